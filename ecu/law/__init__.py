@@ -1,0 +1,1 @@
+"""The pure control law; no CAN word in it."""

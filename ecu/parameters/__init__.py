@@ -1,0 +1,1 @@
+"""Parameter values of the controller: frozen dataclasses beside their TOML sets."""

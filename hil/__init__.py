@@ -1,0 +1,1 @@
+"""The rig: time, buses, processes, faults, logs, reports and the command line."""

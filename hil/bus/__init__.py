@@ -1,0 +1,1 @@
+"""Buses behind one protocol."""

@@ -1,0 +1,1 @@
+"""Log files: guarded reading, vectorised decoding, export."""

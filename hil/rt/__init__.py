@@ -1,0 +1,1 @@
+"""Time: clocks and the fixed-rate loop."""

@@ -1,0 +1,1 @@
+"""The vehicle: submodels, model and node. No I/O in here."""

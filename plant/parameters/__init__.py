@@ -1,0 +1,1 @@
+"""Parameter values of the vehicle: frozen dataclasses beside their TOML sets."""
