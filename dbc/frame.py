@@ -54,14 +54,14 @@ class LinkEvent(NamedTuple):
     bus : the bus it happened on.
     state : what happened.
     time_ns : monotonic time, ns.
-    count : how often (frames lost, errors seen) since the last event of this kind.
+    number : how many (frames lost, errors seen) since the last event of this kind.
     detail : free text from the driver, for people.
     """
 
     bus: BusName
     state: LinkState
     time_ns: int = 0
-    count: int = 1
+    number: int = 1
     detail: str = ""
 
 

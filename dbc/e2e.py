@@ -1,0 +1,119 @@
+"""End-to-end protection: alive counter, check value, data id.
+
+One definition for sender, checker and log decoder. The scheme is AUTOSAR-like profile 1 (variant 1A): CRC-8
+SAE J1850 (polynomial 0x1D, start 0xFF, final XOR 0xFF) over the 16-bit data id (low byte, high byte) and every
+payload byte but the first, which carries the check value; a counter 0..14 sits in the low nibble of the second
+byte. Status names follow AUTOSAR (SWS_E2ELibrary). It protects against faults, not against an attacker.
+"""
+
+from enum import StrEnum
+
+COUNTER_MODULUS = 15  # counts 0..14; 15 never occurs on the wire
+
+
+def _table(polynomial: int) -> bytes:
+    table = []
+    for value in range(256):
+        for _ in range(8):
+            value = (value << 1) ^ polynomial if value & 0x80 else value << 1
+        table.append(value & 0xFF)
+    return bytes(table)
+
+
+_CRC_TABLE = _table(0x1D)
+
+
+def crc8(data: bytes, start: int = 0xFF) -> int:
+    """CRC-8 SAE J1850 of ``data``: polynomial 0x1D, start 0xFF, final XOR 0xFF; b"123456789" gives 0x4B."""
+    crc = start
+    for byte in data:
+        crc = _CRC_TABLE[crc ^ byte]
+    return crc ^ 0xFF
+
+
+def check_value(data_id: int, payload: bytes | bytearray) -> int:
+    """Check value of a payload whose first byte is left out (it holds the check value itself)."""
+    crc = _CRC_TABLE[_CRC_TABLE[0xFF ^ (data_id & 0xFF)] ^ (data_id >> 8)]
+    for byte in payload[1:]:
+        crc = _CRC_TABLE[crc ^ byte]
+    return crc ^ 0xFF
+
+
+def counter_of(payload: bytes | bytearray) -> int:
+    """Alive counter of a payload (low nibble of its second byte)."""
+    return payload[1] & 0x0F
+
+
+def protect(data_id: int, payload: bytearray, counter: int) -> bytes:
+    """Write ``counter`` and the check value into ``payload`` and return it as bytes."""
+    payload[1] = (payload[1] & 0xF0) | (counter % COUNTER_MODULUS)
+    payload[0] = check_value(data_id, payload)
+    return bytes(payload)
+
+
+class Status(StrEnum):
+    """Result of checking one reception (names as in AUTOSAR SWS_E2ELibrary)."""
+
+    OK = "OK"
+    OK_SOME_LOST = "OK_SOME_LOST"
+    SYNC = "SYNC"  # valid, but the sequence is not established (first frame, or after a break)
+    REPEATED = "REPEATED"
+    WRONG_SEQUENCE = "WRONG_SEQUENCE"
+    WRONG_CRC = "WRONG_CRC"  # wrong check value, counter 15 or wrong length
+    NO_NEW_DATA = "NO_NEW_DATA"
+
+
+USABLE = frozenset({Status.OK, Status.OK_SOME_LOST})
+
+
+class Checker:
+    """Checks the sequence of one message.
+
+    Parameters
+    ----------
+    data_id : 16-bit data id of the message.
+    length : payload length, bytes.
+    max_lost : frames that may be missing in a row and still leave the next one usable.
+    sync_frames : consecutive frames needed after a break before data is used again.
+    """
+
+    def __init__(self, data_id: int, length: int, max_lost: int = 2, sync_frames: int = 1) -> None:
+        self.data_id = data_id
+        self.length = length
+        self.max_lost = max_lost
+        self.sync_frames = sync_frames
+        self.counter: int | None = None
+        self.lost = 0
+        self.corrupt = 0
+        self._to_sync = 0
+
+    def check(self, payload: bytes) -> Status:
+        """Check one received payload and remember its counter.
+
+        Only ``OK`` and ``OK_SOME_LOST`` (see ``USABLE``) may be used as fresh data. A shift by a multiple of 15
+        frames cannot be seen by a counter 0..14; the receiver's time-out has to.
+        """
+        if len(payload) != self.length or counter_of(payload) >= COUNTER_MODULUS:
+            self.corrupt += 1
+            return Status.WRONG_CRC
+        if payload[0] != check_value(self.data_id, payload):
+            self.corrupt += 1
+            return Status.WRONG_CRC
+        counter = counter_of(payload)
+        if self.counter is None:
+            self.counter = counter
+            self._to_sync = self.sync_frames
+            return Status.SYNC
+        delta = (counter - self.counter) % COUNTER_MODULUS
+        if delta == 0:
+            return Status.REPEATED
+        self.counter = counter
+        self.lost += delta - 1
+        if delta > self.max_lost + 1:
+            self._to_sync = self.sync_frames
+            return Status.WRONG_SEQUENCE
+        if self._to_sync > 0:
+            self._to_sync -= 1
+            if self._to_sync > 0:
+                return Status.SYNC
+        return Status.OK if delta == 1 else Status.OK_SOME_LOST
