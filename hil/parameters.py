@@ -106,7 +106,7 @@ def _entry(entry: Any, hint: Any, where: str) -> Any:
         if entry.get("unit") != unit:
             raise ParameterError(f"{where}: expected unit {unit!r}, got {entry.get('unit')!r}; convert the value")
         tolerance = entry.get("tolerance")
-        if not _is_number(tolerance) or tolerance < 0:
+        if tolerance is None or not _is_number(tolerance) or tolerance < 0:
             raise ParameterError(f"{where}: expected a tolerance >= 0 in {unit!r} (half width), got {tolerance!r}")
     return _check(entry["value"], hint, where)
 
