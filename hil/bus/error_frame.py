@@ -1,0 +1,68 @@
+"""What Linux reports as error frames, as link events. Field names and values: linux/can/error.h."""
+
+from dbc.frame import BusName, LinkEvent, LinkState
+
+CAN_ERR_TX_TIMEOUT = 0x001
+CAN_ERR_CRTL = 0x004
+CAN_ERR_PROT = 0x008
+CAN_ERR_TRX = 0x010
+CAN_ERR_ACK = 0x020
+CAN_ERR_BUSOFF = 0x040
+CAN_ERR_BUSERROR = 0x080
+CAN_ERR_RESTARTED = 0x100
+CAN_ERR_CNT = 0x200
+
+# data[1]: a state is reported once, with the side that caused it
+_CONTROLLER = (
+    (0x01, LinkState.RX_OVERFLOW, "controller's receive buffer"),
+    (0x02, LinkState.TX_OVERFLOW, "controller's transmit buffer"),
+    (0x04, LinkState.ERROR_WARNING, "receive errors"),
+    (0x08, LinkState.ERROR_WARNING, "transmit errors"),
+    (0x10, LinkState.ERROR_PASSIVE, "receive errors"),
+    (0x20, LinkState.ERROR_PASSIVE, "transmit errors"),
+    (0x40, LinkState.ERROR_ACTIVE, "recovered"),
+)
+
+# data[2]
+_PROTOCOL = (
+    (0x01, "single bit"),
+    (0x02, "frame format"),
+    (0x04, "bit stuffing"),
+    (0x08, "dominant bit not sent"),
+    (0x10, "recessive bit not sent"),
+    (0x20, "overload"),
+    (0x40, "active error announcement"),
+    (0x80, "on transmission"),
+)
+
+
+def link_events(error_class: int, data: bytes, bus: BusName, time_ns: int) -> list[LinkEvent]:
+    """Return what one error frame says, the lasting state last; a lost arbitration is none.
+
+    Parameters
+    ----------
+    error_class : the frame's identifier without flags.
+    data : 8 bytes; missing ones count as 0 (unspecified).
+    """
+    data = data.ljust(8, b"\0")
+    counters = f"; counters tx {data[6]} rx {data[7]}" if error_class & CAN_ERR_CNT else ""
+    found: dict[LinkState, list[str]] = {}
+    if error_class & CAN_ERR_TX_TIMEOUT:
+        found.setdefault(LinkState.BUS_ERROR, []).append("transmission timed out")
+    if error_class & CAN_ERR_TRX:
+        found.setdefault(LinkState.BUS_ERROR, []).append(f"transceiver status 0x{data[4]:02x}")
+    if error_class & CAN_ERR_ACK:
+        found[LinkState.NO_ACK] = ["no acknowledge"]
+    elif error_class & (CAN_ERR_PROT | CAN_ERR_BUSERROR):
+        kinds = [text for bit, text in _PROTOCOL if data[2] & bit] or ["bus error"]
+        where = [f"at 0x{data[3]:02x}"] if data[3] else []
+        found.setdefault(LinkState.BUS_ERROR, []).extend(kinds + where)
+    if error_class & CAN_ERR_CRTL:
+        flagged = [(state, text) for bit, state, text in _CONTROLLER if data[1] & bit]
+        for state, text in flagged or [(LinkState.BUS_ERROR, "controller problem")]:
+            found.setdefault(state, []).append(text)
+    if error_class & CAN_ERR_BUSOFF:
+        found[LinkState.BUS_OFF] = ["bus-off"]
+    if error_class & CAN_ERR_RESTARTED:
+        found[LinkState.RESTARTED] = ["controller restarted"]
+    return [LinkEvent(bus, state, time_ns, 1, ", ".join(texts) + counters) for state, texts in found.items()]

@@ -1,0 +1,145 @@
+"""Where the members of a loopback channel find each other: a directory of listening sockets.
+
+    ${XDG_RUNTIME_DIR, or the temporary directory}/brakebench-<uid>/<channel>/   0700
+        lock                   held (flock) while somebody joins or leaves
+        <pid>-<random>.sock    0600, one per member
+
+Joining and leaving happen one at a time, so everybody meets everybody. Sockets of killed members refuse connections and
+are removed by whoever comes next; the last to leave removes the directory.
+"""
+
+import contextlib
+import fcntl
+import os
+import re
+import socket
+import stat
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from hil.bus.bus import BusError
+from hil.rt.clock import WallClock
+
+_CHANNEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,47}")
+_PATH_LIMIT = 107  # bytes of a Unix socket's path, unix(7)
+_PATIENCE_NS = 5_000_000_000
+_BACKLOG = 1024
+
+
+def base_directory() -> Path:
+    """Return the directory of all this user's channels, which need not exist."""
+    runtime = Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir())
+    return (runtime if runtime.is_dir() else Path(tempfile.gettempdir())) / f"brakebench-{os.getuid()}"
+
+
+class Rendezvous:
+    """One member's way into and out of a channel.
+
+    Parameters
+    ----------
+    channel : letters, digits, ``.``, ``_`` and ``-``, at most 48, the first a letter or digit.
+    """
+
+    def __init__(self, channel: str) -> None:
+        if not _CHANNEL.fullmatch(channel):
+            raise BusError(
+                f"loopback channel {channel!r}: expected 1..48 of letters, digits, '.', '_', '-', not a path"
+            )
+        self._directory = base_directory() / channel
+        self._path = self._directory / f"{os.getpid()}-{os.urandom(3).hex()}.sock"
+        length = len(os.fsencode(self._path))
+        if length > _PATH_LIMIT:
+            raise BusError(
+                f"loopback channel {channel!r}: path {self._path} has {length} bytes, "
+                f"a Unix socket's may have {_PATH_LIMIT}; "
+                "use a shorter channel, or a shorter XDG_RUNTIME_DIR for all members"
+            )
+
+    def join(self) -> tuple[socket.socket, list[socket.socket]]:
+        """Bind this member's socket and connect to all present.
+
+        Returns
+        -------
+        The listening socket and a connection to each member, all non-blocking.
+        """
+        with self._locked():
+            present = self._present()
+            listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
+            try:
+                os.fchmod(listener.fileno(), 0o600)  # before bind: never wider, whatever the umask
+                listener.bind(str(self._path))
+                listener.listen(_BACKLOG)
+            except OSError as error:
+                for one in (listener, *present):
+                    one.close()
+                raise BusError(f"cannot bind {self._path}: {error}") from error
+        return listener, present
+
+    def leave(self, listener: socket.socket) -> None:
+        """Close and remove this member's socket, and the directory after the last member."""
+        listener.close()
+        with contextlib.suppress(BusError), self._locked():
+            self._path.unlink(missing_ok=True)
+            present = self._present()
+            for connection in present:
+                connection.close()
+            if not present:
+                (self._directory / "lock").unlink(missing_ok=True)
+                with contextlib.suppress(OSError):
+                    self._directory.rmdir()
+                    self._directory.parent.rmdir()
+
+    def _present(self) -> list[socket.socket]:
+        """Connect to every living member; remove the sockets of dead ones."""
+        present = []
+        for path in sorted(self._directory.glob("*.sock")):
+            connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
+            try:
+                connection.connect(str(path))
+                present.append(connection)
+            except OSError as error:
+                connection.close()
+                if isinstance(error, ConnectionRefusedError):
+                    path.unlink(missing_ok=True)
+        return present
+
+    @contextlib.contextmanager
+    def _locked(self) -> Iterator[None]:
+        clock = WallClock()
+        give_up_ns = clock.now_ns() + _PATIENCE_NS
+        while True:
+            file = self._open_lock()
+            if file is not None:
+                try:
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    if os.fstat(file).st_nlink:  # else the last member removed it while we waited
+                        break
+                except BlockingIOError:
+                    pass
+                os.close(file)
+            if clock.now_ns() > give_up_ns:
+                raise BusError(f"{self._directory}: locked for 5 s by another member; is one stopped while joining?")
+            clock.sleep_until(clock.now_ns() + 1_000_000)
+        try:
+            yield
+        finally:
+            os.close(file)
+
+    def _open_lock(self) -> int | None:
+        """Open the lock file, making the directories; None where the last member removed them meanwhile."""
+        base = self._directory.parent
+        try:
+            base.mkdir(mode=0o700, exist_ok=True)
+            found = base.lstat()
+            if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
+                raise BusError(
+                    f"{base}: expected a directory of user {os.getuid()} with mode 0700, "
+                    f"got {stat.filemode(found.st_mode)} of user {found.st_uid}; remove it"
+                )
+            self._directory.mkdir(mode=0o700, exist_ok=True)
+            return os.open(self._directory / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise BusError(f"cannot use {self._directory} for a loopback channel: {error}") from error
