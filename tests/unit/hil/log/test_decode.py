@@ -118,7 +118,9 @@ def test_extended_multiplexing_follows_the_chain():
 
 
 def test_whole_numbers_beyond_a_float_stay_exact():
-    text = dbc_of("BO_ 1 M: 8 A", ' SG_ S : 0|64@1+ (1,0) [0|0] "" A', "BO_ 2 N: 8 A", ' SG_ S : 0|64@1- (1,0) [0|0] "" A')
+    text = dbc_of(
+        "BO_ 1 M: 8 A", ' SG_ S : 0|64@1+ (1,0) [0|0] "" A', "BO_ 2 N: 8 A", ' SG_ S : 0|64@1- (1,0) [0|0] "" A'
+    )
     log = decode_log(recording([(1, b"\xff" * 8), (2, struct.pack("<q", -(2**63) + 1))]), parse_database(text))
     assert int(log.columns["M.S"].values[0]) == 2**64 - 1
     assert int(log.columns["N.S"].values[0]) == -(2**63) + 1
