@@ -1,0 +1,43 @@
+"""``brakebench record``: append everything on a bus to a candump file."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from dbc.frame import BusName
+from hil.bus.bus import open_bus
+from hil.bus.channel import bench_channel
+from hil.cli.options import add_bus, add_ready_fd
+from hil.process import StopSignal, end_with_parent, say_ready
+from hil.recorder import FLUSH_PERIOD_NS, Recorder
+from hil.rt.clock import WallClock
+from hil.rt.loop import Loop
+
+
+def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = subparsers.add_parser("record", help="append every frame on a bus to a candump file")
+    parser.add_argument("out", type=Path, metavar="FILE", help="file to create (candump format)")
+    add_bus(parser)
+    add_ready_fd(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Record until Ctrl-C or SIGTERM."""
+    if args.ready_fd is not None:
+        end_with_parent()
+    stop = StopSignal()
+    with open_bus(args.bus, BusName.VEHICLE) as vehicle, open_bus(bench_channel(args.bus), BusName.BENCH) as bench:
+        recorder = Recorder(args.out, [vehicle, bench])
+        try:
+            say_ready(args.ready_fd)
+            for _ in Loop(WallClock(), FLUSH_PERIOD_NS).ticks():
+                recorder.flush()
+                if stop.asked:
+                    break
+        finally:
+            recorder.close()
+    lost = f", {recorder.lost} lost on the way" if recorder.lost else ""
+    print(f"{recorder.frames} frames recorded to {args.out}{lost}", file=sys.stderr)
+    return 0

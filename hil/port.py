@@ -1,0 +1,71 @@
+"""Between a node and its buses."""
+
+from collections.abc import Iterable, Sequence
+from types import TracebackType
+from typing import Self
+
+from dbc.contract import contract
+from dbc.frame import BusName, Frame, Received
+from hil.bus.bus import Bus, open_bus
+from hil.bus.channel import bench_channel
+
+
+class Port:
+    """Joins a node to the vehicle bus and the bench bus; refuses to send what its role does not own.
+
+    Parameters
+    ----------
+    vehicle, bench : the two buses, open; the port closes them.
+    senders : DBC nodes the role plays; empty for one that only listens.
+    """
+
+    def __init__(self, vehicle: Bus, bench: Bus, senders: Iterable[str]) -> None:
+        self._buses = {BusName.VEHICLE: vehicle, BusName.BENCH: bench}
+        self._owned = {(bus, spec.can_id): spec.length for bus in BusName for spec in contract(bus).sent_by(*senders)}
+
+    @classmethod
+    def open(cls, vehicle_spec: str, senders: Iterable[str]) -> Self:
+        """Join a vehicle bus and the bench bus that belongs to it."""
+        vehicle = open_bus(vehicle_spec, BusName.VEHICLE)
+        try:
+            bench = open_bus(bench_channel(vehicle_spec), BusName.BENCH)
+        except BaseException:
+            vehicle.close()
+            raise
+        return cls(vehicle, bench, senders)
+
+    def receive(self) -> list[Received]:
+        """Everything that arrived since the last call: the vehicle bus first, each bus in its order."""
+        return self._buses[BusName.VEHICLE].receive(0.0) + self._buses[BusName.BENCH].receive(0.0)
+
+    def send(self, frames: Sequence[Frame]) -> None:
+        """Send the frames of one tick.
+
+        Raises
+        ------
+        ValueError
+            A frame whose identifier or length the role does not own in the DBC: a mistake of the node.
+        """
+        for bus, out in self._buses.items():
+            mine = [frame for frame in frames if frame.bus is bus]
+            for frame in mine:
+                if frame.extended or self._owned.get((bus, frame.can_id)) != len(frame.data):
+                    raise ValueError(
+                        f"{bus} bus: frame 0x{frame.can_id:X} with {len(frame.data)} bytes is not this role's to send; "
+                        "its identifiers and lengths are those of its senders in the DBC"
+                    )
+            if mine:
+                out.send(mine)
+
+    def close(self) -> None:
+        """Leave both buses."""
+        for bus in self._buses.values():
+            bus.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,139 @@
+"""The one place that starts and stops processes."""
+
+import contextlib
+import ctypes
+import os
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from hil.rt.clock import WallClock
+
+_PR_SET_PDEATHSIG = 1  # linux/prctl.h
+STOP_TIMEOUT_NS = 3_000_000_000
+
+
+def end_with_parent() -> None:
+    """Ask the kernel to end this process (SIGTERM) when its parent dies, however the parent dies."""
+    parent = os.getppid()
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
+    if os.getppid() != parent:  # it died before we asked
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+class StopSignal:
+    """Turns SIGTERM and SIGINT into a flag, so that a loop ends between two ticks.
+
+    Attributes
+    ----------
+    asked : whether a signal has come.
+    interrupted : whether it was SIGINT (Ctrl-C).
+    """
+
+    def __init__(self) -> None:
+        self.asked = False
+        self.interrupted = False
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, self._take)
+
+    def _take(self, number: int, _frame: object) -> None:
+        self.asked = True
+        self.interrupted = self.interrupted or number == signal.SIGINT
+
+
+class Child:
+    """A brakebench command as a process of its own.
+
+    It runs in its own session (a Ctrl-C reaches only us), ends when we end, and says ready over a pipe.
+
+    Parameters
+    ----------
+    name : what people call it.
+    arguments : command line behind ``brakebench``.
+    error_path : file that takes what it prints.
+    """
+
+    def __init__(self, name: str, arguments: Sequence[str], error_path: Path) -> None:
+        self.name = name
+        self.error_path = error_path
+        self._ready, child_end = os.pipe()
+        command = [sys.executable, "-m", "hil.cli.main", *arguments, "--ready-fd", str(child_end)]
+        try:
+            with error_path.open("wb") as output:
+                self._process = subprocess.Popen(
+                    command,
+                    stdin=subprocess.DEVNULL,
+                    stdout=output,
+                    stderr=output,
+                    pass_fds=(child_end,),
+                    start_new_session=True,
+                )
+        finally:
+            os.close(child_end)
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    @property
+    def ended(self) -> bool:
+        """Whether the process is gone."""
+        return self._process.poll() is not None
+
+    @property
+    def failed(self) -> bool:
+        """Whether the process is gone with anything but success."""
+        return self._process.poll() not in (None, 0)
+
+    def wait_ready(self, timeout_s: float) -> bool:
+        """Wait until the process says ready; False when it ends before or does not within ``timeout_s``."""
+        readable, _, _ = select.select([self._ready], [], [], timeout_s)
+        return bool(readable) and os.read(self._ready, 1) == b"r"
+
+    def why(self) -> str:
+        """How the process ended, with its last words."""
+        code = self._process.poll()
+        if code is None:
+            how = "still runs"
+        elif code < 0:
+            how = f"was killed by {signal.Signals(-code).name}"
+        else:
+            how = f"ended with exit code {code}"
+        words = self.error_path.read_text(errors="replace").strip().splitlines()
+        return f"{self.name} (process {self.pid}) {how}" + (f": {words[-1]}" if words else "")
+
+    def ask_to_stop(self) -> None:
+        """Send SIGTERM."""
+        if not self.ended:
+            self._process.terminate()
+
+    def stop(self) -> None:
+        """Make sure that it is gone: SIGTERM, and SIGKILL after a while."""
+        self.ask_to_stop()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(STOP_TIMEOUT_NS * 1e-9)
+        if not self.ended:
+            self._process.kill()
+            self._process.wait()
+        if self._ready >= 0:
+            os.close(self._ready)
+            self._ready = -1
+
+
+def say_ready(ready_fd: int | None) -> None:
+    """Tell the parent that waits at the other end of ``ready_fd`` (None: nobody waits)."""
+    if ready_fd is not None:
+        os.write(ready_fd, b"r")
+        os.close(ready_fd)
+
+
+def wait_for_end(children: Sequence[Child], timeout_ns: int = STOP_TIMEOUT_NS) -> None:
+    """Give all children the same time to end after they were asked to."""
+    clock = WallClock()
+    deadline_ns = clock.now_ns() + timeout_ns
+    while clock.now_ns() < deadline_ns and not all(child.ended for child in children):
+        clock.sleep_until(clock.now_ns() + 5_000_000)
