@@ -81,6 +81,8 @@ class LoopbackBus:
 
     def send(self, frames: Sequence[Frame]) -> None:
         """Send frames to all members but this one, in packets of up to `MAX_FRAMES`."""
+        if self._epoll.closed:
+            raise ValueError(f"{self.name} is closed")
         if self._joiners.poll(0):
             self._accept()
         time_ns = monotonic_ns()
@@ -104,6 +106,8 @@ class LoopbackBus:
 
     def receive(self, timeout_s: float = 0.0) -> list[Received]:
         """Return everything there is: in order per member, by time of sending between members."""
+        if self._epoll.closed:
+            raise ValueError(f"{self.name} is closed")
         received = self._drain(0.0)
         if received or timeout_s <= 0:
             return received

@@ -4,21 +4,21 @@ python-can is imported on first use (it takes 0.4 s) and kept quiet: what it wou
 """
 
 import errno
-import logging
+import select
 import threading
 from collections.abc import Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 from dbc.frame import BusName, Frame, LinkEvent, LinkState, Received
-from hil.bus.bus import BUS_KINDS, BusError, BusSpec
+from hil.bus.bus import BusError, BusSpec
+from hil.bus.driver import error_number, kernel_drops, open_driver, shut
 from hil.bus.error_frame import link_events
 from hil.rt.clock import monotonic_ns, wall_time_ns
 
 if TYPE_CHECKING:
     import can
 
-DEFAULT_BITRATE = 500_000
 _MOST_MESSAGES = 4096  # per receive: a babbling bus does not hold the caller up
 _STAMP_TRUST_NS = 10_000_000_000  # a driver's stamp further from now counts from elsewhere
 _FIRST_RETRY_S, _LAST_RETRY_S = 0.1, 5.0
@@ -49,14 +49,16 @@ class PythonCanBus:
         self._refused: dict[str, int] = {}
         self._closing = threading.Event()
         self._reopened = threading.Event()
-        self._driver: can.BusABC | None = None
-        self._first: can.Message | None = None
-        self._driver, self._first = _open(spec)
+        self._dropped = 0
+        self._driver: can.BusABC | None
+        self._first: can.Message | None
+        self._driver, self._first = open_driver(spec)
 
     def send(self, frames: Sequence[Frame]) -> None:
         """Send frames; what the driver's queue does not take is dropped, not kept for later."""
         import can
 
+        self._refuse_closed()
         timeout = None if self._spec.kind in _WAITING_DRIVERS else 0.0
         messages = []
         for bus, can_id, data, _, extended in frames:
@@ -74,11 +76,12 @@ class PythonCanBus:
                 driver.send(message, timeout)
             except Exception as error:  # drivers raise what they like; a node must live
                 self._refuse(str(error), 1)
-                if _errno(error) in _GONE:
+                if error_number(error) in _GONE:
                     self._disconnect(error)
 
     def receive(self, timeout_s: float = 0.0) -> list[Received]:
         """Return everything there is, in order; wait up to ``timeout_s`` for the first."""
+        self._refuse_closed()
         received, self._pending = self._pending, []
         for detail, count in self._refused.items():
             received.append(LinkEvent(self.bus, LinkState.TX_OVERFLOW, monotonic_ns(), count, detail))
@@ -106,7 +109,7 @@ class PythonCanBus:
         self._closing.set()
         driver, self._driver = self._driver, None
         if driver is not None:
-            _shut(driver)
+            shut(driver)
 
     def __enter__(self) -> Self:
         return self
@@ -121,22 +124,42 @@ class PythonCanBus:
         failed = False
         offset_ns = wall_time_ns() - monotonic_ns()
         for _ in range(_MOST_MESSAGES):
-            if (driver := self._current(wait_s)) is None:
+            driver = self._current(wait_s)
+            if self._pending:
                 received += self._pending
                 self._pending.clear()
+                wait_s = 0.0
+            if driver is None:
                 return
             try:
-                message = self._first or driver.recv(wait_s)
+                message = self._first or driver.recv(self._await(wait_s))
                 self._first = None
             except Exception as error:  # as in send
-                if failed or _errno(error) in _GONE:
+                if failed or error_number(error) in _GONE:
                     self._disconnect(error)
                 failed = True
                 continue
             if message is None:
+                self._count_drops(driver, received)
                 return
             failed, wait_s = False, 0.0
             self._take(message, offset_ns, received)
+
+    def _await(self, wait_s: float) -> float:
+        """Wait on the descriptor where there is one (python-can waits in wall time); return what is left to wait."""
+        if wait_s > 0 and (file := self.fileno()) != -1:
+            ready = select.poll()
+            ready.register(file, select.POLLIN)
+            ready.poll(wait_s * 1e3)
+            return 0.0
+        return wait_s
+
+    def _count_drops(self, driver: "can.BusABC", received: list[Received]) -> None:
+        """Report what the kernel dropped because the socket's queue was full (socketcan only)."""
+        dropped = kernel_drops(driver)
+        if dropped != self._dropped:
+            lost, self._dropped = (dropped - self._dropped) & 0xFFFFFFFF, dropped
+            received.append(LinkEvent(self.bus, LinkState.RX_OVERFLOW, monotonic_ns(), lost, "socket's queue full"))
 
     def _take(self, message: "can.Message", offset_ns: int, received: list[Received]) -> None:
         now_ns = monotonic_ns()
@@ -156,6 +179,10 @@ class PythonCanBus:
             data = bytes(message.data[:8])
             received.append(Frame(self.bus, message.arbitration_id, data, time_ns, message.is_extended_id))
 
+    def _refuse_closed(self) -> None:
+        if self._closing.is_set():
+            raise ValueError(f"{self.name} is closed")
+
     def _refuse(self, detail: str, count: int) -> None:
         self._refused[detail] = self._refused.get(detail, 0) + count
 
@@ -172,7 +199,7 @@ class PythonCanBus:
         driver, self._driver = self._driver, None
         if driver is None:
             return
-        _shut(driver)
+        shut(driver)
         self._pending.append(LinkEvent(self.bus, LinkState.DISCONNECTED, monotonic_ns(), 1, f"{self.name}: {error}"))
         threading.Thread(target=self._reopen, name=f"reopen {self.name}", daemon=True).start()
 
@@ -182,85 +209,12 @@ class PythonCanBus:
         while not self._closing.wait(retry_s):
             retry_s = min(2.0 * retry_s, _LAST_RETRY_S)
             try:
-                driver, first = _open(self._spec)
+                driver, first = open_driver(self._spec)
             except BusError:
                 continue
-            if self._closing.is_set():
-                _shut(driver)
-                return
+            self._dropped = 0
             self._driver, self._first = driver, first
             self._reopened.set()
+            if self._closing.is_set():
+                self.close()
             return
-
-
-def _errno(error: Exception) -> int | None:
-    return getattr(error, "error_code", None) or getattr(error, "errno", None)
-
-
-def _shut(driver: "can.BusABC") -> None:
-    try:
-        driver.shutdown()
-    except Exception:  # the device is gone: nothing is left to be closed
-        logging.getLogger("can").debug("shutdown failed", exc_info=True)
-
-
-def _open(spec: BusSpec) -> tuple["can.BusABC", "can.Message | None"]:
-    """Open and try to read: a socketcan interface that is down opens, but does not read."""
-    import can
-
-    log = logging.getLogger("can")
-    if log.level == logging.NOTSET:
-        log.setLevel(logging.CRITICAL)
-    channel: Any = int(spec.channel) if spec.channel.isdigit() else spec.channel
-    if spec.kind not in can.VALID_INTERFACES:
-        kinds = ", ".join(sorted({kind.kind for kind in BUS_KINDS} | can.VALID_INTERFACES))
-        raise BusError(f"bus {spec.name}: there is no kind {spec.kind!r}, only {kinds}")
-    try:
-        driver = can.Bus(channel=channel, interface=spec.kind, ignore_config=True, **_options(spec))
-    except Exception as error:  # drivers raise ImportError, OSError, NameError, ...
-        raise BusError(f"bus {spec.name}: {_reason(spec, error)}") from error
-    try:
-        return driver, driver.recv(0.0)
-    except Exception as error:
-        _shut(driver)
-        raise BusError(f"bus {spec.name}: {_reason(spec, error)}") from error
-
-
-def _options(spec: BusSpec) -> dict[str, Any]:
-    import can
-
-    options: dict[str, Any] = dict(spec.options)
-    listen_only = options.pop("listen_only", False)
-    if spec.kind == "socketcan":
-        if listen_only or "bitrate" in options:
-            raise BusError(
-                f"bus {spec.name}: socketcan takes bit rate and listen-only from the link: "
-                f"sudo ip link set {spec.channel} type can bitrate 500000 listen-only on"
-            )
-        return options
-    options.setdefault("bitrate", DEFAULT_BITRATE)
-    if listen_only:
-        modes: dict[str, dict[str, Any]] = {
-            "kvaser": {"driver_mode": False},
-            "pcan": {"state": can.BusState.PASSIVE},
-            "slcan": {"listen_only": True},
-            "vector": {"listen_only": True},
-        }
-        if spec.kind not in modes:
-            raise BusError(f"bus {spec.name}: listen_only is known of {', '.join(modes)}, not of {spec.kind}")
-        options |= modes[spec.kind]
-    return options
-
-
-def _reason(spec: BusSpec, error: Exception) -> str:
-    text = str(error) or type(error).__name__
-    if spec.kind != "socketcan":
-        return f"{text} (is the driver of {spec.kind} installed, the adapter attached?)"
-    code = _errno(error)
-    if code in (errno.EAFNOSUPPORT, errno.EPROTONOSUPPORT) or isinstance(error, AttributeError):
-        return f"{text}; this kernel has no SocketCAN: sudo modprobe can-raw, or use loopback:NAME"
-    if code == errno.ENETDOWN:
-        return f"{text}; bring it up: sudo ip link set {spec.channel} up"
-    if code == errno.ENODEV:
-        return f"{text}; see `ip link`; a virtual one: sudo ip link add dev {spec.channel} type vcan"
-    return text
