@@ -1,0 +1,283 @@
+"""A report as one picture (PNG, SVG or PDF by the file's suffix): verdict, numbers, timeline, panels and charts.
+
+Tables and what was run are left to the page. The picture is drawn with matplotlib's objects alone: no global state.
+"""
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hil.report.palette import INK, SEVERITY_COLOURS, Stroke, strokes
+from hil.report.report import Chart, Curve, Floats, Lane, Number, Panel, Report, Section, Span
+from hil.report.units import Unit, shown, symbol
+from hil.report.words import clean, number_text
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.text import Text
+
+WIDTH_IN = 11.0
+_EDGE, _LEFT, _GAP = 0.3, 0.55, 0.35  # in: page edge, room for tick labels, between columns
+_PLOT, _CHART, _LANE, _LINE = 1.25, 2.3, 0.34, 0.19  # in: heights of a plot, a chart, a lane, a line of text
+_SOFT, _RULE, _GRID = "#57636F", "#C9D1D9", "#E8ECF0"
+_VERDICT_COLOURS = {"passed": "#1D7A4F", "failed": "#B3261E", "incomplete": "#9A6700"}
+_NUMBERS_A_ROW = 7
+
+
+def write_figure(report: Report, path: Path, dpi: int = 130) -> None:
+    """Draw the report and write it in the format of ``path``'s suffix."""
+    with warnings.catch_warnings():
+        # a sign that the font lacks is drawn as a box, which is what a reader should see of it
+        warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
+        draw(report).savefig(path, dpi=dpi, facecolor="white", metadata={"Title": clean(report.title)})
+
+
+class _Cell:
+    """One field of the grid: its height without legend, its strokes' names, and how to fill it."""
+
+    def __init__(self, title: str, names: Sequence[str], height: float, fill: Callable[["Axes"], None]) -> None:
+        self.title, self.names, self.height, self.fill = title, names, height, fill
+
+    def legend_columns(self, width: float) -> int:
+        widest = max(map(len, self.names), default=0)
+        return max(1, min(len(self.names), int(width / (0.062 * widest + 0.38))))
+
+    def head(self, width: float) -> float:
+        """Return the height of title and legend, in."""
+        rows = math.ceil(len(self.names) / self.legend_columns(width)) if len(self.names) > 1 else 0
+        return 0.24 + 0.155 * rows
+
+
+def draw(report: Report) -> "Figure":
+    """Return the report as a matplotlib figure."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    blocks = [(section, _cells(section)) for section in report.sections]
+    columns = 2 if max((len(cells) for _, cells in blocks), default=0) > 3 else 1
+    inner = WIDTH_IN - 2 * _EDGE
+    width = (inner - (columns - 1) * _GAP) / columns - _LEFT
+    grids = [[cells[i : i + columns] for i in range(0, len(cells), columns)] for _, cells in blocks]
+    title_rows = math.ceil(len(report.numbers) / _NUMBERS_A_ROW)
+    height = 2 * _EDGE + 0.62 + 0.5 * title_rows
+    height += sum(0.34 + sum(_row_height(row, width) for row in grid) for grid in grids if grid)
+
+    figure = Figure(figsize=(WIDTH_IN, height))
+    FigureCanvasAgg(figure)
+    top = _header(figure, report, height)
+    for (section, _), grid in zip(blocks, grids, strict=True):
+        if not grid:
+            continue
+        top -= 0.3
+        _write(figure, _EDGE, top, clean(section.title), size=11, weight="bold")
+        top -= 0.04
+        for row in grid:
+            head = max(cell.head(width) for cell in row)
+            for column, cell in enumerate(row):
+                left = _EDGE + _LEFT + column * (width + _LEFT + _GAP)
+                bottom = top - head - cell.height
+                axes = figure.add_axes((left / WIDTH_IN, bottom / height, width / WIDTH_IN, cell.height / height))
+                _prepare(axes)
+                cell.fill(axes)
+                _legend(axes, cell, head, width)
+            top -= _row_height(row, width)
+    return figure
+
+
+def _row_height(row: Sequence[_Cell], width: float) -> float:
+    return max(cell.head(width) for cell in row) + max(cell.height for cell in row) + 0.42
+
+
+def _header(figure: "Figure", report: Report, height: float) -> float:
+    """Write title, verdict and numbers; return the height left, in."""
+    top = height - _EDGE
+    _write(figure, _EDGE, top - 0.14, clean(report.title), size=15, weight="bold")
+    left = _EDGE
+    if report.verdict is not None:
+        badge = _write(figure, _EDGE + 0.06, top - 0.45, report.verdict.value, size=9.5, weight="bold", colour="white")
+        badge.set_bbox({"boxstyle": "round,pad=0.35", "facecolor": _VERDICT_COLOURS[report.verdict], "linewidth": 0})
+        left += 0.095 * len(report.verdict.value) + 0.28
+    _write(figure, left, top - 0.45, clean(report.reason), size=10)
+    top -= 0.62
+    for index, number in enumerate(report.numbers):
+        row, column = divmod(index, _NUMBERS_A_ROW)
+        _number(figure, number, _EDGE + column * (WIDTH_IN - 2 * _EDGE) / _NUMBERS_A_ROW, top - 0.5 * row)
+    return top - 0.5 * math.ceil(len(report.numbers) / _NUMBERS_A_ROW)
+
+
+def _number(figure: "Figure", number: Number, left: float, top: float) -> None:
+    value, unit = number_text(number)
+    colour = {None: INK, True: _VERDICT_COLOURS["passed"], False: _VERDICT_COLOURS["failed"]}[number.met]
+    text = f"{value} {unit}".strip()
+    limit = f"  ({clean(number.limit)})" if number.limit else ""
+    _write(figure, left, top - 0.14, _cut(clean(number.label), 26), size=7.5, colour=_SOFT)
+    _write(figure, left, top - 0.34, _cut(text, 20) + limit, size=10.5 if len(text + limit) < 18 else 8, colour=colour)
+
+
+def _write(
+    figure: "Figure", x: float, y: float, text: str, size: float, colour: str = INK, weight: str = "normal"
+) -> "Text":
+    """Write ``text`` at (x, y) inches from the lower left, vertically centred."""
+    width, height = figure.get_size_inches()
+    place = x / width, y / height
+    return figure.text(*place, text, fontsize=size, color=colour, weight=weight, va="center", parse_math=False)
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else text[: most - 1] + "…"
+
+
+def _cells(section: Section) -> list[_Cell]:
+    span = section.time_range_s()
+    cells = []
+    if span is not None:
+        span = span if span[1] > span[0] else (span[0] - 0.5, span[1] + 0.5)
+        if section.timeline:
+            height = max(_PLOT, _LANE * len(section.timeline))
+            cells.append(_Cell("Timeline", (), height, lambda axes: _fill_timeline(axes, section.timeline, span)))
+        for panel in section.panels:
+            names = [clean(trace.name) for trace in panel.traces]
+            cells.append(
+                _Cell(_titled(panel.title, panel.unit), names, _PLOT, _panel_filler(panel, section.timeline, span))
+            )
+    for chart in section.charts:
+        names = [clean(curve.name) for curve in chart.curves]
+        cells.append(_Cell(clean(chart.title), names, _CHART, _chart_filler(chart)))
+    return cells
+
+
+def _titled(title: str, unit: Unit) -> str:
+    return f"{clean(title)}  [{clean(symbol(unit))}]" if symbol(unit) else clean(title)
+
+
+def _prepare(axes: "Axes") -> None:
+    axes.grid(True, color=_GRID, linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.tick_params(labelsize=7.5, colors=_SOFT, length=3, width=0.8)
+    for name, spine in axes.spines.items():
+        spine.set_visible(name in {"left", "bottom"})
+        spine.set_color(_RULE)
+
+
+def _legend(axes: "Axes", cell: _Cell, head: float, width: float) -> None:
+    """Write the cell's title and, where it has more than one trace, its legend between title and plot."""
+    top = 1.0 + (head - 0.14) / cell.height
+    axes.text(
+        0.0,
+        top,
+        cell.title,
+        transform=axes.transAxes,
+        fontsize=9,
+        weight="bold",
+        color=INK,
+        va="center",
+        parse_math=False,
+    )
+    if len(cell.names) < 2:
+        return
+    columns = cell.legend_columns(width)
+    rows = math.ceil(len(cell.names) / columns)
+    order = [row * columns + column for column in range(columns) for row in range(rows)]  # matplotlib fills downwards
+    handles = axes.lines[: len(cell.names)]
+    order = [i for i in order if i < len(handles)]
+    legend = axes.legend(
+        [handles[i] for i in order],
+        ["-"] * len(order),
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=columns,
+        frameon=False,
+        fontsize=7.5,
+        handlelength=1.8,
+        columnspacing=1.2,
+        borderpad=0.15,
+        borderaxespad=0.1,
+        handletextpad=0.5,
+        labelspacing=0.25,
+    )
+    for text, i in zip(legend.get_texts(), order, strict=True):  # set late: a leading "_" would hide the entry
+        text.set_parse_math(False)
+        text.set_text(cell.names[i])
+        text.set_color(INK)
+
+
+def _panel_filler(panel: Panel, timeline: Sequence[Lane], span: tuple[float, float]) -> Callable[["Axes"], None]:
+    def fill(axes: "Axes") -> None:
+        for trace, stroke in zip(panel.traces, strokes(panel.traces), strict=True):
+            _stroke(axes, trace.t_s, shown(trace.y, panel.unit), stroke)
+        axes.set_xlim(*span)
+        for t_s, colour in _marks(timeline):
+            axes.axvline(t_s, color=colour, linewidth=0.8, alpha=0.55, zorder=0.5)
+        axes.set_xlabel("Time in s", fontsize=7.5, color=_SOFT, labelpad=1)
+
+    return fill
+
+
+def _marks(timeline: Sequence[Lane]) -> list[tuple[float, str]]:
+    """Return when something went wrong, and its colour: worth a line through every panel."""
+    marks = [(s.start_s, s.severity) for lane in timeline for s in lane.spans]
+    marks += [(e.t_s, e.severity) for lane in timeline for e in lane.events]
+    return [(t_s, SEVERITY_COLOURS[severity]) for t_s, severity in marks if severity in {"warning", "error"}]
+
+
+def _stroke(axes: "Axes", x: Floats, y: Floats, stroke: Stroke) -> None:
+    width = stroke.width * 0.8
+    dash = (0.0, tuple(length / 1.6 for length in stroke.dash)) if stroke.dash else "solid"
+    if stroke.points:
+        axes.plot(x, y, linestyle="none", marker="o", markersize=3, color=stroke.colour, alpha=0.75, markeredgewidth=0)
+    else:
+        axes.plot(x, y, color=stroke.colour, linewidth=width, linestyle=dash)
+
+
+def _fill_timeline(axes: "Axes", timeline: Sequence[Lane], span: tuple[float, float]) -> None:
+    for row, lane in enumerate(timeline):
+        axes.text(span[0], row - 0.43, clean(lane.name), fontsize=7, color=_SOFT, va="center", parse_math=False)
+        for part in lane.spans:
+            _draw_span(axes, part, row, span)
+        for event in lane.events:
+            axes.plot([event.t_s], [row + 0.05], marker="D", markersize=4.5, color=SEVERITY_COLOURS[event.severity])
+    axes.grid(False)
+    axes.set_xlim(*span)
+    axes.set_ylim(len(timeline) - 0.5, -0.62)
+    axes.set_yticks([])
+    axes.spines["left"].set_visible(False)
+    axes.set_xlabel("Time in s", fontsize=7.5, color=_SOFT, labelpad=1)
+
+
+def _draw_span(axes: "Axes", part: Span, row: int, span: tuple[float, float]) -> None:
+    colour = SEVERITY_COLOURS[part.severity]
+    length = part.end_s - part.start_s
+    axes.broken_barh([(part.start_s, length)], (row - 0.2, 0.5), facecolor=colour, alpha=0.22, linewidth=0)
+    axes.plot([part.start_s] * 2, [row - 0.2, row + 0.3], color=colour, linewidth=1.8, solid_capstyle="butt")
+    fits = int(length / (span[1] - span[0]) * 78)  # characters of 7 points in a half-width plot
+    if fits >= min(len(part.label), 4):
+        label = _cut(clean(part.label), fits)
+        axes.text(
+            part.start_s, row + 0.06, f" {label}", fontsize=7, color=INK, va="center", clip_on=True, parse_math=False
+        )
+
+
+def _chart_filler(chart: Chart) -> Callable[["Axes"], None]:
+    def fill(axes: "Axes") -> None:
+        drawn = strokes(chart.curves)
+        for curve, stroke in zip(chart.curves, drawn, strict=True):
+            _stroke(axes, shown(curve.x, chart.x_unit), shown(curve.y, chart.y_unit), stroke)
+        for curve, stroke in zip(chart.curves, drawn, strict=True):  # after the lines, which the legend counts
+            _interval(axes, chart, curve, stroke)
+        axes.set_xlabel(_titled(chart.x_label, chart.x_unit), fontsize=7.5, color=_SOFT, labelpad=1, parse_math=False)
+        axes.set_ylabel(_titled(chart.y_label, chart.y_unit), fontsize=7.5, color=_SOFT, labelpad=2, parse_math=False)
+
+    return fill
+
+
+def _interval(axes: "Axes", chart: Chart, curve: Curve, stroke: Stroke) -> None:
+    if curve.low is None or curve.high is None:
+        return
+    x, low, high = shown(curve.x, chart.x_unit), shown(curve.low, chart.y_unit), shown(curve.high, chart.y_unit)
+    if stroke.points:
+        axes.vlines(x, low, high, color=stroke.colour, linewidth=1.0)
+    else:
+        axes.fill_between(x, low, high, color=stroke.colour, alpha=0.18, linewidth=0)

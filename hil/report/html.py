@@ -1,0 +1,197 @@
+"""A report as one HTML file that needs no network: plots that zoom together, numbers, and what was run."""
+
+import json
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from hil.report.page import FOOT, HEAD, SCRIPT, STYLE
+from hil.report.palette import INK, SEVERITY_COLOURS, Stroke, strokes
+from hil.report.plots import MARGIN_LEFT, MARGIN_RIGHT, Pool, chart_figure, panel_figure
+from hil.report.report import Chart, Curve, Lane, Number, Panel, Report, Section, Table, Trace
+from hil.report.thin import samples_per_trace
+from hil.report.units import symbol
+from hil.report.words import clean, number_text, outline, value_text
+
+_VERDICT_MARKS = {"passed": "✓", "failed": "✗", "incomplete": "!"}
+
+
+def write_html(report: Report, path: Path) -> None:
+    """Write `render_html` to ``path``."""
+    path.write_text(render_html(report), encoding="utf-8")
+
+
+def render_html(report: Report) -> str:
+    """Return the report as one HTML document; plotly's script is in it once, and nothing is loaded from elsewhere."""
+    pool = Pool(samples_per_trace(report))
+    figures: list[dict[str, Any]] = []
+    body = [_header(report), *(_section(section, pool, figures) for section in report.sections)]
+    if report.provenance:
+        body.append(_provenance(report))
+    if pool.thinned:
+        body.append(_thinned(pool))
+    data = json.dumps({"times": pool.lists, "figures": figures}, separators=(",", ":"), allow_nan=False)
+    data = data.replace("<", "\\u003c")  # cannot end the script, nor open a comment in it
+    margins = f":root {{ --left: {MARGIN_LEFT}px; --right: {MARGIN_RIGHT}px; }}"
+    severities = "\n".join(f".{name} {{ --mark: {colour}; }}" for name, colour in SEVERITY_COLOURS.items())
+    parts = [
+        HEAD.format(title=_text(report.title), style=f"{margins}\n{severities}\n{STYLE}"),
+        *body,
+        f'<script type="application/json" id="data">{data}</script>',
+    ]
+    if figures:
+        from plotly.offline import get_plotlyjs  # 5 MB of text, only where a page is written
+
+        parts.append(f"<script>{get_plotlyjs()}</script>")
+    return "\n".join([*parts, f"<script>{SCRIPT}</script>", FOOT])
+
+
+def _text(text: str) -> str:
+    return escape(clean(text))
+
+
+def _header(report: Report) -> str:
+    verdict = ""
+    if report.verdict is not None:
+        verdict = f'<span class="badge {report.verdict}">{_VERDICT_MARKS[report.verdict]} {report.verdict}</span>'
+    reason = f"<p>{verdict} {_text(report.reason)}</p>" if verdict or report.reason else ""
+    cards = "".join(_card(number) for number in report.numbers)
+    return f'<header><h1>{_text(report.title)}</h1>{reason}</header>\n<dl class="cards">{cards}</dl>'
+
+
+def _card(number: Number) -> str:
+    value, unit = (escape(part) for part in number_text(number))
+    state = "" if number.met is None else " met" if number.met else " missed"
+    mark = "" if number.met is None else "✓ " if number.met else "✗ "
+    limit = f'<dd class="limit">{mark}{_text(number.limit)} {unit}</dd>' if number.limit or mark else ""
+    note = f'<dd class="note">{_text(number.note)}</dd>' if number.note else ""
+    state += " long" if len(value) > 12 else ""
+    shown = f'<dd class="value">{value} <small>{unit}</small></dd>'
+    return f'<div class="card{state}"><dt>{_text(number.label)}</dt>{shown}{limit}{note}</div>'
+
+
+def _section(section: Section, pool: Pool, figures: list[dict[str, Any]]) -> str:
+    parts = [f"<section><h2>{_text(section.title)}</h2>"]
+    if section.text:
+        parts.append(f"<p>{_text(section.text)}</p>")
+    span = section.time_range_s()
+    if span is not None:
+        start, end = span if span[1] > span[0] else (span[0] - 0.5, span[1] + 0.5)
+        parts.append(f'<div class="linked" data-start="{start!r}" data-end="{end!r}">{_TOOLS}')
+        if section.timeline:
+            lanes = "".join(_lane(lane, start, end) for lane in section.timeline)
+            parts.append(f'<div class="timeline">{lanes}<div class="cursor"></div></div>')
+        parts += [_panel(panel, (start, end), pool, figures) for panel in section.panels]
+        parts.append(f'<p class="axis">Time in s</p>{_happenings(section)}</div>')
+    if section.charts:
+        charts = "".join(_chart(chart, pool, figures) for chart in section.charts)
+        parts.append(f'<div class="charts">{charts}</div>')
+    parts += [_table(table) for table in section.tables]
+    return "\n".join([*parts, "</section>"])
+
+
+_TOOLS = """<div class="tools"><output class="window"></output>\
+<span class="hint">drag to zoom all, shift-drag to pan, double-click for all</span><span class="buttons">\
+<button data-do="left" title="Earlier">◀</button><button data-do="in" title="Zoom in">+</button>\
+<button data-do="out" title="Zoom out">−</button><button data-do="right" title="Later">▶</button>\
+<button data-do="all" title="Whole time">All</button></span></div>"""
+
+
+def _lane(lane: Lane, start: float, end: float) -> str:
+    length = end - start
+    marks = []
+    for span in lane.spans:
+        place = f"left:{(span.start_s - start) / length:.4%};width:{(span.end_s - span.start_s) / length:.4%}"
+        tip = f"{_text(span.label)}: {span.start_s:.3f} to {span.end_s:.3f} s"
+        marks.append(
+            f'<span class="span {span.severity}" data-start="{span.start_s!r}" data-end="{span.end_s!r}" '
+            f'style="{place}" title="{tip}"><b>{_text(span.label)}</b></span>'
+        )
+    for event in sorted(lane.events, key=lambda event: event.t_s):
+        marks.append(
+            f'<span class="event {event.severity}" data-start="{event.t_s!r}" '
+            f'style="left:{(event.t_s - start) / length:.4%}" title="{_text(event.label)}: {event.t_s:.3f} s">'
+            f"<i></i><b>{_text(event.label)}</b></span>"
+        )
+    return f'<div class="lane"><h4>{_text(lane.name)}</h4><div class="bar">{"".join(marks)}</div></div>'
+
+
+def _happenings(section: Section) -> str:
+    rows = section.happenings()
+    if not rows:
+        return ""
+    cells = "".join(
+        f"<tr><td class=n>{span.start_s:.3f}</td>"
+        f"<td class=n>{f'{span.end_s:.3f}' if span.end_s > span.start_s else ''}</td><td>{_text(lane)}</td>"
+        f'<td><i class="dot {span.severity}"></i>{_text(span.label)}</td></tr>'
+        for lane, span in rows
+    )
+    heads = "<th class=n>from, s</th><th class=n>to, s</th><th>lane</th><th>what</th>"
+    return (
+        f"<details><summary>Timeline as a table ({len(rows)})</summary>"
+        f'<div class="scroll"><table><thead><tr>{heads}</tr></thead><tbody>{cells}</tbody></table></div></details>'
+    )
+
+
+def _panel(panel: Panel, span: tuple[float, float], pool: Pool, figures: list[dict[str, Any]]) -> str:
+    figures.append(panel_figure(panel, span, pool))
+    unit = f" <small>{_text(symbol(panel.unit))}</small>" if symbol(panel.unit) else ""
+    chips = [_chip(t, s, i) for i, (t, s) in enumerate(zip(panel.traces, strokes(panel.traces), strict=True))]
+    return _plot(f"{_text(panel.title)}{unit}", chips, len(figures) - 1, "panel")
+
+
+def _chart(chart: Chart, pool: Pool, figures: list[dict[str, Any]]) -> str:
+    figures.append(figure := chart_figure(chart, pool))
+    places = [i for i, data in enumerate(figure["data"]) if "name" in data]  # the others are bands
+    pairs = zip(chart.curves, strokes(chart.curves), places, strict=True)
+    return _plot(_text(chart.title), [_chip(*pair) for pair in pairs], len(figures) - 1, "chart")
+
+
+def _plot(head: str, chips: list[str], index: int, kind: str) -> str:
+    return (
+        f'<figure class="{kind}"><figcaption><h3>{head}</h3>{"".join(chips)}</figcaption>'
+        f'<div class="holder"><div class="plot" data-figure="{index}"></div><div class="cursor"></div></div></figure>'
+    )
+
+
+def _chip(trace: Trace | Curve, stroke: Stroke, place: int) -> str:
+    dash = f' stroke-dasharray="{" ".join(f"{d:g}" for d in stroke.dash)}"' if stroke.dash else ""
+    colour = "currentColor" if stroke.colour == INK else stroke.colour
+    line = f'<line x1="0" y1="5" x2="20" y2="5" stroke="{colour}" stroke-width="2.4"{dash}/>'
+    sample = f'<circle cx="10" cy="5" r="3.5" fill="{colour}"/>' if stroke.points else line
+    return (
+        f'<button class="chip" data-trace="{place}" aria-pressed="true" title="Show or hide">'
+        f'<svg width="20" height="10" aria-hidden="true">{sample}</svg>{_text(trace.name)}<output></output></button>'
+    )
+
+
+def _table(table: Table) -> str:
+    title = f"<h3>{_text(table.title)}</h3>" if table.title else ""
+    right = [
+        all(not isinstance(row[i], (str, bool)) for row in table.rows) and bool(table.rows)
+        for i in range(len(table.columns))
+    ]
+    kinds = [" class=n" if r else "" for r in right]
+    heads = "".join(f"<th{kind}>{_text(head)}</th>" for kind, head in zip(kinds, table.columns, strict=True))
+    rows = "".join(
+        "<tr>" + "".join(f"<td{k}>{escape(value_text(c))}</td>" for k, c in zip(kinds, row, strict=True)) + "</tr>"
+        for row in table.rows
+    )
+    note = f'<p class="note">{_text(table.note)}</p>' if table.note else ""
+    body = f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>"
+    return f'<div class="table">{title}<div class="scroll">{body}</div>{note}</div>'
+
+
+def _provenance(report: Report) -> str:
+    rows = "".join(
+        f'<tr><th style="padding-left:{depth * 1.2:.1f}em">{escape(key)}</th><td>{escape(value)}</td></tr>'
+        for depth, key, value in outline(report.provenance)
+    )
+    table = f'<div class="scroll"><table class="run"><tbody>{rows}</tbody></table></div>'
+    return f"<section><details><summary>What was run</summary>{table}</details></section>"
+
+
+def _thinned(pool: Pool) -> str:
+    items = "".join(f"<li>{escape(line)}</li>" for line in pool.thinned)
+    text = f"{len(pool.thinned)} traces are drawn with fewer samples; peaks and gaps are kept, the log has all."
+    return f"<section><details><summary>{text}</summary><ul>{items}</ul></details></section>"
