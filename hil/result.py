@@ -170,7 +170,7 @@ def _vehicle_frames(signals: Signals) -> NDArray[np.intp]:
 
 
 def _bus_load(signals: Signals) -> float:
-    """A stuffed classical 11-bit frame with intermission has 47 + 8 n + floor((34 + 8 n - 1) / 4) bits (Tindell 1994)."""
+    """Share of the bit rate; a stuffed 11-bit frame takes 47 + 8 n + floor((34 + 8 n - 1) / 4) bits (Tindell 1994)."""
     frames, rows = signals.decoded.recording.frames, _vehicle_frames(signals)
     if rows.size < 2:
         return 0.0

@@ -1,0 +1,32 @@
+"""``brakebench perf NAME``: how fast we are, beside a peer or a limit measured in the same run."""
+
+import argparse
+import importlib
+import json
+from dataclasses import asdict
+
+from hil.cli.options import add_json
+
+MEASUREMENTS = ("rt", "plant", "ecu")
+"""Each is a module of hil.perf with ``measure() -> list[Row]``."""
+
+
+def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = subparsers.add_parser("perf", help="measure speed beside a peer or a limit, as ratios of one run")
+    parser.add_argument("name", choices=MEASUREMENTS, help="what to measure")
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and print the rows."""
+    rows = importlib.import_module(f"hil.perf.{args.name}").measure()
+    if args.json:
+        print(json.dumps({"rows": [asdict(row) for row in rows]}, indent=2))
+        return 0
+    width = max(len(row.name) for row in rows)
+    print(f"{'':{width}}  {'ours':>12} {'other':>12} {'unit':8} {'ratio':>8}  other is")
+    for row in rows:
+        print(f"{row.name:{width}}  {row.ours:12.4g} {row.other:12.4g} {row.unit:8} {row.ratio:8.2f}  {row.other_is}")
+    return 0
