@@ -1,0 +1,155 @@
+"""Supervision: faults of the inputs, and the operating mode they allow.
+
+A downgrade happens in the tick in which its cause is found. An upgrade goes one mode at a time, at most one a
+second, and only after a number of valid frames in sequence from every source. INIT goes straight to what the
+faults allow, once every source has brought that many.
+"""
+
+import math
+from typing import NamedTuple
+
+from dbc.messages import BrakeMode, Fault
+from ecu.law.base_brake import PedalReading
+from ecu.law.types import Brake, Inputs, Source
+from ecu.parameters.control import SupervisionParameters
+
+_SOURCE_FAULT = (
+    (Source.WHEEL_SPEED_FRONT, Fault.WHEEL_SPEED_FRONT),
+    (Source.WHEEL_SPEED_REAR, Fault.WHEEL_SPEED_REAR),
+    (Source.BODY_MOTION, Fault.BODY_MOTION),
+    (Source.EHB_PRESSURE_FRONT, Fault.EHB_PRESSURE_FRONT),
+    (Source.EHB_PRESSURE_REAR, Fault.EHB_PRESSURE_REAR),
+    (Source.MOTOR_FRONT, Fault.MOTOR_FRONT),
+    (Source.MOTOR_REAR, Fault.MOTOR_REAR),
+    (Source.STEERING, Fault.STEERING),
+    (Source.BATTERY, Fault.BATTERY),
+)
+_BOTH_WHEEL_SPEEDS = Fault.WHEEL_SPEED_FRONT | Fault.WHEEL_SPEED_REAR
+_BOTH_MOTORS = Fault.MOTOR_FRONT | Fault.MOTOR_REAR
+_PEDALS = Fault.PEDAL_1 | Fault.PEDAL_2
+
+
+class ModeMemory(NamedTuple):
+    """State of the supervision.
+
+    ``runs``: valid frames in sequence of each source (saturating); the rest are times since or during, s.
+    """
+
+    mode: BrakeMode
+    runs: tuple[int, ...]
+    since_upgrade_s: float
+    apart_s: float
+    own_map_s: float
+
+
+def initial_modes() -> ModeMemory:
+    """INIT, nothing received yet."""
+    return ModeMemory(BrakeMode.INIT, (0,) * len(Source), math.inf, 0.0, 0.0)
+
+
+def lost_sources(inputs: Inputs, p: SupervisionParameters) -> tuple[bool, ...]:
+    """Whether each source has timed out (never received counts as lost)."""
+    return tuple(
+        not h.age_s < (p.battery_timeout_s if s == Source.BATTERY else p.timeout_s) for s, h in enumerate(inputs.health)
+    )
+
+
+def _missing(inputs: Inputs) -> Fault:
+    """Sources whose message arrives but says that its values are not available."""
+    faults = Fault.NONE
+    finite = math.isfinite
+    for axle, bits in enumerate(
+        (
+            (Fault.WHEEL_SPEED_FRONT, Fault.EHB_PRESSURE_FRONT, Fault.MOTOR_FRONT),
+            (Fault.WHEEL_SPEED_REAR, Fault.EHB_PRESSURE_REAR, Fault.MOTOR_REAR),
+        )
+    ):
+        left, right = 2 * axle, 2 * axle + 1
+        speed, pressure, motor = bits
+        if not (finite(inputs.wheel_speed_rad_s[left]) and finite(inputs.wheel_speed_rad_s[right])):
+            faults |= speed
+        if (
+            not (finite(inputs.pressure_pa[left]) and finite(inputs.pressure_pa[right]))
+            or inputs.brake[axle] == Brake.FAILED
+        ):
+            faults |= pressure
+        if any(
+            inputs.motor_failed[w] or not finite(inputs.motor_current_a[w]) or not finite(inputs.motor_available_nm[w])
+            for w in (left, right)
+        ):
+            faults |= motor
+    if not (
+        finite(inputs.acceleration_x_mps2) and finite(inputs.acceleration_y_mps2) and finite(inputs.yaw_rate_rad_s)
+    ):
+        faults |= Fault.BODY_MOTION
+    if not finite(inputs.steering_wheel_angle_rad):
+        faults |= Fault.STEERING
+    if not finite(inputs.charge_power_w):
+        faults |= Fault.BATTERY
+    return faults
+
+
+def _allowed(inputs: Inputs, lost: tuple[bool, ...], faults: Fault, p: SupervisionParameters) -> BrakeMode:
+    """Best mode that the faults allow."""
+    if faults & _PEDALS == _PEDALS:
+        return BrakeMode.SAFE_STOP
+    if (
+        faults & (Fault.LINK | Fault.EHB_OWN_MAP | Fault.BATTERY)
+        or faults & _BOTH_WHEEL_SPEEDS == _BOTH_WHEEL_SPEEDS
+        or (lost[Source.MOTOR_FRONT] and lost[Source.MOTOR_REAR])
+        or all(inputs.motor_failed)
+        or any(h.bad_in_row >= p.bad_frames_to_downgrade for h in inputs.health)
+    ):
+        return BrakeMode.FRICTION_ONLY
+    return BrakeMode.DEGRADED if faults else BrakeMode.NORMAL
+
+
+def supervise(
+    memory: ModeMemory,
+    inputs: Inputs,
+    lost: tuple[bool, ...],
+    pedal: PedalReading,
+    p: SupervisionParameters,
+    dt_s: float,
+) -> tuple[ModeMemory, Fault]:
+    """Advance the operating mode by one tick; returns the new state and the faults present.
+
+    Parameters
+    ----------
+    lost : sources that have timed out, from `lost_sources`.
+    pedal : what the two channels say.
+    """
+    faults = _missing(inputs)
+    for source, fault in _SOURCE_FAULT:
+        if lost[source]:
+            faults |= fault
+    if pedal.channel_1_lost:
+        faults |= Fault.PEDAL_1
+    if pedal.channel_2_lost:
+        faults |= Fault.PEDAL_2
+    apart_s = memory.apart_s + dt_s if pedal.apart else 0.0
+    if apart_s > p.pedal_disagreement_s:
+        faults |= Fault.PEDAL_DISAGREE
+    own_map = memory.mode != BrakeMode.INIT and memory.mode != BrakeMode.SAFE_STOP and Brake.OWN_MAP in inputs.brake
+    own_map_s = min(memory.own_map_s + dt_s, 2.0 * p.own_map_tolerated_s) if own_map else 0.0
+    if own_map_s > p.own_map_tolerated_s:
+        faults |= Fault.EHB_OWN_MAP
+    if inputs.link_down:
+        faults |= Fault.LINK
+    runs = tuple(
+        0 if gone or h.bad_in_row else min(run + h.fresh, p.frames_to_upgrade)
+        for run, h, gone in zip(memory.runs, inputs.health, lost, strict=True)
+    )
+    since_upgrade_s = memory.since_upgrade_s + dt_s
+    mode = memory.mode
+    allowed = _allowed(inputs, lost, faults, p)
+    if mode == BrakeMode.INIT:
+        if min(runs) >= p.frames_to_upgrade:
+            mode = allowed
+            since_upgrade_s = 0.0
+    elif allowed > mode:
+        mode = allowed
+    elif allowed < mode and min(runs) >= p.frames_to_upgrade and since_upgrade_s >= p.upgrade_interval_s:
+        mode = BrakeMode(mode - 1)
+        since_upgrade_s = 0.0
+    return ModeMemory(mode, runs, since_upgrade_s, apart_s, own_map_s), faults

@@ -1,0 +1,76 @@
+"""Values that enter and leave the control law. Wheel order fl, fr, rl, rr; NaN means not available."""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+from dbc.messages import BrakeMode, Fault
+
+Four = tuple[float, float, float, float]
+
+ZERO: Four = (0.0, 0.0, 0.0, 0.0)
+
+
+class Source(IntEnum):
+    """Where the law's inputs come from; each can be lost on its own."""
+
+    PEDAL = 0
+    WHEEL_SPEED_FRONT = 1
+    WHEEL_SPEED_REAR = 2
+    BODY_MOTION = 3
+    EHB_PRESSURE_FRONT = 4
+    EHB_PRESSURE_REAR = 5
+    MOTOR_FRONT = 6
+    MOTOR_REAR = 7
+    STEERING = 8
+    BATTERY = 9
+
+
+class Health(NamedTuple):
+    """Supply of one source: time since its last usable values, whether some came now, unusable ones in a row."""
+
+    age_s: float
+    fresh: bool
+    bad_in_row: int
+
+
+class Brake(IntEnum):
+    """What the pressure control of an axle follows."""
+
+    DEMAND = 0
+    OWN_MAP = 1
+    FAILED = 2
+
+
+class Inputs(NamedTuple):
+    """What the sensors say at one tick; the last values of a lost source may still stand here."""
+
+    pedal_1: float
+    pedal_2: float
+    wheel_speed_rad_s: Four
+    acceleration_x_mps2: float
+    acceleration_y_mps2: float
+    yaw_rate_rad_s: float
+    pressure_pa: Four
+    brake: tuple[Brake, Brake]
+    motor_current_a: Four
+    motor_available_nm: Four
+    motor_failed: tuple[bool, bool, bool, bool]
+    steering_wheel_angle_rad: float
+    charge_power_w: float
+    blending_factor: float
+    link_down: bool
+    health: tuple[Health, ...]
+
+
+class Outputs(NamedTuple):
+    """Demands and reports of one tick; NaN is sent as not available."""
+
+    pressure_demand_pa: Four
+    motor_demand_nm: Four
+    mode: BrakeMode
+    faults: Fault
+    blending_factor: float
+    demanded_deceleration_mps2: float
+    wheel_torque_nm: Four
+    pad_friction: Four
+    confidence: tuple[int, int, int, int]

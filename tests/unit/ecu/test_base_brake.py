@@ -1,0 +1,62 @@
+import itertools
+import math
+
+import pytest
+
+from ecu.law import base_brake
+
+
+def test_sixty_percent_pedal_demands_about_three_point_two(parameters):
+    assert base_brake.reference_deceleration(0.6, parameters.pedal) == pytest.approx(3.2, abs=0.02)
+
+
+def test_pedal_map_is_progressive_and_zero_in_the_free_travel(parameters):
+    values = [base_brake.reference_deceleration(i / 100, parameters.pedal) for i in range(101)]
+    steps = [b - a for a, b in itertools.pairwise(values)]
+    assert values[:6] == [0.0] * 6
+    assert all(later >= earlier - 1e-12 for earlier, later in itertools.pairwise(steps))
+    assert base_brake.reference_deceleration(1.4, parameters.pedal) == values[-1]
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "lost", "travel"),
+    [
+        (0.5, 0.52, False, 0.51),
+        (0.5, 0.1, False, 0.5),
+        (0.1, 0.5, False, 0.5),
+        (math.nan, 0.3, False, 0.3),
+        (0.3, math.nan, False, 0.3),
+    ],
+)
+def test_pedal_channels(good_inputs, one, two, lost, travel):
+    reading = base_brake.read_pedal(good_inputs._replace(pedal_1=one, pedal_2=two), lost, 0.06)
+    assert reading.travel == pytest.approx(travel)
+    assert reading.apart == (abs(one - two) > 0.06)
+
+
+def test_no_pedal_channel_gives_no_travel(good_inputs):
+    assert math.isnan(base_brake.read_pedal(good_inputs, True, 0.06).travel)
+    assert math.isnan(
+        base_brake.read_pedal(good_inputs._replace(pedal_1=math.nan, pedal_2=math.nan), False, 0.06).travel
+    )
+
+
+def test_brake_torque_gives_the_demanded_deceleration(parameters):
+    v = parameters.vehicle
+    torque = base_brake.brake_torque(3.0, 300.0, v.mass_kg, v)
+    # Newton for car and wheels: m a = T/r + F_R - 4 I (a/r) / r
+    force = torque / v.force_arm_m + 300.0 - 4 * v.wheel_inertia_kg_m2 * 3.0 / v.rolling_radius_m**2
+    assert force / v.mass_kg == pytest.approx(3.0)
+
+
+def test_driving_resistance_at_speed_and_rest(parameters):
+    v = parameters.vehicle
+    assert base_brake.driving_resistance(20.0, v.mass_kg, v) == pytest.approx(
+        0.5 * 1.205 * 0.645 * 400 + 1463 * 9.80665 * 0.011
+    )
+    assert base_brake.driving_resistance(0.0, v.mass_kg, v) == 0.0
+
+
+def test_distribution_keeps_the_sum():
+    parts = base_brake.distribute(1000.0, 0.7)
+    assert parts == (350.0, 350.0, pytest.approx(150.0), pytest.approx(150.0))
