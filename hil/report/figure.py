@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.report.palette import INK, SEVERITY_COLOURS, Stroke, strokes
-from hil.report.report import Chart, Curve, Floats, Lane, Number, Panel, Report, Section, Span
+from hil.report.report import Chart, Curve, Event, Floats, Lane, Number, Panel, Report, Section, Span
 from hil.report.units import Unit, shown, symbol
 from hil.report.words import clean, number_text
 
@@ -25,6 +25,7 @@ _PLOT, _CHART, _LANE, _LINE = 1.25, 2.3, 0.34, 0.19  # in: heights of a plot, a 
 _SOFT, _RULE, _GRID = "#57636F", "#C9D1D9", "#E8ECF0"
 _VERDICT_COLOURS = {"passed": "#1D7A4F", "failed": "#B3261E", "incomplete": "#9A6700"}
 _NUMBERS_A_ROW = 7
+_LETTERS = 88  # of 7 points that the narrowest timeline holds
 
 
 def write_figure(report: Report, path: Path, dpi: int = 130) -> None:
@@ -42,8 +43,12 @@ class _Cell:
         self.title, self.names, self.height, self.fill = title, names, height, fill
 
     def legend_columns(self, width: float) -> int:
-        widest = max(map(len, self.names), default=0)
-        return max(1, min(len(self.names), int(width / (0.062 * widest + 0.38))))
+        """Return the most legend columns that fit ``width`` in."""
+        widths = [0.056 * len(name) + 0.4 for name in self.names]
+        for columns in range(len(widths), 1, -1):
+            if sum(max(widths[i::columns]) for i in range(columns)) <= width:
+                return columns
+        return 1
 
     def head(self, width: float) -> float:
         """Return the height of title and legend, in."""
@@ -63,7 +68,7 @@ def draw(report: Report) -> "Figure":
     grids = [[cells[i : i + columns] for i in range(0, len(cells), columns)] for _, cells in blocks]
     title_rows = math.ceil(len(report.numbers) / _NUMBERS_A_ROW)
     height = 2 * _EDGE + 0.62 + 0.5 * title_rows
-    height += sum(0.34 + sum(_row_height(row, width) for row in grid) for grid in grids if grid)
+    height += sum(0.5 + sum(_row_height(row, width) for row in grid) for grid in grids if grid)
 
     figure = Figure(figsize=(WIDTH_IN, height))
     FigureCanvasAgg(figure)
@@ -71,9 +76,9 @@ def draw(report: Report) -> "Figure":
     for (section, _), grid in zip(blocks, grids, strict=True):
         if not grid:
             continue
-        top -= 0.3
-        _write(figure, _EDGE, top, clean(section.title), size=11, weight="bold")
-        top -= 0.04
+        top -= 0.28
+        _write(figure, _EDGE, top, clean(section.title), size=12, weight="bold")
+        top -= 0.22
         for row in grid:
             head = max(cell.head(width) for cell in row)
             for column, cell in enumerate(row):
@@ -82,7 +87,7 @@ def draw(report: Report) -> "Figure":
                 axes = figure.add_axes((left / WIDTH_IN, bottom / height, width / WIDTH_IN, cell.height / height))
                 _prepare(axes)
                 cell.fill(axes)
-                _legend(axes, cell, head, width)
+                _legend(axes, cell, width)
             top -= _row_height(row, width)
     return figure
 
@@ -99,7 +104,7 @@ def _header(figure: "Figure", report: Report, height: float) -> float:
     if report.verdict is not None:
         badge = _write(figure, _EDGE + 0.06, top - 0.45, report.verdict.value, size=9.5, weight="bold", colour="white")
         badge.set_bbox({"boxstyle": "round,pad=0.35", "facecolor": _VERDICT_COLOURS[report.verdict], "linewidth": 0})
-        left += 0.095 * len(report.verdict.value) + 0.28
+        left += 0.085 * len(report.verdict.value) + 0.25
     _write(figure, left, top - 0.45, clean(report.reason), size=10)
     top -= 0.62
     for index, number in enumerate(report.numbers):
@@ -113,7 +118,7 @@ def _number(figure: "Figure", number: Number, left: float, top: float) -> None:
     colour = {None: INK, True: _VERDICT_COLOURS["passed"], False: _VERDICT_COLOURS["failed"]}[number.met]
     text = f"{value} {unit}".strip()
     limit = f"  ({clean(number.limit)})" if number.limit else ""
-    _write(figure, left, top - 0.14, _cut(clean(number.label), 26), size=7.5, colour=_SOFT)
+    _write(figure, left, top - 0.14, _cut(clean(number.label), 24), size=7.5, colour=_SOFT)
     _write(figure, left, top - 0.34, _cut(text, 20) + limit, size=10.5 if len(text + limit) < 18 else 8, colour=colour)
 
 
@@ -156,15 +161,16 @@ def _titled(title: str, unit: Unit) -> str:
 def _prepare(axes: "Axes") -> None:
     axes.grid(True, color=_GRID, linewidth=0.8)
     axes.set_axisbelow(True)
+    axes.locator_params(axis="y", nbins=5)
     axes.tick_params(labelsize=7.5, colors=_SOFT, length=3, width=0.8)
     for name, spine in axes.spines.items():
         spine.set_visible(name in {"left", "bottom"})
         spine.set_color(_RULE)
 
 
-def _legend(axes: "Axes", cell: _Cell, head: float, width: float) -> None:
+def _legend(axes: "Axes", cell: _Cell, width: float) -> None:
     """Write the cell's title and, where it has more than one trace, its legend between title and plot."""
-    top = 1.0 + (head - 0.14) / cell.height
+    top = 1.0 + (cell.head(width) - 0.13) / cell.height
     axes.text(
         0.0,
         top,
@@ -217,10 +223,9 @@ def _panel_filler(panel: Panel, timeline: Sequence[Lane], span: tuple[float, flo
 
 
 def _marks(timeline: Sequence[Lane]) -> list[tuple[float, str]]:
-    """Return when something went wrong, and its colour: worth a line through every panel."""
-    marks = [(s.start_s, s.severity) for lane in timeline for s in lane.spans]
-    marks += [(e.t_s, e.severity) for lane in timeline for e in lane.events]
-    return [(t_s, SEVERITY_COLOURS[severity]) for t_s, severity in marks if severity in {"warning", "error"}]
+    """Return when a bad state began, and its colour: worth a line through every panel."""
+    spans = [span for lane in timeline for span in lane.spans if span.severity in {"warning", "error"}]
+    return [(span.start_s, SEVERITY_COLOURS[span.severity]) for span in spans]
 
 
 def _stroke(axes: "Axes", x: Floats, y: Floats, stroke: Stroke) -> None:
@@ -237,8 +242,7 @@ def _fill_timeline(axes: "Axes", timeline: Sequence[Lane], span: tuple[float, fl
         axes.text(span[0], row - 0.43, clean(lane.name), fontsize=7, color=_SOFT, va="center", parse_math=False)
         for part in lane.spans:
             _draw_span(axes, part, row, span)
-        for event in lane.events:
-            axes.plot([event.t_s], [row + 0.05], marker="D", markersize=4.5, color=SEVERITY_COLOURS[event.severity])
+        _draw_events(axes, lane.events, row, span)
     axes.grid(False)
     axes.set_xlim(*span)
     axes.set_ylim(len(timeline) - 0.5, -0.62)
@@ -247,17 +251,28 @@ def _fill_timeline(axes: "Axes", timeline: Sequence[Lane], span: tuple[float, fl
     axes.set_xlabel("Time in s", fontsize=7.5, color=_SOFT, labelpad=1)
 
 
+def _draw_events(axes: "Axes", events: Sequence[Event], row: int, span: tuple[float, float]) -> None:
+    events = sorted(events, key=lambda event: event.t_s)
+    ends = [*(event.t_s for event in events[1:]), span[1]]
+    for event, end in zip(events, ends, strict=False):
+        axes.plot([event.t_s], [row + 0.05], marker="D", markersize=4, color=SEVERITY_COLOURS[event.severity])
+        fits = int((end - event.t_s) / (span[1] - span[0]) * _LETTERS) - 3
+        if fits >= min(len(event.label), 8):
+            _write_in(axes, event.t_s + 0.012 * (span[1] - span[0]), row + 0.06, _cut(clean(event.label), fits))
+
+
 def _draw_span(axes: "Axes", part: Span, row: int, span: tuple[float, float]) -> None:
     colour = SEVERITY_COLOURS[part.severity]
     length = part.end_s - part.start_s
     axes.broken_barh([(part.start_s, length)], (row - 0.2, 0.5), facecolor=colour, alpha=0.22, linewidth=0)
     axes.plot([part.start_s] * 2, [row - 0.2, row + 0.3], color=colour, linewidth=1.8, solid_capstyle="butt")
-    fits = int(length / (span[1] - span[0]) * 78)  # characters of 7 points in a half-width plot
+    fits = int(length / (span[1] - span[0]) * _LETTERS) - 1
     if fits >= min(len(part.label), 4):
-        label = _cut(clean(part.label), fits)
-        axes.text(
-            part.start_s, row + 0.06, f" {label}", fontsize=7, color=INK, va="center", clip_on=True, parse_math=False
-        )
+        _write_in(axes, part.start_s + 0.01 * (span[1] - span[0]), row + 0.06, _cut(clean(part.label), fits))
+
+
+def _write_in(axes: "Axes", t_s: float, y: float, text: str) -> None:
+    axes.text(t_s, y, text, fontsize=7, color=INK, va="center", clip_on=True, parse_math=False)
 
 
 def _chart_filler(chart: Chart) -> Callable[["Axes"], None]:

@@ -45,7 +45,7 @@ def render_text(report: Report, width: int = 100, colour: bool = False, brief: b
     width = max(60, width)
 
     def paint(text: str, sgr: str) -> str:
-        return f"\x1b[{sgr}m{text}\x1b[0m" if colour else text
+        return f"\x1b[{sgr}m{text}\x1b[0m" if colour and text else text
 
     lines = _head(report, width, paint)
     for section in report.sections:

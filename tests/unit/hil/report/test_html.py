@@ -1,0 +1,214 @@
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hil.report.html import render_html, write_html
+from hil.report.plots import Pool, chart_figure, inert, numbers, panel_figure
+from hil.report.report import Chart, Curve, Event, Lane, Number, Panel, Report, Section, Span, Table, Trace, Verdict
+
+HOSTILE = [
+    "<script>alert(1)</script>",
+    "</script><script>alert(1)</script>",
+    "<!--<script>",
+    '"><img src=x onerror=alert(1)>',
+    "' onmouseover='alert(1)",
+    "<b>bold</b><br><a href='http://example.com'>a</a>",
+    "&lt;script&gt; &amp; &#60;b&#62;",
+    "%{y} %{customdata[0]} $x^2$",
+    "\x00\x1b[31m\u202e\ud800\u2028",
+    "{title} %s %(x)s",
+]
+
+
+class Page(HTMLParser):
+    """What a browser sees: text, tags with attributes, and scripts apart."""
+
+    def __init__(self, source: str) -> None:
+        super().__init__()
+        self.text: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[str] = []
+        self._in_script = False
+        self.feed(source)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        self._in_script = tag == "script"
+
+    def handle_endtag(self, tag: str) -> None:
+        self._in_script = False
+
+    def handle_data(self, data: str) -> None:
+        (self.scripts if self._in_script else self.text).append(data)
+
+    @property
+    def figures(self) -> list[dict]:
+        return json.loads(self.scripts[0])["figures"]
+
+    @property
+    def times(self) -> list[list[float]]:
+        return json.loads(self.scripts[0])["times"]
+
+
+def page_without_plotly(report: Report) -> Page:
+    """Parse a page without plotly's own 5 MB, which are always the same."""
+    with patch("plotly.offline.get_plotlyjs", return_value="/* plotly */"):
+        return Page(render_html(report))
+
+
+def test_all_content_is_on_the_page(full_report: Report, shown: list[str]) -> None:
+    page = page_without_plotly(full_report)
+    text = re.sub(r"\s+", " ", " ".join(page.text))
+    assert [name for name in shown if name not in text and name not in {"Slip", "Force"}] == []
+    fit = page.figures[2]["layout"]
+    assert (fit["xaxis"]["title"]["text"], fit["yaxis"]["title"]["text"]) == ("Slip in &#37;", "Force in N")
+
+
+def test_every_sample_is_on_the_page_in_the_shown_unit(full_report: Report) -> None:
+    page = page_without_plotly(full_report)
+    for panel, figure in zip(full_report.sections[0].panels, page.figures, strict=False):
+        for trace, drawn in zip(panel.traces, figure["data"], strict=True):
+            y = np.array(drawn["y"], dtype=float)  # None becomes NaN: the gap is still there
+            np.testing.assert_allclose(y, trace.y * panel.unit.factor, rtol=1e-6)  # type: ignore[union-attr]
+            np.testing.assert_allclose(page.times[drawn["x"]], trace.t_s, atol=1e-6)
+    assert len(page.times) == 1  # all traces share their times
+
+
+def test_the_page_needs_no_network(full_report: Report) -> None:
+    source = render_html(full_report)
+    page = Page(source)
+    policy = next(attrs["content"] for tag, attrs in page.tags if attrs.get("http-equiv") == "Content-Security-Policy")
+    assert policy is not None
+    assert "default-src 'none'" in policy
+    assert "http" not in policy
+    assert not [
+        tag for tag, _ in page.tags if tag in {"link", "img", "iframe", "object", "embed", "base", "audio", "video"}
+    ]
+    assert not [attrs for _, attrs in page.tags if {"src", "href", "srcset", "action", "poster"} & set(attrs)]
+    assert source.count("plotly.js v") == 1
+    assert "url(" not in "".join(page.text)
+    assert not [script for script in (page.scripts[0], page.scripts[-1]) if "http" in script]
+
+
+def _everything_named(name: str) -> Report:
+    x = np.array([0.0, 1.0])
+    panel = Panel(name, name, (Trace(name, x, x, group=name),))
+    lane = Lane(name, (Span(0.0, 0.5, name),), (Event(0.7, name),))
+    chart = Chart(name, name, name, name, name, (Curve(name, x, x, x, x),))
+    section = Section(name, (panel,), (lane,), (chart,), (Table(name, (name,), ((name,),), name),), name)
+    numbers = (Number(name, name, name, name, name, False),)
+    return Report(name, Verdict.FAILED, name, numbers, (section,), {name: {name: name}, "list": [name]})
+
+
+def _harmless(name: str) -> None:
+    expected = [(tag, sorted(attrs)) for tag, attrs in page_without_plotly(_everything_named("x" * len(name))).tags]
+    page = page_without_plotly(_everything_named(name))
+    assert [(tag, sorted(attrs)) for tag, attrs in page.tags] == expected  # no tag, no attribute of its own
+    assert len(page.scripts) == 3
+    for figure in page.figures:
+        labels = [trace[key] for trace in figure["data"] for key in ("name", "hovertemplate") if key in trace]
+        labels += [
+            figure["layout"][axis]["title"]["text"] for axis in ("xaxis", "yaxis") if "title" in figure["layout"][axis]
+        ]
+        for label in labels:
+            own = re.sub(r"<br>|<extra></extra>|%\{[xy]:\.5~r\}", "", label)
+            assert not re.search(r"[<>$]|%\{", own)
+            assert not re.search(r"&(?!(amp|lt|gt|#37|#36);)", own)
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_names_stay_text(name: str) -> None:
+    _harmless(name)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.text(st.sampled_from("<>&\"'/%${}!-=;#abscript\\\n\x00\u2028\ud800é"), min_size=1, max_size=30))
+def test_any_name_stays_text(name: str) -> None:
+    _harmless(name)
+
+
+def test_plotly_text_is_made_inert() -> None:
+    assert inert("<b>%{y}</b> & $x$") == "&lt;b&gt;&#37;{y}&lt;/b&gt; &amp; &#36;x&#36;"
+
+
+@pytest.mark.parametrize("report", [Report(""), Report("r", sections=(Section("nothing"),))])
+def test_an_empty_report_is_a_page_without_plotly(report: Report) -> None:
+    source = render_html(report)
+    assert len(source) < 30_000
+    assert Page(source).figures == []
+
+
+def test_odd_traces_are_drawn() -> None:
+    instant = Trace("instant", np.array([3.0]), np.array([np.inf]))
+    never = Trace("never", np.empty(0), np.empty(0))
+    missing = Trace("missing", np.array([3.0]), np.array([np.nan]))
+    lane = Lane("l", (Span(3.0, 3.0, "a blink"),), (Event(3.0, "now"),))
+    page = page_without_plotly(
+        Report("r", sections=(Section("s", (Panel("p", "", (instant, never, missing)),), (lane,)),))
+    )
+    figure = page.figures[0]
+    assert [trace["y"] for trace in figure["data"]] == [[None], [], [None]]
+    assert figure["layout"]["xaxis"]["range"] == [2.5, 3.5]
+
+
+def test_numbers_keep_seven_digits() -> None:
+    values = np.array([0.0, -1.23456789e-9, 123456789.0, np.nan, -np.inf, 1e300, 5e-324])
+    assert numbers(values) == [
+        0.0,
+        pytest.approx(-1.234568e-9),
+        123456800.0,
+        None,
+        None,
+        1e300,
+        pytest.approx(0, abs=1e-300),
+    ]
+
+
+def test_a_huge_trace_is_thinned_and_the_page_says_so(full_report: Report) -> None:
+    t_s = np.arange(1_000_000) * 1e-3
+    y = np.sin(t_s)
+    y[500_001] = 9.0
+    page = page_without_plotly(Report("r", sections=(Section("s", (Panel("Force", "N", (Trace("f", t_s, y),)),)),)))
+    drawn = page.figures[0]["data"][0]
+    assert len(drawn["y"]) == len(page.times[0]) <= 20_000
+    assert max(drawn["y"]) == 9.0
+    assert f"Force / f: {len(drawn['y'])} of 1000000" in "".join(page.text)
+    assert "fewer samples" not in "".join(page_without_plotly(full_report).text)
+
+
+def test_sixty_traces_of_ten_seconds_stay_below_8_mb(tmp_path: Path) -> None:
+    t_s = np.arange(0.0, 10.0, 0.01)
+    noise = np.random.default_rng(1).normal(size=(60, t_s.size))
+    panels = tuple(
+        Panel(f"p{i}", "N", tuple(Trace(f"{i}.{k}", t_s, noise[6 * i + k]) for k in range(6))) for i in range(10)
+    )
+    path = tmp_path / "report.html"
+    write_html(Report("r", sections=(Section("s", panels),)), path)
+    assert path.stat().st_size < 8e6
+
+
+def test_plotly_accepts_the_figures(full_report: Report) -> None:
+    import plotly.graph_objects as go
+
+    pool = Pool(1000)
+    figures = [panel_figure(p, (0.0, 2.0), pool) for p in full_report.sections[0].panels]
+    figures += [chart_figure(c, pool) for c in full_report.sections[1].charts]
+    for figure in figures:
+        for trace in figure["data"]:
+            trace["x"] = pool.lists[trace["x"]] if isinstance(trace["x"], int) else trace["x"]
+        go.Figure(figure)  # refuses a property it does not know
+
+
+def test_the_time_axes_of_a_section_have_one_range(full_report: Report) -> None:
+    page = page_without_plotly(full_report)
+    assert [figure["layout"]["xaxis"]["range"] for figure in page.figures[:2]] == [[0.0, 2.0], [0.0, 2.0]]
+    linked = [attrs for tag, attrs in page.tags if tag == "div" and attrs.get("class") == "linked"]
+    assert [(a["data-start"], a["data-end"]) for a in linked] == [("0.0", "2.0")]
