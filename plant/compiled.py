@@ -1,0 +1,40 @@
+"""How the plant is compiled: equations are inlined into a few cached entry points.
+
+``NUMBA_DISABLE_JIT=1`` runs the same source uncompiled. Numba's cache looks at the age of one file only, so an edited
+submodel or a changed layout would leave a stale entry point behind; `entry` stamps the cache with all sources instead.
+"""
+
+import hashlib
+from collections.abc import Callable
+from functools import cache
+from importlib import resources
+from typing import Any, TypeVar, cast
+
+from numba import njit
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def equation(function: F) -> F:
+    """Compile a pure function of scalars or arrays when an entry point first needs it."""
+    return cast(F, njit(error_model="numpy")(function))
+
+
+def entry(function: F) -> F:
+    """Compile a function that Python calls: cached on disk, without the global interpreter lock."""
+    compiled = njit(cache=True, nogil=True, error_model="numpy")(function)
+    disk_cache = getattr(compiled, "_cache", None)  # absent when numba is switched off
+    if disk_cache is not None:
+        disk_cache._cache_file._source_stamp = _source_stamp()
+    return cast(F, compiled)
+
+
+@cache
+def _source_stamp() -> str:
+    """Digest of every source file of the plant."""
+    digest = hashlib.sha256()
+    for folder in ("plant", "plant.parameters"):
+        for file in sorted(resources.files(folder).iterdir(), key=lambda f: f.name):
+            if file.name.endswith(".py"):
+                digest.update(file.read_bytes())
+    return digest.hexdigest()

@@ -1,0 +1,93 @@
+"""The flat vectors of the model: state, inputs, cut points, switches, parameters, outputs.
+
+Wheels are in the order fl, fr, rl, rr; axes are ISO 8855 (x forward, y left, z up); torques and forces that brake are
+negative. Compiled code reads ``x[X.speed_mps]``; Python reads ``x[STATE.slice("speed_mps")]``.
+"""
+
+from plant.layout import Layout, dataclass_sizes
+from plant.parameters.plant import PlantParameters
+
+DELAY_SLOTS = 128  # steps of demand remembered for the dead time
+
+CONTINUOUS = {
+    "x_m": 1,
+    "y_m": 1,
+    "yaw_rad": 1,
+    "speed_mps": 1,
+    "lateral_speed_mps": 1,
+    "yaw_rate_rad_s": 1,
+    "heave_m": 1,
+    "pitch_rad": 1,  # positive nose down
+    "roll_rad": 1,  # positive left side up
+    "heave_rate_mps": 1,
+    "pitch_rate_rad_s": 1,
+    "roll_rate_rad_s": 1,
+    "wheel_speed_rad_s": 4,
+    "wheel_angle_rad": 4,
+    "slip": 4,  # longitudinal, relaxed
+    "side_slip": 4,  # tangent of the slip angle, relaxed
+    "windup_rad": 4,  # of the applied friction brake against the hub
+    "pressure_pa": 4,
+    "pressure_rate_pa_s": 4,
+    "motor_torque_nm": 4,
+    "winding_temperature_k": 4,
+    "pad_friction": 4,
+    "pad_temperature_k": 4,
+    "disc_temperature_k": 4,
+    "state_of_charge": 1,
+    "recuperated_j": 1,
+    "friction_heat_j": 1,
+    "distance_m": 1,
+    "imu_longitudinal_mps2": 1,
+    "imu_lateral_mps2": 1,
+    "imu_yaw_rate_rad_s": 1,
+}
+MEMORY = {
+    "time_s": 1,
+    "tooth_time_s": 4,  # when the last tooth passed
+    "tooth_count": 4,  # teeth passed so far, either way
+    "delay_index": 1,
+    "delayed_demand_pa": 4 * DELAY_SLOTS,
+}
+INPUTS = {
+    "pressure_demand_pa": 4,
+    "motor_demand_nm": 4,
+    "steering_wheel_rad": 1,
+    "pressure_pa": 4,  # measured values, used where the cut says so
+    "motor_torque_nm": 4,
+    "wheel_torque_nm": 4,
+    "longitudinal_force_n": 4,
+}
+CUTS = {"pressure": 4, "motor_torque": 4, "wheel_torque": 4, "force": 4}
+SWITCHES = {"motor_alive": 4, "battery_accepts": 1}
+OUTPUTS = {
+    "acceleration_mps2": 1,
+    "specific_force_x_mps2": 1,
+    "specific_force_y_mps2": 1,
+    "wheel_torque_nm": 4,
+    "friction_torque_nm": 4,
+    "motor_torque_nm": 4,
+    "pressure_pa": 4,
+    "longitudinal_force_n": 4,
+    "lateral_force_n": 4,
+    "wheel_load_n": 4,
+    "rolling_torque_nm": 4,
+    "slip_speed_mps": 4,
+    "motor_available_nm": 4,
+    "motor_derating": 4,
+    "road_friction": 4,
+    "charge_power_limit_w": 1,
+    "battery_power_w": 1,
+    "drag_n": 1,
+    "grade": 1,
+}
+
+STATE = Layout("State", CONTINUOUS | MEMORY)
+RATES = Layout("Rates", CONTINUOUS)
+INPUT = Layout("Input", INPUTS)
+CUT = Layout("Cut", CUTS)
+SWITCH = Layout("Switch", SWITCHES)
+OUTPUT = Layout("Output", OUTPUTS)
+PARAMETER = Layout("Parameter", dataclass_sizes(PlantParameters))
+
+X, U, C, S, Y, P = STATE.at, INPUT.at, CUT.at, SWITCH.at, OUTPUT.at, PARAMETER.at
