@@ -25,7 +25,7 @@ _PLOT, _CHART, _LANE, _LINE = 1.25, 2.3, 0.34, 0.19  # in: heights of a plot, a 
 _SOFT, _RULE, _GRID = "#57636F", "#C9D1D9", "#E8ECF0"
 _VERDICT_COLOURS = {"passed": "#1D7A4F", "failed": "#B3261E", "incomplete": "#9A6700"}
 _NUMBERS_A_ROW = 7
-_LETTERS = 88  # of 7 points that the narrowest timeline holds
+_LETTERS = 84  # of 7 points that the narrowest timeline holds
 
 
 def write_figure(report: Report, path: Path, dpi: int = 130) -> None:
@@ -80,14 +80,14 @@ def draw(report: Report) -> "Figure":
         _write(figure, _EDGE, top, clean(section.title), size=12, weight="bold")
         top -= 0.22
         for row in grid:
-            head = max(cell.head(width) for cell in row)
+            head, tall = max(cell.head(width) for cell in row), max(cell.height for cell in row)
             for column, cell in enumerate(row):
                 left = _EDGE + _LEFT + column * (width + _LEFT + _GAP)
-                bottom = top - head - cell.height
-                axes = figure.add_axes((left / WIDTH_IN, bottom / height, width / WIDTH_IN, cell.height / height))
+                bottom = top - head - tall
+                axes = figure.add_axes((left / WIDTH_IN, bottom / height, width / WIDTH_IN, tall / height))
                 _prepare(axes)
                 cell.fill(axes)
-                _legend(axes, cell, width)
+                _legend(axes, cell, width, tall)
             top -= _row_height(row, width)
     return figure
 
@@ -141,8 +141,9 @@ def _cells(section: Section) -> list[_Cell]:
     if span is not None:
         span = span if span[1] > span[0] else (span[0] - 0.5, span[1] + 0.5)
         if section.timeline:
-            height = max(_PLOT, _LANE * len(section.timeline))
-            cells.append(_Cell("Timeline", (), height, lambda axes: _fill_timeline(axes, section.timeline, span)))
+            rows = section.rows()
+            height = max(_PLOT, _LANE * len(rows))
+            cells.append(_Cell("Timeline", (), height, lambda axes: _fill_timeline(axes, rows, span)))
         for panel in section.panels:
             names = [clean(trace.name) for trace in panel.traces]
             cells.append(
@@ -168,9 +169,9 @@ def _prepare(axes: "Axes") -> None:
         spine.set_color(_RULE)
 
 
-def _legend(axes: "Axes", cell: _Cell, width: float) -> None:
+def _legend(axes: "Axes", cell: _Cell, width: float, tall: float) -> None:
     """Write the cell's title and, where it has more than one trace, its legend between title and plot."""
-    top = 1.0 + (cell.head(width) - 0.13) / cell.height
+    top = 1.0 + (cell.head(width) - 0.13) / tall
     axes.text(
         0.0,
         top,
@@ -237,15 +238,15 @@ def _stroke(axes: "Axes", x: Floats, y: Floats, stroke: Stroke) -> None:
         axes.plot(x, y, color=stroke.colour, linewidth=width, linestyle=dash)
 
 
-def _fill_timeline(axes: "Axes", timeline: Sequence[Lane], span: tuple[float, float]) -> None:
-    for row, lane in enumerate(timeline):
-        axes.text(span[0], row - 0.43, clean(lane.name), fontsize=7, color=_SOFT, va="center", parse_math=False)
-        for part in lane.spans:
-            _draw_span(axes, part, row, span)
-        _draw_events(axes, lane.events, row, span)
+def _fill_timeline(axes: "Axes", rows: Sequence[Lane], span: tuple[float, float]) -> None:
+    for place, row in enumerate(rows):
+        axes.text(span[0], place - 0.43, clean(row.name), fontsize=7, color=_SOFT, va="center", parse_math=False)
+        for part in row.spans:
+            _draw_span(axes, part, place, span)
+        _draw_events(axes, row.events, place, span)
     axes.grid(False)
     axes.set_xlim(*span)
-    axes.set_ylim(len(timeline) - 0.5, -0.62)
+    axes.set_ylim(len(rows) - 0.5, -0.62)
     axes.set_yticks([])
     axes.spines["left"].set_visible(False)
     axes.set_xlabel("Time in s", fontsize=7.5, color=_SOFT, labelpad=1)

@@ -79,7 +79,7 @@ def _section(section: Section, pool: Pool, figures: list[dict[str, Any]]) -> str
         start, end = span if span[1] > span[0] else (span[0] - 0.5, span[1] + 0.5)
         parts.append(f'<div class="linked" data-start="{start!r}" data-end="{end!r}">{_TOOLS}')
         if section.timeline:
-            lanes = "".join(_lane(lane, start, end) for lane in section.timeline)
+            lanes = "".join(_lane(lane, start, end) for lane in section.rows())
             parts.append(f'<div class="timeline">{lanes}<div class="cursor"></div></div>')
         parts += [_panel(panel, (start, end), pool, figures) for panel in section.panels]
         parts.append(f'<p class="axis">Time in s</p>{_happenings(section)}</div>')
@@ -90,7 +90,7 @@ def _section(section: Section, pool: Pool, figures: list[dict[str, Any]]) -> str
     return "\n".join([*parts, "</section>"])
 
 
-_TOOLS = """<div class="tools"><output class="window"></output>\
+_TOOLS = """<div class="tools"><output class="window"></output><output class="at"></output>\
 <span class="hint">drag to zoom all, shift-drag to pan, double-click for all</span><span class="buttons">\
 <button data-do="left" title="Earlier">◀</button><button data-do="in" title="Zoom in">+</button>\
 <button data-do="out" title="Zoom out">−</button><button data-do="right" title="Later">▶</button>\
@@ -113,7 +113,8 @@ def _lane(lane: Lane, start: float, end: float) -> str:
             f'style="left:{(event.t_s - start) / length:.4%}" title="{_text(event.label)}: {event.t_s:.3f} s">'
             f"<i></i><b>{_text(event.label)}</b></span>"
         )
-    return f'<div class="lane"><h4>{_text(lane.name)}</h4><div class="bar">{"".join(marks)}</div></div>'
+    head = f"<h4>{_text(lane.name)}</h4>" if lane.name else ""
+    return f'<div class="lane">{head}<div class="bar">{"".join(marks)}</div></div>'
 
 
 def _happenings(section: Section) -> str:

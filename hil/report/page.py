@@ -65,6 +65,7 @@ section { margin-top: 26px; }
   display: flex; justify-content: space-between; align-items: center; gap: 10px; position: sticky; top: 0; z-index: 5;
   background: var(--paper); padding: 6px 0; font-variant-numeric: tabular-nums; color: var(--soft); font-size: 12px;
 }
+.at { color: var(--ink); }
 .hint { margin-left: auto; }
 @media (pointer: coarse), (max-width: 640px) { .hint { display: none; } }
 .buttons { display: flex; gap: 4px; }
@@ -75,6 +76,7 @@ section { margin-top: 26px; }
 .timeline { position: relative; padding-bottom: 4px; }
 .lane { margin: 4px 0 6px; }
 .lane h4 { margin-left: var(--left); }
+.lane:not(:has(h4)) { margin-top: -3px; }
 .bar {
   position: relative; height: 22px; margin: 1px var(--right) 0 var(--left); background: var(--wash); overflow: hidden;
   border-radius: 3px;
@@ -108,7 +110,7 @@ figcaption h3 { margin-right: 8px; }
 .chip[aria-pressed=false] { opacity: 0.4; text-decoration: line-through; }
 .chip svg { flex: none; }
 .chip output { font-variant-numeric: tabular-nums; font-weight: 600; }
-.chip output:empty { display: none; }
+.linked .chip output { min-width: 6.2ch; }  /* reading at the cursor moves nothing */
 .holder { position: relative; }
 .plot { height: 190px; }
 .chart .plot { height: 300px; }
@@ -139,6 +141,8 @@ thead th { color: var(--soft); font-weight: 550; border-bottom-color: var(--rule
   h1 { font-size: 20px; }
   .cards { grid-template-columns: repeat(2, minmax(0, 1fr)); gap: 8px; }
   figcaption, .lane h4 { padding-left: 0; margin-left: 0; }
+  figcaption h3 { flex-basis: 100%; }
+  .chip { padding-left: 0; }
   .buttons button { min-width: 38px; height: 32px; }
 }
 @media print {
@@ -187,7 +191,8 @@ SCRIPT = r"""
     return Plotly.update(gd, gd.inked.length ? { "line.color": style("--ink") } : {}, ink(), gd.inked);
   }
 
-  const digits = (v) => v === null || v === undefined ? "–" : String(+v.toPrecision(4));
+  const digits = (v, decimals) =>
+    v === null || v === undefined ? "–" : decimals === null ? v.toPrecision(4) : v.toFixed(decimals).replace(/^-(0\.?0*)$/, "$1");
 
   function nearest(x, t) {
     let low = 0, high = x.length - 1;
@@ -252,7 +257,7 @@ SCRIPT = r"""
         const events = [...bar.querySelectorAll(".event")], at = events.map((e) => px(Number(e.dataset.start)));
         let used = 0;
         events.forEach((event, i) => {
-          const label = event.lastElementChild.offsetWidth + 14;
+          const label = event.lastElementChild.offsetWidth + 20;
           const room = Math.min(width, at[i + 1] ?? width) - at[i];
           const right = label <= room, left = !right && at[i] - label >= used;
           event.style.left = at[i] + "px";
@@ -265,6 +270,7 @@ SCRIPT = r"""
 
     point(t) {
       const [a, b] = this.range;
+      this.root.querySelector(".at").textContent = t === null ? "" : `cursor at ${t.toFixed(3)} s`;
       for (const cursor of this.root.querySelectorAll(".cursor")) {
         const width = cursor.parentElement.clientWidth, left = parseFloat(style("--left"));
         cursor.style.display = t === null || t < a || t > b ? "none" : "block";
@@ -274,7 +280,7 @@ SCRIPT = r"""
         for (const chip of gd.closest("figure").querySelectorAll(".chip")) {
           const trace = gd.data[chip.dataset.trace];
           const none = t === null || !trace.x.length;
-          chip.lastElementChild.textContent = none ? "" : digits(trace.y[nearest(trace.x, t)]);
+          chip.lastElementChild.textContent = none ? "" : digits(trace.y[nearest(trace.x, t)], gd.layout.meta.decimals);
         }
       }
     }
@@ -293,6 +299,7 @@ SCRIPT = r"""
   Promise.all(plots.map(draw)).then(() => {
     for (const root of document.querySelectorAll(".linked")) new Linked(root);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => plots.forEach(paint));
+    addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((part) => part.open = true));
     document.documentElement.dataset.ready = "yes";
   });
 })();

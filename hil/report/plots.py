@@ -64,6 +64,8 @@ def panel_figure(panel: Panel, span_s: tuple[float, float], pool: Pool) -> Figur
     """Return a time-series plot over ``span_s``; its ``x`` are places in ``pool``."""
     unit = inert(symbol(panel.unit))
     data = []
+    decimals = _decimals([shown(trace.y, panel.unit) for trace in panel.traces])
+    y_format = ".4g" if decimals is None else f".{decimals}f"
     for trace, stroke in zip(panel.traces, strokes(panel.traces), strict=True):
         kept = pool.keep(f"{panel.title} / {trace.name}", trace.y)
         data.append(
@@ -72,13 +74,21 @@ def panel_figure(panel: Panel, span_s: tuple[float, float], pool: Pool) -> Figur
                 "name": inert(trace.name),
                 "x": pool.time(trace.t_s[kept]),
                 "y": numbers(shown(trace.y[kept], panel.unit)),
-                "hovertemplate": f"{inert(trace.name)}  %{{y:.5~r}} {unit}<extra></extra>",
+                "hovertemplate": f"{inert(trace.name)}  %{{y:{y_format}}} {unit}<extra></extra>",
             }
         )
     layout = _layout()
-    layout["hovermode"] = "x unified"
+    layout |= {"hovermode": "x unified", "meta": {"decimals": decimals}}
     layout["xaxis"] |= {"range": list(span_s), "hoverformat": ".3f", "unifiedhovertitle": {"text": "%{x} s"}}
     return {"data": data, "layout": layout}
+
+
+def _decimals(courses: list[NDArray[np.float64]]) -> int | None:
+    """Return the decimals that give a panel's largest value four digits; None where that needs an exponent."""
+    largest = max((float(np.abs(y[np.isfinite(y)]).max()) for y in courses if np.isfinite(y).any()), default=0.0)
+    if largest == 0.0:
+        return 0
+    return max(0, 3 - int(np.floor(np.log10(largest)))) if 1e-3 <= largest < 1e6 else None
 
 
 def chart_figure(chart: Chart, pool: Pool) -> Figure:

@@ -21,7 +21,7 @@ Names may hold anything a log can hold; the printers escape them.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Literal
 
@@ -200,6 +200,20 @@ class Lane:
     spans: tuple[Span, ...] = ()
     events: tuple[Event, ...] = ()
 
+    def rows(self) -> tuple["Lane", ...]:
+        """Return the lane as rows in which no span covers another, nor an event; only the first has the name."""
+        rows: list[list[Span]] = []
+        for span in sorted(self.spans, key=lambda span: (span.start_s, span.end_s)):
+            row = next((row for row in rows if row[-1].end_s <= span.start_s), None)
+            if row is None:
+                rows.append([span])
+            else:
+                row.append(span)
+        lanes = [Lane("", spans=tuple(row)) for row in rows]
+        if self.events or not lanes:
+            lanes.append(Lane("", events=self.events))
+        return replace(lanes[0], name=self.name), *lanes[1:]
+
 
 @dataclass(frozen=True)
 class Section:
@@ -218,6 +232,10 @@ class Section:
         ends += [t for lane in self.timeline for span in lane.spans for t in (span.start_s, span.end_s)]
         ends += [event.t_s for lane in self.timeline for event in lane.events]
         return (min(ends), max(ends)) if ends else None
+
+    def rows(self) -> tuple[Lane, ...]:
+        """Return the timeline's rows, `Lane.rows` of every lane."""
+        return tuple(row for lane in self.timeline for row in lane.rows())
 
     def happenings(self) -> list[tuple[str, Span]]:
         """Return spans and events with their lane's name, by start; an event is a span of no length."""

@@ -130,7 +130,7 @@ def _over_time(section: Section, span: tuple[float, float], width: int, paint: P
     end = f"{float_text(span[1])} s"
     heads = "".join(f"{word:>10}" for word in ("min", "max", "last")) if section.panels else f"{'':30}"
     yield paint(f"{'':{name_width + 2}}{heads} {axis}{end:>{max(0, strip - len(axis))}}", "2")
-    for lane in section.timeline:
+    for lane in section.rows():
         yield f"  {_fit(clean(lane.name), left - 3)} {_lane_strip(lane, span, strip)}"
     for panel in section.panels:
         unit = clean(symbol(panel.unit))

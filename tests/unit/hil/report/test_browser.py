@@ -105,7 +105,7 @@ def test_pointing_at_one_panel_reads_all(full_report: Report, tmp_path: Path) ->
       done({ shown, after: read(), hidden: cursor.style.display });
     """
     outcome = run_in_browser(full_report, script, tmp_path)
-    assert outcome["shown"] == {"values": ["54", "68.4", "1", "1"], "display": "block"}
+    assert outcome["shown"] == {"values": ["54.00", "68.40", "1.000", "1.000"], "display": "block"}
     assert outcome["after"] == [""] * 4
     assert outcome["hidden"] == "none"
 

@@ -119,7 +119,7 @@ def _harmless(name: str) -> None:
             figure["layout"][axis]["title"]["text"] for axis in ("xaxis", "yaxis") if "title" in figure["layout"][axis]
         ]
         for label in labels:
-            own = re.sub(r"<br>|<extra></extra>|%\{[xy]:\.5~r\}", "", label)
+            own = re.sub(r"<br>|<extra></extra>|%\{[xy]:\.\d(f|~r)\}", "", label)
             assert not re.search(r"[<>$]|%\{", own)
             assert not re.search(r"&(?!(amp|lt|gt|#37|#36);)", own)
 

@@ -50,6 +50,22 @@ def test_the_time_range_covers_traces_spans_and_events() -> None:
     assert [(name, span.start_s) for name, span in section.happenings()] == [("l", 0.5), ("l", 3.0)]
 
 
+def test_spans_that_overlap_and_events_get_rows_of_their_own() -> None:
+    a, b, c = Span(0.0, 2.0, "a"), Span(1.0, 3.0, "b"), Span(2.0, 4.0, "c")
+    event = Event(1.5, "e")
+    rows = Lane("faults", (c, b, a), (event,)).rows()
+    assert [(row.name, row.spans, row.events) for row in rows] == [
+        ("faults", (a, c), ()),
+        ("", (b,), ()),
+        ("", (), (event,)),
+    ]
+    assert Lane("idle").rows() == (Lane("idle"),)
+    assert Section("s", timeline=(Lane("one", (a,)), Lane("two", (b,)))).rows() == (
+        Lane("one", (a,)),
+        Lane("two", (b,)),
+    )
+
+
 def test_si_values_are_converted_and_text_units_are_not() -> None:
     values = np.array([1.0, 300.0])
     assert shown(values, KMH).tolist() == [3.6, 1080.0]
