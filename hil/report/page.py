@@ -191,8 +191,10 @@ SCRIPT = r"""
     return Plotly.update(gd, gd.inked.length ? { "line.color": style("--ink") } : {}, ink(), gd.inked);
   }
 
-  const digits = (v, decimals) =>
-    v === null || v === undefined ? "–" : decimals === null ? v.toPrecision(4) : v.toFixed(decimals).replace(/^-(0\.?0*)$/, "$1");
+  function digits(v, decimals) {
+    if (v === null || v === undefined) return "–";
+    return decimals === null ? v.toPrecision(4) : v.toFixed(decimals).replace(/^-(0\.?0*)$/, "$1");  // no minus zero
+  }
 
   function nearest(x, t) {
     let low = 0, high = x.length - 1;
