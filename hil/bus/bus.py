@@ -109,6 +109,12 @@ def _open_loopback(spec: BusSpec, bus: BusName) -> Bus:
     return LoopbackBus(spec.channel, bus)
 
 
+def _open_socketcan(spec: BusSpec, bus: BusName) -> Bus:
+    from hil.bus.socketcan import SocketcanBus
+
+    return SocketcanBus(spec, bus)
+
+
 def _open_python_can(spec: BusSpec, bus: BusName) -> Bus:
     from hil.bus.python_can import PythonCanBus
 
@@ -122,7 +128,7 @@ class BusKind(NamedTuple):
     open: Callable[[BusSpec, BusName], Bus]
 
 
-BUS_KINDS: tuple[BusKind, ...] = (BusKind("loopback", _open_loopback),)
+BUS_KINDS: tuple[BusKind, ...] = (BusKind("loopback", _open_loopback), BusKind("socketcan", _open_socketcan))
 """Our own kinds; any other is left to python-can."""
 
 

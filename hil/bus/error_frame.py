@@ -1,6 +1,6 @@
 """What Linux reports as error frames, as link events. Field names and values: linux/can/error.h."""
 
-from dbc.frame import BusName, LinkEvent, LinkState
+from dbc.frame import BusName, LinkEvent, LinkState, Received
 
 CAN_ERR_TX_TIMEOUT = 0x001
 CAN_ERR_CRTL = 0x004
@@ -66,3 +66,12 @@ def link_events(error_class: int, data: bytes, bus: BusName, time_ns: int) -> li
     if error_class & CAN_ERR_RESTARTED:
         found[LinkState.RESTARTED] = ["controller restarted"]
     return [LinkEvent(bus, state, time_ns, 1, ", ".join(texts) + counters) for state, texts in found.items()]
+
+
+def append_event(event: LinkEvent, received: list[Received]) -> None:
+    """Append an event, or count it into the last one of its kind: bus errors may come by the thousand."""
+    last = received[-1] if received else None
+    if isinstance(last, LinkEvent) and last.state == event.state:
+        received[-1] = event._replace(number=last.number + event.number)
+    else:
+        received.append(event)

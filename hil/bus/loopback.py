@@ -94,7 +94,7 @@ class LoopbackBus:
                     self._send_to(peer, count, time_ns, records)
 
     def _send_to(self, peer: _Peer, count: int, time_ns: int, records: bytes) -> None:
-        packet = pack_header(b"BBL1", count, peer.addressed, time_ns) + records
+        packet = pack_header(count, peer.addressed, time_ns) + records
         peer.addressed += count
         try:
             peer.connection.send(packet, socket.MSG_NOSIGNAL)

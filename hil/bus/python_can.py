@@ -1,4 +1,4 @@
-"""Any interface python-can opens, behind our protocol.
+"""Any adapter python-can opens, behind our protocol.
 
 python-can is imported on first use (it takes 0.4 s) and kept quiet: what it would log becomes a link event or an error.
 """
@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Self
 
 from dbc.frame import BusName, Frame, LinkEvent, LinkState, Received
 from hil.bus.bus import BusError, BusSpec
-from hil.bus.driver import error_number, kernel_drops, open_driver, shut
-from hil.bus.error_frame import link_events
+from hil.bus.can_frame import pack_frame
+from hil.bus.driver import error_number, open_driver, shut
+from hil.bus.error_frame import append_event, link_events
 from hil.rt.clock import monotonic_ns, wall_time_ns
 
 if TYPE_CHECKING:
@@ -49,7 +50,6 @@ class PythonCanBus:
         self._refused: dict[str, int] = {}
         self._closing = threading.Event()
         self._reopened = threading.Event()
-        self._dropped = 0
         self._driver: can.BusABC | None
         self._first: can.Message | None
         self._driver, self._first = open_driver(spec)
@@ -61,12 +61,9 @@ class PythonCanBus:
         self._refuse_closed()
         timeout = None if self._spec.kind in _WAITING_DRIVERS else 0.0
         messages = []
-        for bus, can_id, data, _, extended in frames:
-            if bus != self.bus or len(data) > 8 or not 0 <= can_id <= (0x1FFFFFFF if extended else 0x7FF):
-                raise ValueError(
-                    f"cannot send 0x{can_id:x} of bus {bus} on {self.name}: expected bus {self.bus}, 0..8 bytes (got "
-                    f"{len(data)}), an id of 11 (extended: 29) bits"
-                )
+        for frame in frames:
+            pack_frame(frame, self.bus)  # for what it refuses
+            _, can_id, data, _, extended = frame
             messages.append(can.Message(arbitration_id=can_id, is_extended_id=extended, data=data))
         for number, message in enumerate(messages):
             if (driver := self._current()) is None:
@@ -140,7 +137,6 @@ class PythonCanBus:
                 failed = True
                 continue
             if message is None:
-                self._count_drops(driver, received)
                 return
             failed, wait_s = False, 0.0
             self._take(message, offset_ns, received)
@@ -154,13 +150,6 @@ class PythonCanBus:
             return 0.0
         return wait_s
 
-    def _count_drops(self, driver: "can.BusABC", received: list[Received]) -> None:
-        """Report what the kernel dropped because the socket's queue was full (socketcan only)."""
-        dropped = kernel_drops(driver)
-        if dropped != self._dropped:
-            lost, self._dropped = (dropped - self._dropped) & 0xFFFFFFFF, dropped
-            received.append(LinkEvent(self.bus, LinkState.RX_OVERFLOW, monotonic_ns(), lost, "socket's queue full"))
-
     def _take(self, message: "can.Message", offset_ns: int, received: list[Received]) -> None:
         now_ns = monotonic_ns()
         time_ns = int(message.timestamp * 1e9) - offset_ns
@@ -168,11 +157,7 @@ class PythonCanBus:
             time_ns = now_ns
         if message.is_error_frame:
             for event in link_events(message.arbitration_id, bytes(message.data), self.bus, time_ns):
-                last = received[-1] if received else None
-                if isinstance(last, LinkEvent) and last.state == event.state:  # errors may flood: one event, counted
-                    received[-1] = event._replace(number=last.number + 1)
-                else:
-                    received.append(event)
+                append_event(event, received)
         elif message.is_remote_frame or message.is_fd:
             self.ignored += 1
         else:
@@ -212,7 +197,6 @@ class PythonCanBus:
                 driver, first = open_driver(self._spec)
             except BusError:
                 continue
-            self._dropped = 0
             self._driver, self._first = driver, first
             self._reopened.set()
             if self._closing.is_set():

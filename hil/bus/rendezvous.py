@@ -22,7 +22,6 @@ from hil.bus.bus import BusError
 from hil.rt.clock import WallClock
 
 _CHANNEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,47}")
-_PATH_LIMIT = 107  # bytes of a Unix socket's path, unix(7)
 _PATIENCE_NS = 5_000_000_000
 _BACKLOG = 1024
 
@@ -48,13 +47,6 @@ class Rendezvous:
             )
         self._directory = base_directory() / channel
         self._path = self._directory / f"{os.getpid()}-{os.urandom(3).hex()}.sock"
-        length = len(os.fsencode(self._path))
-        if length > _PATH_LIMIT:
-            raise BusError(
-                f"loopback channel {channel!r}: path {self._path} has {length} bytes, "
-                f"a Unix socket's may have {_PATH_LIMIT}; "
-                "use a shorter channel, or a shorter XDG_RUNTIME_DIR for all members"
-            )
 
     def join(self) -> tuple[socket.socket, list[socket.socket]]:
         """Bind this member's socket and connect to all present.
@@ -63,12 +55,12 @@ class Rendezvous:
         -------
         The listening socket and a connection to each member, all non-blocking.
         """
-        with self._locked():
-            present = self._present()
+        with self._locked(), self._reachable() as place:
+            present = self._present(place)
             listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
             try:
                 os.fchmod(listener.fileno(), 0o600)  # before bind: never wider, whatever the umask
-                listener.bind(str(self._path))
+                listener.bind(f"{place}/{self._path.name}")
                 listener.listen(_BACKLOG)
             except OSError as error:
                 for one in (listener, *present):
@@ -79,9 +71,9 @@ class Rendezvous:
     def leave(self, listener: socket.socket) -> None:
         """Close and remove this member's socket, and the directory after the last member."""
         listener.close()
-        with contextlib.suppress(BusError), self._locked():
+        with contextlib.suppress(BusError), self._locked(), self._reachable() as place:
             self._path.unlink(missing_ok=True)
-            present = self._present()
+            present = self._present(place)
             for connection in present:
                 connection.close()
             if not present:
@@ -90,19 +82,28 @@ class Rendezvous:
                     self._directory.rmdir()
                     self._directory.parent.rmdir()
 
-    def _present(self) -> list[socket.socket]:
+    def _present(self, place: str) -> list[socket.socket]:
         """Connect to every living member; remove the sockets of dead ones."""
         present = []
         for path in sorted(self._directory.glob("*.sock")):
             connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
             try:
-                connection.connect(str(path))
+                connection.connect(f"{place}/{path.name}")
                 present.append(connection)
             except OSError as error:
                 connection.close()
                 if isinstance(error, ConnectionRefusedError):
                     path.unlink(missing_ok=True)
         return present
+
+    @contextlib.contextmanager
+    def _reachable(self) -> Iterator[str]:
+        """Give the directory a short name: a Unix socket's path may have 107 bytes only, see unix(7)."""
+        directory = os.open(self._directory, os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            yield f"/proc/self/fd/{directory}"
+        finally:
+            os.close(directory)
 
     @contextlib.contextmanager
     def _locked(self) -> Iterator[None]:

@@ -1,0 +1,175 @@
+import errno
+import logging
+import time
+import uuid
+
+import can
+import pytest
+
+from dbc.frame import BusName, Frame, LinkEvent, LinkState
+from hil.bus import BusError, open_bus, python_can
+from hil.bus.bus import parse_spec
+from hil.bus.python_can import PythonCanBus
+
+VEHICLE = BusName.VEHICLE
+FRAME = Frame(VEHICLE, 1, b"")
+
+
+class Driver:
+    """A python-can driver that does what a script says: an exception is raised, anything else returned."""
+
+    def __init__(self, arriving=(), refusing=()):
+        self.arriving, self.refusing = list(arriving), list(refusing)
+        self.sent, self.closed = [], False
+
+    def recv(self, timeout):
+        item = self.arriving.pop(0) if self.arriving else None
+        if isinstance(item, Exception):
+            raise item
+        return item
+
+    def send(self, message, timeout):
+        item = self.refusing.pop(0) if self.refusing else None
+        if item is not None:
+            raise item
+        self.sent.append(message.arbitration_id)
+
+    def fileno(self):
+        raise NotImplementedError
+
+    def shutdown(self):
+        self.closed = True
+        raise can.CanOperationError("there is nothing left to shut down")
+
+
+@pytest.fixture
+def bus_on(monkeypatch):
+    """Open a bus on the first of some drivers; reopening takes the next, or fails while it is None."""
+    opened = []
+
+    def bus_on(*drivers):
+        waiting = list(drivers)
+
+        def open_driver(spec):
+            driver = waiting.pop(0)
+            if driver is None:
+                raise BusError("still unplugged")
+            return driver, None
+
+        monkeypatch.setattr(python_can, "open_driver", open_driver)
+        monkeypatch.setattr(python_can, "_FIRST_RETRY_S", 0.001)
+        opened.append(PythonCanBus(parse_spec("fake:0"), VEHICLE))
+        return opened[-1]
+
+    yield bus_on
+    for bus in opened:
+        bus.close()
+
+
+def message(can_id=1, **more):
+    return can.Message(timestamp=time.time(), arbitration_id=can_id, is_extended_id=False, **more)
+
+
+def states(received):
+    return [item.state if isinstance(item, LinkEvent) else item.can_id for item in received]
+
+
+def test_a_full_transmit_queue_is_counted_and_nothing_is_kept_for_later(bus_on):
+    full = can.CanOperationError("Failed to transmit: No buffer space available", errno.ENOBUFS)
+    driver = Driver(refusing=[None, full, full, None])
+    bus = bus_on(driver)
+    bus.send([FRAME._replace(can_id=n) for n in range(4)])
+    (event,) = bus.receive()
+    assert (event.state, event.number) == (LinkState.TX_OVERFLOW, 2)
+    assert "No buffer space" in event.detail
+    bus.send([FRAME._replace(can_id=9)])
+    assert driver.sent == [0, 3, 9]
+    assert bus.receive() == []
+
+
+def test_an_unplugged_adapter_is_reported_and_reopened(bus_on):
+    gone = can.CanOperationError("Error receiving: No such device", errno.ENODEV)
+    first, second = Driver([message(1), gone]), Driver([message(2)])
+    bus = bus_on(first, None, None, second)
+    assert states(bus.receive()) == [1, LinkState.DISCONNECTED]
+    assert first.closed
+    received = bus.receive(20.0)
+    assert states(received + bus.receive(20.0) if len(received) == 1 else received) == [LinkState.RESTARTED, 2]
+    bus.send([FRAME])
+    assert second.sent == [1]
+
+
+def test_while_it_is_unplugged_nothing_is_sent_later(bus_on):
+    driver, later = Driver(refusing=[OSError(errno.ENETDOWN, "Network is down")]), Driver()
+    bus = bus_on(driver, None, None, later)
+    bus.send([FRAME] * 3)
+    bus.send([FRAME] * 2)
+    received = bus.receive()
+    while LinkState.RESTARTED not in states(received):
+        received += bus.receive(20.0)
+    events = [item for item in received if item.state is not LinkState.RESTARTED]
+    assert {event.state for event in events} == {LinkState.DISCONNECTED, LinkState.TX_OVERFLOW}
+    assert sum(event.number for event in events if event.state is LinkState.TX_OVERFLOW) == 5
+    assert later.sent == []
+
+
+def test_one_unreadable_message_is_no_disconnection(bus_on):
+    bus = bus_on(Driver([ValueError("invalid literal"), message(1)]))
+    assert states(bus.receive()) == [1]
+
+
+def test_a_driver_that_keeps_failing_is_reopened(bus_on):
+    bus = bus_on(Driver([message(1), ValueError("bad"), ValueError("bad")]), Driver([message(2)]))
+    received = []
+    while 2 not in states(received):
+        received += bus.receive(20.0)
+    assert states(received) == [1, LinkState.DISCONNECTED, LinkState.RESTARTED, 2]
+
+
+def test_closing_ends_reconnecting(bus_on):
+    bus = bus_on(Driver([OSError(errno.ENODEV, "gone")]), *[None] * 1000)
+    assert states(bus.receive()) == [LinkState.DISCONNECTED]
+    bus.close()
+    with pytest.raises(ValueError, match="closed"):
+        bus.receive()
+
+
+def test_what_is_no_classical_data_frame_is_ignored_and_counted(bus_on):
+    bus = bus_on(Driver([message(1, is_remote_frame=True), message(2, is_fd=True, data=bytes(12)), message(3)]))
+    assert states(bus.receive()) == [3]
+    assert bus.ignored == 2
+
+
+def test_error_frames_become_events_and_floods_are_counted(bus_on):
+    errors = [message(0x088, is_error_frame=True, data=bytes(8))] * 500
+    bus = bus_on(Driver([message(1), *errors, message(0x040, is_error_frame=True, data=bytes(8)), message(2)]))
+    received = bus.receive()
+    assert states(received) == [1, LinkState.BUS_ERROR, LinkState.BUS_OFF, 2]
+    assert received[1].number == 500
+
+
+def test_a_stamp_that_counts_from_elsewhere_is_replaced(bus_on):
+    early = message(1)
+    early.timestamp = 12.5  # seconds since the adapter was plugged in
+    before_ns = time.monotonic_ns()
+    (frame,) = bus_on(Driver([early])).receive()
+    assert before_ns <= frame.time_ns <= time.monotonic_ns()
+
+
+def test_error_frames_of_another_program_arrive_as_events():
+    name = uuid.uuid4().hex
+    with open_bus(f"virtual:{name}", VEHICLE) as bus, can.Bus(name, interface="virtual") as other:
+        other.send(can.Message(arbitration_id=0x100, is_error_frame=True, is_extended_id=False, data=bytes(8)))
+        other.send(can.Message(arbitration_id=0x7FF, is_extended_id=False, data=b"x"))
+        assert states(bus.receive(20.0) + bus.receive()) == [LinkState.RESTARTED, 0x7FF]
+
+
+def test_python_can_is_kept_quiet(caplog):
+    open_bus(f"virtual:{uuid.uuid4().hex}", VEHICLE).close()
+    assert not logging.getLogger("can").isEnabledFor(logging.ERROR)
+
+
+@pytest.mark.parametrize("kind", ["virtual", "gs_usb"])
+def test_listen_only_is_refused_where_the_driver_cannot(kind):
+    with pytest.raises(BusError, match="listen_only is known of kvaser, pcan, slcan, vector"):
+        open_bus(f"{kind}:0,listen_only=true", VEHICLE)
