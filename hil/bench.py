@@ -50,7 +50,7 @@ class Bench:
     scenario : path or name, as on the command line.
     bus : vehicle bus, or ``auto``.
     out : folder of the run; created.
-    node_options : further options of both node commands.
+    seed, realtime : as of the commands ``plant`` and ``ecu``.
     say : takes progress, one line at a time.
 
     Attributes
@@ -58,6 +58,7 @@ class Bench:
     state, reason : where the run is, and why it is broken.
     spec, note : the vehicle bus taken, and why that one.
     log : the recording.
+    alive_at_end : node processes that lived until they were asked to stop.
     """
 
     def __init__(
@@ -65,7 +66,8 @@ class Bench:
         scenario: str,
         bus: str,
         out: Path,
-        node_options: Sequence[str] = (),
+        seed: int = 1,
+        realtime: bool = False,
         say: Callable[[str], None] = lambda _: None,
     ) -> None:
         self.state = BenchState.NEW
@@ -73,10 +75,13 @@ class Bench:
         self.out = out
         self.log = out / "recording.log"
         self._scenario = scenario
-        self._node_options = node_options
+        self._node_options = ["--realtime"] if realtime else []
+        self._seed = seed
         self._say = say
         self._stop = StopSignal()
         self._children: list[Child] = []
+        self._stopped = False
+        self.alive_at_end = 0
         self._stack = contextlib.ExitStack()
         self._claim = self._stack.enter_context(claim_channel(bus))
         self.spec, self.note = self._claim.spec, self._claim.note
@@ -106,8 +111,8 @@ class Bench:
         self._await_ready(self._children)
         self.state = BenchState.RECORDING
         self._say("starting plant and ECU (the first start on a machine compiles the plant: about 20 s)")
-        for name in ("plant", "ecu"):
-            self._spawn(name, [name, self._scenario, *self._node_options])
+        self._spawn("plant", ["plant", self._scenario, "--seed", str(self._seed), *self._node_options])
+        self._spawn("ecu", ["ecu", self._scenario, *self._node_options])
         self._await_ready(self._children[1:])
         self.state = BenchState.STARTED
 
@@ -158,6 +163,9 @@ class Bench:
     def _stop_all(self) -> None:
         """Stop the nodes first, the recorder last; whoever fails to end well breaks the run."""
         nodes, recorder = self._children[1:], self._children[:1]
+        if not self._stopped:
+            self.alive_at_end = sum(not child.ended for child in nodes)
+        self._stopped = True
         for group in (nodes, recorder):
             for child in group:
                 child.ask_to_stop()

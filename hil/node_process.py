@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from dbc.bench_messages import EcuTiming, PlantTiming
 from dbc.exchange import Transmitter
 from dbc.frame import Node
+from hil.bus.channel import resolve
 from hil.port import Port
-from hil.process import StopSignal, say_ready
+from hil.process import StopSignal, end_with_parent, say_ready
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop, run_node
+from hil.rt.realtime import request_realtime, request_timer_slack
 
 NODE_PERIOD_NS = 10_000_000
 
@@ -42,7 +44,8 @@ def serve(
     bus: str,
     *,
     ready_fd: int | None = None,
-    on_joined: Callable[[], None] = lambda: None,
+    realtime: bool = False,
+    say: Callable[[str], None] = lambda _: None,
     senders: Iterable[str] | None = None,
 ) -> None:
     """Run a node on a bus until SIGTERM or Ctrl-C.
@@ -52,13 +55,20 @@ def serve(
     make_node : builds the node (and compiles what it needs) before the bus is joined.
     bus : the vehicle bus, as on the command line.
     ready_fd : where to say that the node is about to tick.
-    on_joined : called once the buses are joined.
+    realtime : ask for what makes ticks punctual (`hil.rt.realtime`), and say what was granted.
+    say : takes messages for people.
     senders : DBC nodes to play, all of the role's by default.
     """
+    if ready_fd is not None:
+        end_with_parent()
     stop = StopSignal()
+    bus = resolve(bus)
     node = make_node()
     with Port.open(bus, role.senders if senders is None else senders) as port:
-        on_joined()
+        say(f"{role.name}: on {bus}, every {NODE_PERIOD_NS / 1e6:g} ms")
+        for grant in request_realtime() if realtime else [request_timer_slack()]:
+            if realtime or not grant.granted:
+                say(f"{role.name}: {grant.what}: {'granted' if grant.granted else 'NOT granted'}, {grant.detail}")
         say_ready(ready_fd)
         health = Transmitter()
         loop = Loop(WallClock(), NODE_PERIOD_NS, role.phase_ns)

@@ -79,9 +79,8 @@ class RunResult:
     energy_recuperated_j : electrical energy returned to the battery over that time.
     frames_sent : frames recorded on the vehicle bus.
     frames_lost, frames_corrupt : as ECU and plant saw them by counter and check value.
-    overruns : ticks that both nodes skipped.
-    lateness_ms : of the worse node.
-    bus_load : mean share of the vehicle bus's bit rate, each frame counted with all stuff bits it may need.
+    overruns, lateness_ms : of the manoeuvre: ticks that both nodes skipped; how late ticks woke, of the worse node.
+    bus_load : mean share of the vehicle bus's bit rate in the manoeuvre, each frame with all stuff bits it may need.
     link_states : number of link events by name.
     """
 
@@ -126,7 +125,7 @@ def measure(signals: Signals) -> RunResult:
         frames_sent=_vehicle_frames(signals).size,
         frames_lost=sum(_last(signals, f"{node}_RECEPTION.FRAMES_LOST") for node in nodes),
         frames_corrupt=sum(_last(signals, f"{node}_RECEPTION.FRAMES_CORRUPT") for node in nodes),
-        overruns=sum(_last(signals, f"{node}_TIMING.OVERRUNS") for node in nodes),
+        overruns=sum(_overruns(signals, node) for node in nodes),
         lateness_ms=max((_lateness(signals, node) for node in nodes), key=lambda lateness: lateness.p99),
         bus_load=_bus_load(signals),
         link_states=dict(Counter(event.state.value for event in link_events(signals))),
@@ -153,8 +152,15 @@ def _last(signals: Signals, name: str) -> int:
     return int(values[-1]) if len(values) else 0
 
 
+def _overruns(signals: Signals, node: str) -> int:
+    t_s, count = signals.get(f"{node}_TIMING.OVERRUNS")
+    count = count[t_s >= 0.0]
+    return int(count[-1] - count[0]) if len(count) else 0
+
+
 def _lateness(signals: Signals, node: str) -> Lateness:
-    _, late_s = signals.get(f"{node}_TIMING.LATENESS")
+    t_s, late_s = signals.get(f"{node}_TIMING.LATENESS")
+    late_s = late_s[t_s >= 0.0]
     if not len(late_s):
         return Lateness(0.0, 0.0, 0.0)
     p50, p99 = np.percentile(late_s, (50, 99))
@@ -172,6 +178,7 @@ def _vehicle_frames(signals: Signals) -> NDArray[np.intp]:
 def _bus_load(signals: Signals) -> float:
     """Share of the bit rate; a stuffed 11-bit frame takes 47 + 8 n + floor((34 + 8 n - 1) / 4) bits (Tindell 1994)."""
     frames, rows = signals.decoded.recording.frames, _vehicle_frames(signals)
+    rows = rows[signals.decoded.time_s[rows] >= signals.start_s]
     if rows.size < 2:
         return 0.0
     payload_bits = 8 * frames.length[rows].astype(np.int64)

@@ -1,6 +1,7 @@
 """The report of one run, built from its recording."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -111,10 +112,7 @@ def _timeline(signals: Signals) -> tuple[Lane, ...]:
     ]
     modes = [Span(a, b, BrakeMode(v).name, _MODE_SEVERITY[v]) for a, b, v in _spans(*signals.get("BRAKE_STATUS.MODE"))]
     faults = [
-        Span(a, b, fault.name or "", "error")
-        for fault in Fault
-        for a, b, active in _spans(*_bit(signals, fault))
-        if active
+        Span(a, b, _fault_names(v), "error") for a, b, v in _spans(*signals.get("BRAKE_STATUS.ACTIVE_FAULTS")) if v
     ]
     brakes = [
         Span(a, b, f"{axle.lower()}: {EhbState(v).name}", "warning")
@@ -141,6 +139,17 @@ def _timeline(signals: Signals) -> tuple[Lane, ...]:
     )
 
 
-def _bit(signals: Signals, fault: Fault) -> tuple[Floats, Floats]:
-    t_s, values = signals.get("BRAKE_STATUS.ACTIVE_FAULTS")
-    return t_s, (values.astype(np.int64) & int(fault) != 0).astype(np.float64)
+def _fault_names(bits: int) -> str:
+    """Names of the set bits, shortened where there are many (all of them before the first frames have come)."""
+    names = [fault.name or "" for fault in Fault if fault and bits & fault]
+    return ", ".join(names if len(names) <= 3 else [*names[:2], f"{len(names) - 2} more"])
+
+
+def brief(report: Report) -> Report:
+    """What a terminal shows: numbers, the main panels, the timeline; the rest is on the page."""
+    wanted = ("Speed", "Deceleration", "Brake pressure", "Pad friction")
+    sections = tuple(
+        replace(section, panels=tuple(panel for panel in section.panels if panel.title in wanted))
+        for section in report.sections
+    )
+    return replace(report, sections=sections, provenance={})

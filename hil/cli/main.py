@@ -8,12 +8,12 @@ from importlib.metadata import version
 
 from hil.errors import BrakebenchError
 
-COMMANDS = ("run", "ecu", "plant", "record", "decode", "convert")
+COMMANDS = ("run", "ecu", "plant", "record", "decode", "perf")
 """Subcommands in the order of the help; each is a module of this package."""
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """Parser of the whole command line."""
+def build_parser(commands: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
+    """Parser of the command line, with some or all commands."""
     parser = argparse.ArgumentParser(
         prog="brakebench",
         description="CAN-bus brake ECU emulator and hardware-in-the-loop bench.",
@@ -21,14 +21,16 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"brakebench {version('brakebench')}")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for name in COMMANDS:
+    for name in commands:
         importlib.import_module(f"hil.cli.{name}").add_parser(subparsers)
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
-    args = build_parser().parse_args(arguments)
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    named = [word for word in words[:1] if word in COMMANDS]  # importing one command is faster than all
+    args = build_parser(named or COMMANDS).parse_args(words)
     try:
         code: int = args.run(args)
     except BrakebenchError as error:

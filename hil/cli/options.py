@@ -22,3 +22,36 @@ def add_ready_fd(parser: argparse.ArgumentParser) -> None:
 def add_json(parser: argparse.ArgumentParser) -> None:
     """``--json``: one object alone on standard output, all else on standard error."""
     parser.add_argument("--json", action="store_true", help="print one JSON object alone on standard output")
+
+
+def add_scenario(parser: argparse.ArgumentParser) -> None:
+    """The scenario, by name or path."""
+    parser.add_argument(
+        "scenario",
+        nargs="?",
+        default="stop72",
+        metavar="SCENARIO",
+        help="name of a scenario of the library, or the path of a .toml file (default: stop72)",
+    )
+
+
+def add_realtime(parser: argparse.ArgumentParser) -> None:
+    """``--realtime``: what a kernel can give to be punctual."""
+    parser.add_argument(
+        "--realtime",
+        action="store_true",
+        help="ask for real-time scheduling, locked memory and no garbage collection; says what was not granted",
+    )
+
+
+def add_seed(parser: argparse.ArgumentParser) -> None:
+    """``--seed``: of all noise."""
+    parser.add_argument("--seed", type=int, default=1, help="seed of all noise (default: 1)")
+
+
+def add_node_options(parser: argparse.ArgumentParser) -> None:
+    """What the commands ``ecu`` and ``plant`` share."""
+    add_scenario(parser)
+    add_bus(parser)
+    add_realtime(parser)
+    add_ready_fd(parser)

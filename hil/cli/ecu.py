@@ -1,0 +1,29 @@
+"""``brakebench ecu``: the controller alone, on a bus."""
+
+import argparse
+import sys
+
+from hil.cli.options import add_node_options
+
+
+def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = subparsers.add_parser("ecu", help="run the controller alone on a bus, until Ctrl-C")
+    add_node_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the controller until it is told to stop."""
+    from dbc.frame import Node
+    from ecu.node import EcuNode
+    from hil.node_process import ECU, NODE_PERIOD_NS, serve
+    from hil.scenario import load_scenario
+
+    scenario = load_scenario(args.scenario)
+
+    def make() -> Node:
+        return EcuNode(scenario.ecu, NODE_PERIOD_NS)
+
+    serve(ECU, make, args.bus, ready_fd=args.ready_fd, realtime=args.realtime, say=lambda s: print(s, file=sys.stderr))
+    return 0

@@ -1,0 +1,34 @@
+"""``brakebench plant``: the vehicle alone, on a bus."""
+
+import argparse
+import sys
+
+from hil.cli.options import add_node_options, add_seed
+
+
+def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = subparsers.add_parser("plant", help="run the vehicle alone on a bus, until Ctrl-C")
+    add_node_options(parser)
+    add_seed(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the vehicle until it is told to stop; it drives the scenario once, when a controller is there."""
+    from dbc.frame import Node
+    from hil.node_process import NODE_PERIOD_NS, PLANT, serve
+    from hil.scenario import load_scenario
+    from plant.model import compile_model
+    from plant.node import PlantNode
+
+    scenario = load_scenario(args.scenario)
+
+    def make() -> Node:
+        compile_model()
+        return PlantNode(scenario.plant, scenario.manoeuvre, args.seed, NODE_PERIOD_NS)
+
+    serve(
+        PLANT, make, args.bus, ready_fd=args.ready_fd, realtime=args.realtime, say=lambda s: print(s, file=sys.stderr)
+    )
+    return 0

@@ -1,0 +1,38 @@
+"""``brakebench run``: ECU and plant as two processes on one bus, one scenario, recorded and measured."""
+
+import argparse
+import sys
+
+from hil.cli.options import add_bus, add_json, add_realtime, add_scenario, add_seed
+
+
+def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = subparsers.add_parser("run", help="run a scenario: ECU and plant as two processes on one CAN bus")
+    add_scenario(parser)
+    add_bus(parser)
+    parser.add_argument("--out", metavar="DIR", help="folder for log, signals, figure and report (default: runs/...)")
+    add_seed(parser)
+    add_realtime(parser)
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run, measure, report."""
+    from hil.run import run_scenario
+
+    outcome = run_scenario(
+        args.scenario,
+        args.bus,
+        out=args.out,
+        seed=args.seed,
+        realtime=args.realtime,
+        command_line=" ".join(sys.argv[1:]),
+        say=lambda line: print(line, file=sys.stderr, flush=True),
+    )
+    if args.json:
+        print(outcome.json_text())
+    else:
+        outcome.print_text(sys.stdout)
+    return outcome.exit_code
