@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from hil.log.frames import (
     FD_LENGTHS,
+    FIRST_REJECTED,
     MAX_EXTENDED_ID,
     MAX_STANDARD_ID,
     FrameFlag,
@@ -21,7 +22,6 @@ from hil.log.frames import (
 
 BLOCK_BYTES = 2 * 1024 * 1024
 MAX_LINE_BYTES = 4096
-FIRST_REJECTED = 10
 MAX_SECONDS = 9_000_000_000  # int64 nanoseconds reach a little farther
 SMALL_GROUP = 16  # fewer lines of one shape are not worth an array operation
 SHAPES_PER_GROUP = 4

@@ -13,7 +13,9 @@ from hil.errors import BrakebenchError
 
 MAX_STANDARD_ID = 0x7FF
 MAX_EXTENDED_ID = 0x1FFFFFFF
-FD_LENGTHS = frozenset({*range(9), 12, 16, 20, 24, 32, 48, 64})
+FD_CODES = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)  # data bytes by length code
+FD_LENGTHS = frozenset(FD_CODES)
+FIRST_REJECTED = 10  # how many rejected pieces are shown
 
 
 class FrameFlag(IntFlag):
@@ -138,3 +140,56 @@ class Recording:
     rejected: int = 0
     first_rejected: tuple[Rejected, ...] = ()
     truncated_at: int | None = None
+
+
+class FrameBuilder:
+    """Collects frames one at a time where a format leaves no other way.
+
+    What no CAN frame can be is rejected: identifiers out of range, wrong lengths, stamps that are no time.
+    """
+
+    def __init__(self) -> None:
+        self.rejected = 0
+        self.first_rejected: list[Rejected] = []
+        self._channels: dict[str, int] = {}
+        self._rows: list[tuple[int, int, int, bool, int, int]] = []
+        self._data: list[bytes] = []
+
+    def add(
+        self, time_ns: int, channel: str, can_id: int, extended: bool, data: bytes, flags: FrameFlag, length: int
+    ) -> bool:
+        """Add a frame; False (and nothing added) where it can be none. ``length`` counts for remote frames only."""
+        remote = bool(flags & FrameFlag.REMOTE)
+        limit = MAX_EXTENDED_ID if extended or flags & FrameFlag.ERROR else MAX_STANDARD_ID
+        size = length if remote else len(data)
+        sound = size in FD_LENGTHS if flags & FrameFlag.FD else 0 <= size <= 8
+        if not (sound and 0 <= can_id <= limit and 0 <= time_ns < 2**63):
+            return False
+        number = self._channels.setdefault(channel, len(self._channels))
+        self._rows.append((time_ns, number, can_id, extended, size, int(flags)))
+        self._data.append(b"" if remote else data)
+        return True
+
+    def reject(self, offset: int, text: str) -> None:
+        """Count something that should be a frame and is none."""
+        self.rejected += 1
+        if len(self.first_rejected) < FIRST_REJECTED:
+            self.first_rejected.append(Rejected(offset, text[:80].encode("ascii", "backslashreplace").decode()))
+
+    def recording(self, path: Path, form: str, truncated_at: int | None = None) -> Recording:
+        """Return what was collected."""
+        width = 64 if any(len(d) > 8 for d in self._data) else 8
+        n = len(self._rows)
+        rows = np.array(self._rows, np.int64).reshape(n, 6)
+        data = np.frombuffer(b"".join(d.ljust(width, b"\0") for d in self._data), np.uint8).reshape(n, width)
+        frames = FrameTable(
+            tuple(self._channels),
+            rows[:, 0].copy(),
+            rows[:, 1].astype(np.int32),
+            rows[:, 2].astype(np.uint32),
+            rows[:, 3].astype(np.bool_),
+            rows[:, 4].astype(np.uint8),
+            data,
+            rows[:, 5].astype(np.uint8),
+        )
+        return Recording(path, form, frames, self.rejected, tuple(self.first_rejected), truncated_at)
