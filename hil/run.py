@@ -18,7 +18,7 @@ from hil.report.report import Number, Report, Verdict
 from hil.report.text import print_text
 from hil.result import RunResult, Signals, measure
 from hil.rt.clock import wall_time_ns
-from hil.run_report import brief, build_report
+from hil.run_report import build_report
 from hil.scenario import Scenario, load_scenario
 
 EXIT_CODES = {Verdict.PASSED: 0, Verdict.FAILED: 1, Verdict.INCOMPLETE: 3}
@@ -48,7 +48,7 @@ class Outcome:
 
     def print_text(self, stream: TextIO) -> None:
         """What a terminal can show, then where the files are."""
-        print_text(brief(self.report), stream)
+        print_text(self.report, stream, brief=True)
         stream.write("\n")
         for name in ("log", "signals", "figure", "page"):
             stream.write(f"{name:8} {self.facts[name]}\n")

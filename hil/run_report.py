@@ -1,18 +1,18 @@
 """The report of one run, built from its recording."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
 from dbc.bench_messages import ManoeuvreState
 from dbc.messages import BrakeMode, EhbState, Fault, MotorState
-from hil.report.report import Event, Lane, Number, Panel, Report, Section, Severity, Span, Trace, Verdict
+from hil.report.report import Event, Lane, Number, Panel, Report, Section, Severity, Span, Style, Trace, Verdict
 from hil.report.units import BAR, DEG_C, KJ, KMH, PERCENT
 from hil.result import Floats, RunResult, Signals, link_events
 
 WHEELS = ("FL", "FR", "RL", "RR")
 _AXLE = {"FL": "FRONT", "FR": "FRONT", "RL": "REAR", "RR": "REAR"}
+FROM_S = -1.0  # nothing of the wait for the controller is shown but its last second
 _MODE_SEVERITY: dict[int, Severity] = {0: "info", 1: "ok", 2: "warning", 3: "error", 4: "error"}
 
 
@@ -38,20 +38,23 @@ def _numbers(result: RunResult) -> tuple[Number, ...]:
         Number("Demanded deceleration", result.demanded_decel_mps2, "m/s²", "pedal map, mean over the stop"),
         Number("Energy recuperated", result.energy_recuperated_j, KJ),
         Number("Frames on the vehicle bus", result.frames_sent, ""),
-        Number("Frames lost", result.frames_lost, "", limit="0", met=result.frames_lost == 0),
-        Number("Frames corrupt", result.frames_corrupt, "", limit="0", met=result.frames_corrupt == 0),
+        Number("Frames lost", result.frames_lost, "", limit="= 0", met=result.frames_lost == 0),
+        Number("Frames corrupt", result.frames_corrupt, "", limit="= 0", met=result.frames_corrupt == 0),
         Number("Bus load", result.bus_load, PERCENT, "with worst-case stuff bits"),
         Number("Overruns", result.overruns, "", "ticks skipped by ECU and plant"),
         Number("Lateness p50 / p99 / max", f"{late.p50:.3f} / {late.p99:.3f} / {late.max:.3f}", "ms", "worse node"),
     )
 
 
-def _trace(signals: Signals, name: str, message: str, style: str = "line", group: str = "", sign: float = 1.0) -> Trace:
+def _trace(
+    signals: Signals, name: str, message: str, style: Style = "line", group: str = "", sign: float = 1.0
+) -> Trace:
     t_s, values = signals.get(message)
-    return Trace(name, t_s, sign * values, style, group)  # type: ignore[arg-type]
+    shown = t_s >= FROM_S
+    return Trace(name, t_s[shown], sign * values[shown], style, group)
 
 
-def _wheels(signals: Signals, pattern: str, name: str, style: str = "line") -> tuple[Trace, ...]:
+def _wheels(signals: Signals, pattern: str, name: str, style: Style = "line") -> tuple[Trace, ...]:
     """One trace a wheel; ``pattern`` holds {w} and {axle}."""
     return tuple(
         _trace(signals, f"{name} {w.lower()}", pattern.format(w=w, axle=_AXLE[w]), style, w.lower()) for w in WHEELS
@@ -99,6 +102,7 @@ def _panels(signals: Signals) -> tuple[Panel, ...]:
 
 def _spans(t_s: Floats, values: Floats) -> list[tuple[float, float, int]]:
     """Stretches of constant value: (start, end, value)."""
+    t_s, values = t_s[t_s >= FROM_S], values[t_s >= FROM_S]
     if not len(t_s):
         return []
     edges = np.concatenate(([0], np.flatnonzero(np.diff(values)) + 1))
@@ -143,13 +147,3 @@ def _fault_names(bits: int) -> str:
     """Names of the set bits, shortened where there are many (all of them before the first frames have come)."""
     names = [fault.name or "" for fault in Fault if fault and bits & fault]
     return ", ".join(names if len(names) <= 3 else [*names[:2], f"{len(names) - 2} more"])
-
-
-def brief(report: Report) -> Report:
-    """What a terminal shows: numbers, the main panels, the timeline; the rest is on the page."""
-    wanted = ("Speed", "Deceleration", "Brake pressure", "Pad friction")
-    sections = tuple(
-        replace(section, panels=tuple(panel for panel in section.panels if panel.title in wanted))
-        for section in report.sections
-    )
-    return replace(report, sections=sections, provenance={})
