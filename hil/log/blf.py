@@ -106,9 +106,10 @@ def _content(path: Path, position: int, body: memoryview, builder: FrameBuilder)
 def _objects(builder: FrameBuilder, stream: bytes, offset: int, start_ns: int) -> bytes:
     """Take the objects of a stream; return the unfinished rest. ``offset`` is where its container starts."""
     position = 0
+    lost = False  # behind an object of impossible size, counted already
     while True:
         found = stream.find(b"LOBJ", position)
-        if (found if found >= 0 else len(stream)) - position > MAX_PADDING:
+        if not lost and (found if found >= 0 else len(stream)) - position > MAX_PADDING:
             builder.reject(offset, f"bytes that are no object: {stream[position : position + 16]!r}")
         if found < 0:
             return stream[max(position, len(stream) - MAX_PADDING) :]
@@ -117,7 +118,7 @@ def _objects(builder: FrameBuilder, stream: bytes, offset: int, start_ns: int) -
         _, header_size, version, size, kind = OBJECT.unpack_from(stream, found)
         if not OBJECT.size <= size <= MAX_OBJECT:
             builder.reject(offset, f"object of type {kind} and {size} bytes")
-            position = found + 4
+            position, lost = found + 4, True
             continue
         if found + size > len(stream):
             return stream[found:]
@@ -129,7 +130,7 @@ def _objects(builder: FrameBuilder, stream: bytes, offset: int, start_ns: int) -
                 taken = False
             if not taken:
                 builder.reject(offset, f"object of type {kind}: {one[:32].hex(' ')}")
-        position = found + size
+        position, lost = found + size, False
 
 
 def _frame(builder: FrameBuilder, one: bytes, layout: tuple[int, int, int], start_ns: int) -> bool:

@@ -111,11 +111,12 @@ def decode_log(recording: Recording, databases: Database | Mapping[str, Database
     for a, b in pairwise(bounds):
         whole = int(key[a])
         groups[whole >> 32, whole & 0x1FFF_FFFF, bool(whole >> 31 & 1)] = rows[a:b]
-    for i, database in enumerate(distinct):
-        for (can_id, extended), message in database.messages.items():
-            group = groups.pop((i, can_id, extended), None)
-            if group is not None:
-                _decode_message(log, frames, message, group)
+    with np.errstate(over="ignore", invalid="ignore"):  # a floating-point signal may hold anything
+        for i, database in enumerate(distinct):
+            for (can_id, extended), message in database.messages.items():
+                group = groups.pop((i, can_id, extended), None)
+                if group is not None:
+                    _decode_message(log, frames, message, group)
     for (_, can_id, extended), group in groups.items():
         _count_unknown(log, frames, can_id, extended, group)
     return log

@@ -10,6 +10,7 @@ import binascii
 import csv
 import re
 from collections.abc import Iterator
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +95,7 @@ def _added(add: Any, builder: FrameBuilder, cells: dict[str, Any]) -> bool:
 
 def _ns(seconds: Any) -> int:
     if isinstance(seconds, float):  # as fine as a float64 of this size is
-        return round(seconds * 1e6) * 1000 if seconds > 1e8 else round(seconds * 1e9)
+        return round(Decimal(seconds) * 10**6) * 1000 if seconds > 1e8 else round(seconds * 1e9)
     match = _SECONDS.fullmatch(seconds)
     if match is None:
         raise ValueError(seconds)

@@ -52,7 +52,7 @@ def read_trc(path: Path) -> Recording:
 
 def _start_ns(days: str) -> int:
     try:
-        start_ns = int((Decimal(days.strip()) - EPOCH_DAY) * 86_400_000_000) * 1000
+        start_ns = round((Decimal(days.strip()) - EPOCH_DAY) * 86_400_000_000) * 1000
     except (InvalidOperation, ValueError, OverflowError):
         return 0
     return start_ns if 0 <= start_ns < 2**62 else 0
@@ -86,7 +86,7 @@ def trc_lines(frames: FrameTable, numbers: list[int]) -> Iterator[str]:
     """
     first_ns = int(frames.time_ns.min()) // 10**6 * 10**6 if len(frames) else 0
     days = Decimal(first_ns) / (86_400 * 10**9) + EPOCH_DAY
-    yield f";$FILEVERSION=2.1\n;$STARTTIME={days:.12f}\n;$COLUMNS=N,O,T,B,I,d,R,l,D\n;\n"
+    yield f";$FILEVERSION=2.1\n;$STARTTIME={days:.15f}\n;$COLUMNS=N,O,T,B,I,d,R,l,D\n;\n"
     yield ";   Number, offset in ms, type, bus, id (hex), direction, reserved, data length, data (hex)\n;\n"
     names = {int(flags): name for name, flags in TYPES.items()}
     columns = (frames.time_ns, frames.channel, frames.can_id, frames.extended, frames.length, frames.flags)
