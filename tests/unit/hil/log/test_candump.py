@@ -135,7 +135,7 @@ PIECES = (
 LINE_PIECES = st.sampled_from(PIECES.split("|"))
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.lists(st.tuples(st.lists(LINE_PIECES, max_size=9).map("".join), st.sampled_from([1, 17])), max_size=8))
 def test_the_array_path_takes_just_what_the_line_definition_takes(tmp_path_factory, lines):
     folder = tmp_path_factory.getbasetemp()
