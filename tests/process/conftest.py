@@ -1,0 +1,61 @@
+"""Real processes, as a user starts them."""
+
+import os
+import signal
+import subprocess
+import sys
+import uuid
+
+import pytest
+from processes import RUN_LIMIT_S
+
+COMMAND = [sys.executable, "-m", "hil.cli.main"]
+
+
+@pytest.fixture
+def channel():
+    """A loopback of this test's own."""
+    return f"loopback:t{uuid.uuid4().hex[:10]}"
+
+
+@pytest.fixture
+def brakebench(tmp_path):
+    """Run a command to its end in a folder of its own."""
+
+    def run(*arguments, check=0, env=None):
+        done = subprocess.run(
+            [*COMMAND, *arguments],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=RUN_LIMIT_S,
+            env=os.environ | (env or {}),
+        )
+        assert done.returncode == check, f"exit {done.returncode}\n{done.stdout}\n{done.stderr}"
+        return done
+
+    return run
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Start a command and go on; whatever still runs at the end is killed."""
+    started = []
+
+    def begin(*arguments, program=COMMAND, env=None):
+        process = subprocess.Popen(
+            [*program, *arguments],
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | (env or {}),
+        )
+        started.append(process)
+        return process
+
+    yield begin
+    for process in started:
+        if process.poll() is None:
+            process.send_signal(signal.SIGKILL)
+        process.communicate(timeout=30)
