@@ -15,15 +15,16 @@ from types import TracebackType
 from typing import Self
 
 from dbc.frame import BusName, Frame, LinkEvent, LinkState, Received
-from hil.bus.loopback_wire import MAX_FRAMES, MAX_PACKET, pack_frames, pack_header, unpack
+from hil.bus.can_frame import pack_frame
+from hil.bus.loopback_wire import MAX_FRAMES, MAX_PACKET, pack_header, unpack
 from hil.bus.rendezvous import Rendezvous
 from hil.rt.clock import monotonic_ns
 
 QUEUE_BYTES = 1 << 20
 """Asked of the kernel per peer, a few hundred packets at least; beyond it that peer loses frames."""
 
-MOST_PACKETS = 1 << 14
-"""Read of one peer at a time, more than its queue can hold: one that floods the bus holds nobody up."""
+MOST_ROUNDS = 1 << 14
+"""Packets read of a peer at a time, more than its queue can hold: one that floods the bus holds nobody up."""
 
 _SO_SNDBUFFORCE = 32  # asm-generic/socket.h; needs CAP_NET_ADMIN
 
@@ -74,6 +75,7 @@ class LoopbackBus:
         except BaseException:
             self._epoll.close()
             raise
+        self._listener_file = self._listener.fileno()
         self._joiners.register(self._listener, select.POLLIN)
         self._epoll.register(self._listener, select.EPOLLIN)
         for connection in present:
@@ -85,13 +87,14 @@ class LoopbackBus:
             raise ValueError(f"{self.name} is closed")
         if self._joiners.poll(0):
             self._accept()
+        records = [pack_frame(frame, self.bus) for frame in frames]  # all of them, before the first is sent
         time_ns = monotonic_ns()
-        for start in range(0, len(frames), MAX_FRAMES):
-            records = pack_frames(frames[start : start + MAX_FRAMES], self.bus)
-            count = min(MAX_FRAMES, len(frames) - start)
+        for start in range(0, len(records), MAX_FRAMES):
+            chunk = records[start : start + MAX_FRAMES]
+            packed = b"".join(chunk)
             for peer in list(self._peers.values()):
                 if peer.takes:
-                    self._send_to(peer, count, time_ns, records)
+                    self._send_to(peer, len(chunk), time_ns, packed)
 
     def _send_to(self, peer: _Peer, count: int, time_ns: int, records: bytes) -> None:
         packet = pack_header(count, peer.addressed, time_ns) + records
@@ -108,12 +111,17 @@ class LoopbackBus:
         """Return everything there is: in order per member, by time of sending between members."""
         if self._epoll.closed:
             raise ValueError(f"{self.name} is closed")
-        received = self._drain(0.0)
-        if received or timeout_s <= 0:
+        received: list[Received] = []
+        if self._sent_lost:
+            received.append(self._not_taken())
+            timeout_s = 0.0
+        if timeout_s <= 0:
+            self._drain(0.0, received)
             return received
         deadline_ns = monotonic_ns() + int(timeout_s * 1e9)
-        while not received and (left_ns := deadline_ns - monotonic_ns()) > 0:
-            received = self._drain(left_ns * 1e-9)
+        while not received and timeout_s > 0:
+            self._drain(timeout_s, received)
+            timeout_s = (deadline_ns - monotonic_ns()) * 1e-9
         return received
 
     def fileno(self) -> int:
@@ -138,64 +146,69 @@ class LoopbackBus:
     ) -> None:
         self.close()
 
-    def _drain(self, timeout_s: float) -> list[Received]:
-        heard: list[list[Received]] = []
-        for file, _ in self._epoll.poll(timeout_s):
-            readable = self._accept() if file == self._listener.fileno() else [file]
-            heard += [batch for ready in readable if (batch := self._read(ready))]
-        if self._sent_lost:
-            detail = f"queue full of process {', '.join(map(str, sorted(self._sent_lost_to)))}"
-            event = LinkEvent(self.bus, LinkState.TX_OVERFLOW, monotonic_ns(), self._sent_lost, detail)
-            heard.append([event])
-            self._sent_lost = 0
-            self._sent_lost_to.clear()
-        if len(heard) == 1:
-            return heard[0]
-        return sorted((item for batch in heard for item in batch), key=lambda item: item.time_ns)
+    def _drain(self, timeout_s: float, received: list[Received]) -> None:
+        """Append what the members sent: a packet of each in turn, until nobody has more."""
+        heard = set()
+        for _ in range(MOST_ROUNDS):
+            ready = self._epoll.poll(timeout_s)
+            timeout_s = 0.0
+            progress = False
+            for file, _ in ready:
+                if file == self._listener_file:
+                    progress |= self._accept()
+                else:
+                    progress = True
+                    heard.add(file)
+                    self._read(file, received)
+            if not progress:
+                break
+        if len(heard) > 1:
+            received.sort(key=lambda item: item.time_ns)
 
-    def _read(self, file: int) -> list[Received]:
-        """Read one peer until it has nothing more."""
+    def _read(self, file: int, received: list[Received]) -> None:
+        """Append one packet's content."""
         peer = self._peers.get(file)
-        if peer is None:
-            return []
-        received: list[Received] = []
-        receive = peer.connection.recv
-        for _ in range(MOST_PACKETS):
-            try:
-                packet = receive(MAX_PACKET + 1)
-            except BlockingIOError:
-                return received
-            except ConnectionResetError:  # it closed without having read all: said once, its last packets follow
-                continue
-            except OSError:
-                packet = b""
-            if not packet:
-                self._drop(file)
-                return received
-            content = unpack(packet, self.bus)
-            if content is None or content[0] < peer.heard:
-                self.garbage += 1
-                continue
-            sequence, frames = content
-            if sequence > peer.heard:
-                detail = f"from process {peer.pid}"
-                event = LinkEvent(self.bus, LinkState.RX_OVERFLOW, frames[0].time_ns, sequence - peer.heard, detail)
-                received.append(event)
-            peer.heard = sequence + len(frames)
-            received += frames
-        return received
+        if peer is None:  # dropped by a sending thread in the same moment
+            return
+        try:
+            packet = peer.connection.recv(MAX_PACKET + 1)
+        except (BlockingIOError, ConnectionResetError):  # reset: it left unread what we sent; its last packets follow
+            return
+        except OSError:
+            packet = b""
+        if not packet:
+            self._drop(file)
+            return
+        content = unpack(packet, self.bus)
+        if content is None or content[0] < peer.heard:
+            self.garbage += 1
+            return
+        sequence, frames = content
+        if sequence > peer.heard:
+            lost, detail = sequence - peer.heard, f"from process {peer.pid}"
+            received.append(LinkEvent(self.bus, LinkState.RX_OVERFLOW, frames[0].time_ns, lost, detail))
+        peer.heard = sequence + len(frames)
+        received += frames
 
-    def _accept(self) -> list[int]:
-        """Accept whoever joined, without waiting; return their descriptors."""
-        accepted: list[int] = []
+    def _not_taken(self) -> LinkEvent:
+        detail = f"queue full of process {', '.join(map(str, sorted(self._sent_lost_to)))}"
+        event = LinkEvent(self.bus, LinkState.TX_OVERFLOW, monotonic_ns(), self._sent_lost, detail)
+        self._sent_lost = 0
+        self._sent_lost_to.clear()
+        return event
+
+    def _accept(self) -> bool:
+        """Accept whoever joined, without waiting; return whether somebody did."""
+        accepted = False
         while True:
             try:
                 connection, _ = self._listener.accept()
             except OSError:  # nobody more; or gone again; or out of descriptors, retried at the next call
                 return accepted
-            accepted.append(self._add(connection))
+            self._add(connection)
+            accepted = True
 
-    def _add(self, connection: socket.socket) -> int:
+    def _add(self, connection: socket.socket) -> None:
         file = connection.fileno()
         try:
             self._peers[file] = _Peer(connection)
@@ -203,7 +216,6 @@ class LoopbackBus:
         except OSError:  # it left in the same moment
             self._drop(file)
             connection.close()
-        return file
 
     def _drop(self, file: int) -> None:
         peer = self._peers.pop(file, None)

@@ -95,7 +95,7 @@ def test_a_frame_arrives_as_it_was_sent(join):
     here.send(sent)
     received = receive_all(there, len(sent))
     assert [f._replace(time_ns=0) for f in received] == sent
-    tolerance_ns = 5_000_000 if "socketcan" in there.name or "virtual" in there.name else 0  # stamped in wall time
+    tolerance_ns = 10**9 if "socketcan" in there.name or "virtual" in there.name else 0  # stamped in wall time
     for frame in received:
         assert before_ns - tolerance_ns <= frame.time_ns <= time.monotonic_ns() + tolerance_ns
 

@@ -3,7 +3,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from dbc.frame import BusName, Frame
-from hil.bus.loopback_wire import MAX_FRAMES, MAX_PACKET, pack_frames, pack_header, unpack
+from hil.bus.can_frame import pack_frame
+from hil.bus.loopback_wire import MAX_FRAMES, MAX_PACKET, pack_header, unpack
 
 VEHICLE = BusName.VEHICLE
 
@@ -16,7 +17,7 @@ def frames(draw, time_ns):
 
 
 def packet(sequence, frames, time_ns=0):
-    return pack_header(len(frames), sequence, time_ns) + pack_frames(frames, VEHICLE)
+    return pack_header(len(frames), sequence, time_ns) + b"".join(pack_frame(frame, VEHICLE) for frame in frames)
 
 
 @given(st.data(), st.integers(0, 2**63 - 1), st.integers(0, 2**64 - 1))
@@ -53,12 +54,12 @@ def test_a_bit_flip_is_refused_or_gives_valid_frames(bit):
     content = unpack(bytes(mutant), VEHICLE)
     if content is not None:
         for frame in content[1]:
-            pack_frames([frame], VEHICLE)  # raises on what is not one
+            pack_frame(frame, VEHICLE)  # raises on what is not one
 
 
 def test_the_boundaries_of_a_frame():
     for frame in (Frame(VEHICLE, 0x7FF, bytes(8)), Frame(VEHICLE, 0x1FFFFFFF, b"", 0, True)):
-        assert len(pack_frames([frame], VEHICLE)) == 16
+        assert len(pack_frame(frame, VEHICLE)) == 16
     for frame in (Frame(VEHICLE, 0x800, b""), Frame(VEHICLE, 0x20000000, b"", 0, True), Frame(VEHICLE, 0, bytes(9))):
         with pytest.raises(ValueError, match="cannot send"):
-            pack_frames([frame], VEHICLE)
+            pack_frame(frame, VEHICLE)
