@@ -38,7 +38,7 @@ def read_blf(path: Path) -> Recording:
     Raises
     ------
     LogError
-        When it has no BLF header, or its containers cannot be followed.
+        When it has no BLF header, or a container of absurd size.
     """
     content = path.read_bytes()
     if len(content) < FILE_HEADER.size or content[:4] != b"LOGG":
@@ -50,12 +50,20 @@ def read_blf(path: Path) -> Recording:
     tail = b""
     position = header[1]
     while position < len(content):
-        if position + OBJECT.size > len(content):
-            truncated_at = position
+        found = content.find(b"LOBJ", position)
+        if (found if found >= 0 else len(content)) - position > MAX_PADDING:
+            builder.reject(position, f"bytes that are no object: {content[position : position + 16]!r}")
+        if found < 0:
             break
-        signature, header_size, _, size, kind = OBJECT.unpack_from(content, position)
-        if signature != b"LOBJ" or size < OBJECT.size:
-            raise LogError(path, f"expected an object (LOBJ), got {signature!r} of {size} bytes", position)
+        if found + OBJECT.size > len(content):
+            truncated_at = found
+            break
+        position = found
+        _, header_size, _, size, kind = OBJECT.unpack_from(content, position)
+        if size < OBJECT.size:
+            builder.reject(position, f"object of type {kind} and {size} bytes")
+            position += OBJECT.size
+            continue
         if position + size > len(content):
             truncated_at = position
         if kind == LOG_CONTAINER:
@@ -65,7 +73,7 @@ def read_blf(path: Path) -> Recording:
             truncated_at = position if cut else truncated_at
         else:
             _objects(builder, content[position : position + size], position, start_ns)
-        position += size + size % 4
+        position += size
     if tail.startswith(b"LOBJ") and truncated_at is None:
         truncated_at = len(content)
     whole = header[2]  # a writer that was killed leaves the size of the bare header

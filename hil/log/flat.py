@@ -55,7 +55,7 @@ def read_csv(path: Path) -> Recording:
             if not line:
                 continue
             truncated_at = None if raw.endswith(b"\n") else begin
-            cells = next(csv.reader([line]), [])
+            cells = _cells(line)
             if len(cells) != len(header) or not _added(add, builder, dict(zip(header, cells, strict=True))):
                 builder.reject(begin, line)
     return builder.recording(path, "csv", truncated_at)
@@ -81,9 +81,16 @@ def read_parquet(path: Path) -> Recording:
                 if not _added(_add, builder, cells):
                     builder.reject(row, str(cells))
                 row += 1
-    except (pa.ArrowException, OSError) as error:
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise LogError(path, f"damaged Parquet file: {str(error).splitlines()[0]}") from error
     return builder.recording(path, "parquet")
+
+
+def _cells(line: str) -> list[str]:
+    try:
+        return next(csv.reader([line]), [])
+    except csv.Error:  # a carriage return in the middle, say
+        return []
 
 
 def _added(add: Any, builder: FrameBuilder, cells: dict[str, Any]) -> bool:

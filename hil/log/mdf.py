@@ -4,6 +4,7 @@ asammdf is an extra (``pip install brakebench[mdf]``). python-can's writer is no
 of writing and appends frame by frame.
 """
 
+import logging
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -40,6 +41,7 @@ def read_mdf(path: Path) -> Recording:
     if path.read_bytes()[:3] not in (b"MDF", b"UnF"):
         raise LogError(path, "no MDF file: expected the signature MDF", 0)
     found: list[tuple[int, str, int, bool, bytes, FrameFlag, int]] = []
+    logging.getLogger("asammdf").setLevel(logging.CRITICAL + 1)  # its tracebacks would stand beside our one message
     try:
         with asammdf.MDF(path) as mdf:
             start_ns = round(mdf.header.start_time.timestamp() * 1e6) * 1000

@@ -310,9 +310,16 @@ def test_blf_accounts_for_every_object(tmp_path, content, frames, rejected):
     assert (len(log.frames), log.rejected) == (frames + 1, rejected)
 
 
-@pytest.mark.parametrize(
-    "content", [b"", b"LOGG", blf_of(blf_object(), stated=2**31), blf_of()[:144] + b"LOBJ" + b"\0" * 28]
-)
+def test_blf_is_followed_behind_damage_between_its_containers(tmp_path):
+    path = tmp_path / "a.blf"
+    container = blf_of(blf_object())[144:]
+    path.write_bytes(blf_of(blf_object()) + b"damage" + container + b"LOBJ" + b"\0" * 12 + container)
+    log = read_log(path)
+    assert (len(log.frames), log.rejected) == (3, 2)
+    assert len(blf_of(blf_object())) - log.first_rejected[0].offset <= 3  # padding before it
+
+
+@pytest.mark.parametrize("content", [b"", b"LOGG", blf_of(blf_object(), stated=2**31)])
 def test_blf_that_cannot_be_followed_is_refused(tmp_path, content):
     path = tmp_path / "a.blf"
     path.write_bytes(content)
