@@ -73,7 +73,7 @@ def database_and_frames(draw):
     return dbc_of(*lines, *float_types), frames
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(database_and_frames())
 def test_values_equal_cantools(case):
     text, frames = case
@@ -97,6 +97,8 @@ def test_values_equal_cantools(case):
             got = cells[row][name]
             if isinstance(value, int) and not isinstance(got, np.floating):
                 assert int(got) == value
+            elif isinstance(value, int):  # beyond 64 bits: a float, rounded twice
+                np.testing.assert_array_max_ulp(float(got), float(value), 1)
             else:
                 np.testing.assert_array_equal(float(got), float(value))
 
