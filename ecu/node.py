@@ -72,12 +72,17 @@ class EcuNode:
     ----------
     parameters : the controller's parameter set.
     period_ns : time between two steps.
+
+    Attributes
+    ----------
+    memory, outputs : state of the control law, and what it gave in the last step (None before the first).
     """
 
     def __init__(self, parameters: EcuParameters, period_ns: int = 10_000_000) -> None:
         self.parameters = parameters
         self.period_ns = period_ns
         self.memory = initial_memory(parameters)
+        self.outputs: Outputs | None = None
         self._receiver = Receiver((*SOURCES, StimulusEcu))
         self._receptions = [self._receiver.receptions[t] for t in SOURCES]
         self._transmitter = Transmitter()
@@ -92,8 +97,8 @@ class EcuNode:
                 self._link_down = _LINK_DOWN.get(event.state, self._link_down)
         elapsed_ns = self.period_ns if self._last_ns is None else now_ns - self._last_ns
         self._last_ns = now_ns
-        self.memory, outputs = step(self.memory, self._inputs(now_ns), self.parameters, elapsed_ns * 1e-9)
-        return self._transmitter.frames(now_ns, self._outgoing(outputs))
+        self.memory, self.outputs = step(self.memory, self._inputs(now_ns), self.parameters, elapsed_ns * 1e-9)
+        return self._transmitter.frames(now_ns, self._outgoing(self.outputs))
 
     def _inputs(self, now_ns: int) -> Inputs:
         """What the receiver holds, as the law takes it."""

@@ -9,18 +9,20 @@ import math
 from typing import NamedTuple
 
 from dbc.messages import BrakeMode
-from ecu.law import base_brake, blend, estimates, friction, modes
-from ecu.law.types import ZERO, Brake, Four, Inputs, Outputs, Source
+from ecu.law import base_brake, blend, compensation, estimator, friction, modes
+from ecu.law.types import UNKNOWN, ZERO, Brake, Four, Inputs, Outputs, Source
 from ecu.parameters.ecu import EcuParameters
 
-NOT_AVAILABLE: Four = (math.nan, math.nan, math.nan, math.nan)
+SAMPLE_S = 0.01  # the sensors' cycle: the observer steps once for each, however fast the task
+CONFIDENCE_STEPS = 7
 
 
 class Memory(NamedTuple):
     """State of the law between two steps.
 
     ``deceleration_mps2``: last valid demand; ``without_pedal_s``: time since there was one; ``handed_over``: the brake
-    has been asked to follow its own pedal map.
+    has been asked to follow its own pedal map. ``observer``: state of the chosen observer;
+    ``friction``: pad friction in use.
     """
 
     modes: modes.ModeMemory
@@ -28,11 +30,26 @@ class Memory(NamedTuple):
     without_pedal_s: float
     handed_over: bool
     blending_factor: float
+    observer: estimator.Vector
+    since_sample_s: float
+    estimates: estimator.Estimates
+    friction: Four
 
 
 def initial_memory(parameters: EcuParameters) -> Memory:
     """State before the first step."""
-    return Memory(modes.initial_modes(), 0.0, 0.0, False, parameters.blend.blending_factor)
+    mu = parameters.friction_brake.pad_friction
+    return Memory(
+        modes=modes.initial_modes(),
+        deceleration_mps2=0.0,
+        without_pedal_s=0.0,
+        handed_over=False,
+        blending_factor=parameters.blend.blending_factor,
+        observer=estimator.initial_state(parameters),
+        since_sample_s=0.0,
+        estimates=estimator.Estimates(0.0, UNKNOWN, (mu, mu, mu, mu), ZERO, 1.0),
+        friction=(mu, mu, mu, mu),
+    )
 
 
 def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float) -> tuple[Memory, Outputs]:
@@ -61,16 +78,28 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     )
     factor = inputs.blending_factor if math.isfinite(inputs.blending_factor) else memory.blending_factor
 
-    speeds = estimates.usable_wheel_speeds(inputs, lost)
+    observer, known, since_sample_s = memory.observer, memory.estimates, memory.since_sample_s + dt_s
+    if since_sample_s > 0.95 * SAMPLE_S:
+        z = estimator.measured(inputs, lost, deceleration, p.motor.torque_per_current_nm_a)
+        observer, known = estimator.estimate(observer, z, p, since_sample_s)
+        since_sample_s = 0.0
+    nominal = p.friction_brake.pad_friction
+    mu = compensation.friction_in_use(
+        memory.friction, known.pad_friction, known.confidence, nominal, p.compensation, dt_s
+    )
+    factor_now = compensation.motor_factor(factor, mu, nominal, p.compensation)
+    mass = p.vehicle.mass_kg * known.mass_factor
+
+    speeds = _usable_wheel_speeds(inputs, lost)
     wheel_speed = max(speeds) if speeds else 0.0
     speed = max(wheel_speed * p.vehicle.rolling_radius_m, 0.0)
-    resistance = base_brake.driving_resistance(speed, p.vehicle.mass_kg, p.vehicle)
+    resistance = base_brake.driving_resistance(speed, mass, p.vehicle)
     resistance *= min(deceleration / p.pedal.resistance_full_mps2, 1.0)
-    torque = base_brake.brake_torque(deceleration, resistance, p.vehicle.mass_kg, p.vehicle)
+    torque = base_brake.brake_torque(deceleration, resistance, mass, p.vehicle)
     demand = base_brake.distribute(torque, p.friction_brake.front_share)
     shares = blend.blend(
         demand,
-        factor,
+        factor_now,
         _usable_torque(inputs, lost, mode),
         inputs.charge_power_w,
         speed,
@@ -81,26 +110,39 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     )
 
     gain = friction.gains(p.friction_brake)
-    mu = p.friction_brake.pad_friction
     q0, q1, q2, q3 = (
-        friction.pressure_demand(t, mu, g, p.friction_brake) for t, g in zip(shares.friction_nm, gain, strict=True)
+        friction.pressure_demand(t, m, g, p.friction_brake)
+        for t, m, g in zip(shares.friction_nm, mu, gain, strict=True)
     )
     m0, m1, m2, m3 = shares.motor_nm
     silent = mode == BrakeMode.INIT or handed_over
     outputs = Outputs(
-        pressure_demand_pa=NOT_AVAILABLE if silent else (q0, q1, q2, q3),
-        motor_demand_nm=NOT_AVAILABLE if mode == BrakeMode.INIT else (-m0, -m1, -m2, -m3),
+        pressure_demand_pa=UNKNOWN if silent else (q0, q1, q2, q3),
+        motor_demand_nm=UNKNOWN if mode == BrakeMode.INIT else (-m0, -m1, -m2, -m3),
         mode=mode,
         faults=faults,
         blending_factor=sum(shares.motor_nm) / torque if torque > 0.0 else 0.0,
         demanded_deceleration_mps2=math.nan if silent else deceleration,
-        wheel_torque_nm=estimates.nominal_wheel_torque(
-            inputs.pressure_pa, estimates.motor_torques(inputs.motor_current_a, p.motor), mu, gain, p.friction_brake
+        wheel_torque_nm=known.wheel_torque_nm,
+        pad_friction=known.pad_friction,
+        confidence=(
+            round(CONFIDENCE_STEPS * known.confidence[0]),
+            round(CONFIDENCE_STEPS * known.confidence[1]),
+            round(CONFIDENCE_STEPS * known.confidence[2]),
+            round(CONFIDENCE_STEPS * known.confidence[3]),
         ),
-        pad_friction=(mu, mu, mu, mu),
-        confidence=(0, 0, 0, 0),
     )
-    return Memory(mode_memory, deceleration, without_pedal_s, handed_over, factor), outputs
+    memory = Memory(
+        mode_memory, deceleration, without_pedal_s, handed_over, factor, observer, since_sample_s, known, mu
+    )
+    return memory, outputs
+
+
+def _usable_wheel_speeds(inputs: Inputs, lost: tuple[bool, ...]) -> list[float]:
+    """Wheel speeds that are present and not timed out, rad/s."""
+    front = () if lost[Source.WHEEL_SPEED_FRONT] else inputs.wheel_speed_rad_s[:2]
+    rear = () if lost[Source.WHEEL_SPEED_REAR] else inputs.wheel_speed_rad_s[2:]
+    return [w for w in (*front, *rear) if math.isfinite(w)]
 
 
 def _usable_torque(inputs: Inputs, lost: tuple[bool, ...], mode: BrakeMode) -> Four:

@@ -1,5 +1,6 @@
 """Values that enter and leave the control law. Wheel order fl, fr, rl, rr; NaN means not available."""
 
+import math
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -8,6 +9,7 @@ from dbc.messages import BrakeMode, Fault
 Four = tuple[float, float, float, float]
 
 ZERO: Four = (0.0, 0.0, 0.0, 0.0)
+UNKNOWN: Four = (math.nan, math.nan, math.nan, math.nan)
 
 
 class Source(IntEnum):

@@ -3,12 +3,22 @@
 from dataclasses import dataclass
 
 from ecu.parameters.control import BlendParameters, PedalParameters, SupervisionParameters
+from ecu.parameters.observer import (
+    CompensationParameters,
+    JointFilterParameters,
+    PaperObserverParameters,
+    SignalParameters,
+    TyreParameters,
+)
 from ecu.parameters.vehicle import FrictionBrakeParameters, MotorParameters, VehicleParameters
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class EcuParameters:
-    """Everything the controller is told; read from a TOML set with one table for each field."""
+    """Everything the controller is told; read from a TOML set with one table for each field.
+
+    Compared by identity, so that what is derived from a set can be kept beside it at no cost.
+    """
 
     vehicle: VehicleParameters
     friction_brake: FrictionBrakeParameters
@@ -16,3 +26,8 @@ class EcuParameters:
     pedal: PedalParameters
     blend: BlendParameters
     supervision: SupervisionParameters
+    tyre: TyreParameters
+    signal: SignalParameters
+    joint_filter: JointFilterParameters
+    paper_observer: PaperObserverParameters
+    compensation: CompensationParameters

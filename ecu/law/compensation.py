@@ -1,0 +1,46 @@
+"""Compensation: the estimated pad friction instead of the nominal one between torque and pressure.
+
+The friction in use follows the estimate at a rate that is limited and scales with the estimate's confidence, within
+an authority round the nominal value. At no confidence it holds: what was learned in the last stop is the best guess
+for the next, and an estimate nobody trusts moves nothing.
+"""
+
+from ecu.law.types import Four
+from ecu.parameters.observer import CompensationParameters
+
+
+def friction_in_use(
+    used: Four, estimate: Four, confidence: Four, nominal: float, p: CompensationParameters, dt_s: float
+) -> Four:
+    """Pad friction of each wheel to convert torque to pressure with.
+
+    Parameters
+    ----------
+    used : what was in use in the last step.
+    estimate, confidence : estimated pad friction and its confidence, 0..1.
+    nominal : nominal pad friction, the centre of the authority.
+    dt_s : time since the last step.
+    """
+    if not p.enabled:
+        return (nominal, nominal, nominal, nominal)
+    low = max(nominal * (1.0 - p.authority), p.friction_lowest)
+    high = min(nominal * (1.0 + p.authority), p.friction_highest)
+    a, b, c, d = (
+        _toward(u, min(max(e, low), high), p.rate_1_s * nominal * k * dt_s)
+        for u, e, k in zip(used, estimate, confidence, strict=True)
+    )
+    return (a, b, c, d)
+
+
+def _toward(value: float, target: float, most: float) -> float:
+    return value + min(max(target - value, -most), most)
+
+
+def motor_factor(factor: float, friction: Four, nominal: float, p: CompensationParameters) -> float:
+    """Blending factor with work moved to the motors where the pads are weak, 0..1.
+
+    alpha' = alpha (1 + k max(0, s - mean(mu) / mu_nominal)): "keeping the brakes in their optimal operating
+    conditions" (paper, introduction). Blending that is switched off stays off.
+    """
+    lack = max(p.motor_preference_from - 0.25 * sum(friction) / nominal, 0.0)
+    return min(factor * (1.0 + p.motor_preference * lack), 1.0)

@@ -1,0 +1,341 @@
+"""Joint filter: one extended Kalman filter over the car's motion, its tyres and its four pad frictions.
+
+What the paper does in two stages (wheel torque, then pad friction) is one estimation problem: the wheel torque is
+T = T_motor - mu G (p - p0), and the accelerations of car and wheels tell what sum and which shares of T were true.
+States: speed v, offset b of the acceleration sensor, grade theta, mass factor c, tyre stiffness factor s with the
+difference d between the axles, four rolling-radius factors, four pad frictions mu. The body acceleration is an input;
+the measurements are the force balance and the four wheel speeds (their slip), each used once.
+
+Decisions that make it work: the pad friction only moves while pressure is applied; the mass factor is only learned
+while no friction brake is (else it would take part of the friction's error); wheels that slide are left out;
+torques are delayed as the sensors delay the accelerations.
+"""
+
+from math import isnan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ecu.law.compiled import compiled
+
+Vector = NDArray[np.float64]
+
+# estimated states
+SPEED, BIAS, GRADE, MASS, STIFFNESS, AXLE = 0, 1, 2, 3, 4, 5
+RADIUS, FRICTION = 6, 10
+N = 14
+# vector of the whole state: estimates, covariance, then what is merely remembered
+COVARIANCE = N
+PRESSURE_ZERO = N + N * N
+PRESSURE_LAG = PRESSURE_ZERO + 4
+MOTOR_LAG = PRESSURE_LAG + 4
+SLIDING = MOTOR_LAG + 4  # seconds that a wheel still counts as sliding
+TORQUE = SLIDING + 4
+PITCH, PITCH_RATE, LOAD_ACCELERATION, FORCE_LAG, RELEASED_S, STARTED, LOCKED = (TORQUE + 4 + i for i in range(7))
+SIZE = TORQUE + 11
+
+# inputs
+AX, AY, YAW_RATE, STEER, DEMAND = 0, 1, 2, 3, 4
+WHEEL, PRESSURE, MOTOR = 5, 9, 13
+INPUTS = 17
+
+# parameters
+(P_MASS, P_BASE, P_FRONT, P_HEIGHT, P_RADIUS, P_ARM, P_INERTIA, P_DRAG, P_ROLL, P_DIVE, P_STEER_RATIO) = range(11)
+P_TRACK, P_GAIN = 11, 13
+P_THRESHOLD, P_STIFF, P_STIFF_SLOPE, P_PEAK, P_CORNER, P_RELAX = range(15, 21)
+P_LAG, P_WHEEL_LAG, P_PITCH_W, P_PITCH_D, P_ZERO_TIME, P_ZERO_LIMIT, P_SPEED_MIN, P_SLIDE, P_TOOTH = range(21, 30)
+(Q_BIAS, Q_GRADE, Q_STIFF, Q_COMMON, Q_AXLE, Q_SINGLE, Q_RELEASED, R_ACC, R_ALIGN, R_WHEEL, GATE, ROAD) = range(30, 42)
+START = 42  # variances: bias, grade, mass, stiffness, axle, radius, friction common, axle, single; nominal friction
+PARAMETERS = 52
+
+G0 = 9.80665
+SLIDING_HOLD_S = 0.06
+LOCKED_SHARE = 0.15  # of the speed of the car: slower than that a wheel counts as locked
+RELEASED_PA = 3e5
+SETTLED_S = 0.4
+APPLIED_PA = 1e5
+MASS_FORCE_SHARE = 0.7  # m/s2 of steady motor drive or drag from which on the mass is learned
+CURVATURE = 0.38  # extra slip near the grip limit, kappa = F / C (1 + 0.38 (F / D)^2): the Magic Formula to third order
+
+
+@compiled
+def start(s: Vector, p: Vector, speed_mps: float) -> None:
+    """Set the state ``s`` to what is believed before anything was measured, at a speed."""
+    s[:] = 0.0
+    s[SPEED] = speed_mps
+    s[MASS] = 1.0
+    s[STIFFNESS] = 1.0
+    for i in range(4):
+        s[RADIUS + i] = 1.0
+        s[FRICTION + i] = p[START + 9]
+    c = COVARIANCE
+    s[c] = 0.25
+    for k, state in enumerate((BIAS, GRADE, MASS, STIFFNESS, AXLE)):
+        s[c + state * N + state] = p[START + k]
+    for i in range(4):
+        s[c + (RADIUS + i) * N + RADIUS + i] = p[START + 5]
+        for j in range(4):
+            same_axle = 1.0 if (i < 2) == (j < 2) else -1.0
+            s[c + (FRICTION + i) * N + FRICTION + j] = (
+                p[START + 6] + same_axle * p[START + 7] + (p[START + 8] if i == j else 0.0)
+            )
+    s[STARTED] = 1.0
+
+
+@compiled
+def correct(
+    s: Vector, h: Vector, residual: float, variance: float, gate: float, hold_mass: bool, hold_pads: bool
+) -> bool:
+    """One scalar measurement: gain, gate, symmetric covariance. Held states keep their value and their uncertainty.
+
+    With a gain K that is zero in the held rows, P' = P - K (P h)^T - (P h) K^T + S K K^T (Schmidt's consider states).
+    """
+    ph = np.empty(N)
+    total = variance
+    for i in range(N):
+        row = 0.0
+        for j in range(N):
+            if h[j] != 0.0:
+                row += s[COVARIANCE + i * N + j] * h[j]
+        ph[i] = row
+    for i in range(N):
+        total += h[i] * ph[i]
+    if residual * residual > gate * gate * total:
+        return False
+    k = ph / total
+    if hold_mass:
+        k[MASS] = 0.0
+    if hold_pads:
+        for i in range(4):
+            k[FRICTION + i] = 0.0
+    for i in range(N):
+        s[i] += k[i] * residual
+    for i in range(N):
+        for j in range(i + 1):
+            value = s[COVARIANCE + i * N + j] - k[i] * ph[j] - ph[i] * k[j] + total * k[i] * k[j]
+            s[COVARIANCE + i * N + j] = value
+            s[COVARIANCE + j * N + i] = value
+    return True
+
+
+@compiled
+def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
+    """Advance the filter by one sample.
+
+    Parameters
+    ----------
+    s : state of the last step (layout of this file); not changed.  z : inputs, NaN where not available; pressures Pa,
+        motor torques Nm negative braking, ``DEMAND`` the demanded deceleration.  p : parameters, `pack`.
+    dt : time since the last sample, s.
+
+    Returns
+    -------
+    new state; ``TORQUE`` holds the wheel torques, Nm, negative braking.
+    """
+    s = s.copy()
+    radius, arm, inertia = p[P_RADIUS], p[P_ARM], p[P_INERTIA]
+    fastest = -1.0
+    for i in range(4):
+        if z[WHEEL + i] > fastest:
+            fastest = z[WHEEL + i]
+    if s[STARTED] == 0.0:
+        if fastest < 0.0 or isnan(z[AX]):
+            return s
+        start(s, p, fastest * radius)
+        for i in range(4):
+            s[MOTOR_LAG + i] = 0.0 if isnan(z[MOTOR + i]) else z[MOTOR + i]
+    body = not isnan(z[AX])
+    yaw_rate = 0.0 if isnan(z[YAW_RATE]) else z[YAW_RATE]
+    ay = 0.0 if isnan(z[AY]) else z[AY]
+    steer = 0.0 if isnan(z[STEER]) else z[STEER] / p[P_STEER_RATIO]
+
+    # pressure zero while the pedal is free
+    settled = z[DEMAND] <= 0.0
+    pressures = True
+    for i in range(4):
+        if isnan(z[PRESSURE + i]):
+            pressures = False
+        elif abs(z[PRESSURE + i]) > RELEASED_PA:
+            settled = False
+    s[RELEASED_S] = s[RELEASED_S] + dt if settled else 0.0
+    if s[RELEASED_S] > SETTLED_S:
+        share = min(dt / p[P_ZERO_TIME], 1.0)
+        for i in range(4):
+            if not isnan(z[PRESSURE + i]):
+                zero = s[PRESSURE_ZERO + i] + share * (z[PRESSURE + i] - s[PRESSURE_ZERO + i])
+                s[PRESSURE_ZERO + i] = min(max(zero, -p[P_ZERO_LIMIT]), p[P_ZERO_LIMIT])
+
+    # torques, delayed as the sensors and the tyres delay what they do
+    lag = p[P_LAG] + p[P_RELAX] / max(s[SPEED], 2.0)
+    share = min(dt / (lag + 0.5 * dt), 1.0)
+    applied = False
+    force = 0.0
+    for i in range(4):
+        axle = 0 if i < 2 else 1
+        clamp = 0.0
+        if not isnan(z[PRESSURE + i]):
+            clamp = max(z[PRESSURE + i] - s[PRESSURE_ZERO + i] - p[P_THRESHOLD], 0.0)
+        motor = 0.0 if isnan(z[MOTOR + i]) else z[MOTOR + i]
+        s[TORQUE + i] = motor - s[FRICTION + i] * p[P_GAIN + axle] * clamp
+        if s[RELEASED_S] > 0.0:
+            clamp = 0.0
+        s[PRESSURE_LAG + i] += share * (clamp - s[PRESSURE_LAG + i])
+        s[MOTOR_LAG + i] += share * (motor - s[MOTOR_LAG + i])
+        if s[PRESSURE_LAG + i] > APPLIED_PA:
+            applied = True
+        force += (s[MOTOR_LAG + i] - s[FRICTION + i] * p[P_GAIN + axle] * s[PRESSURE_LAG + i]) / arm
+    force_rate = (force - s[FORCE_LAG]) / dt
+    s[FORCE_LAG] = force
+
+    # standstill: nothing to learn, the car stands
+    moving = False
+    for i in range(4):
+        if z[WHEEL + i] > 0.0:
+            moving = True
+    if not moving and s[SPEED] < 1.0:
+        s[SPEED] = 0.0
+        return s
+
+    # body acceleration, pitch taken out (the sensor pitches with the body)
+    if body:
+        w, d = p[P_PITCH_W], p[P_PITCH_D]
+        level = (z[AX] - s[BIAS]) / (1.0 + G0 * p[P_DIVE])
+        s[PITCH_RATE] += dt * (w * w * (-p[P_DIVE] * level - s[PITCH]) - 2.0 * d * w * s[PITCH_RATE])
+        s[PITCH] += dt * s[PITCH_RATE]
+        ax = z[AX] + G0 * s[PITCH]
+        s[LOAD_ACCELERATION] += min(dt / 0.05, 1.0) * (ax - s[BIAS] - s[LOAD_ACCELERATION])
+    else:
+        ax = s[LOAD_ACCELERATION] + s[BIAS]
+    base = p[P_BASE]
+    rear_m = base - p[P_FRONT]
+    lateral = rear_m * yaw_rate - s[SPEED] * ay / (G0 * p[P_CORNER])
+
+    # prediction
+    c = COVARIANCE
+    acceleration = ax - s[BIAS] - G0 * s[GRADE] + yaw_rate * lateral
+    s[SPEED] += dt * acceleration
+    for j in range(N):
+        s[c + SPEED * N + j] -= dt * (s[c + BIAS * N + j] + G0 * s[c + GRADE * N + j])
+    for j in range(N):
+        s[c + j * N + SPEED] -= dt * (s[c + j * N + BIAS] + G0 * s[c + j * N + GRADE])
+    s[c] += p[R_ACC] ** 2 * dt * dt + 1e-8
+    s[c + BIAS * N + BIAS] += p[Q_BIAS] * dt
+    s[c + GRADE * N + GRADE] += p[Q_GRADE] * dt
+    s[c + STIFFNESS * N + STIFFNESS] += p[Q_STIFF] * dt
+    for i in range(4):
+        for j in range(4):
+            same_axle = 1.0 if (i < 2) == (j < 2) else -1.0
+            at = c + (FRICTION + i) * N + FRICTION + j
+            if s[PRESSURE_LAG + i] > APPLIED_PA and s[PRESSURE_LAG + j] > APPLIED_PA:
+                s[at] += dt * (p[Q_COMMON] + same_axle * p[Q_AXLE] + (p[Q_SINGLE] if i == j else 0.0))
+            elif s[at] < p[START + 6]:
+                s[at] += dt * p[Q_RELEASED]
+    if s[SPEED] < 0.0:
+        s[SPEED] = 0.0
+    speed = s[SPEED]
+
+    # loads and forces of the wheels
+    mass = p[P_MASS] * s[MASS]
+    shift_x = mass * p[P_HEIGHT] * s[LOAD_ACCELERATION] / (2.0 * base)
+    loads = np.empty(4)
+    along = np.empty(4)
+    forces = np.empty(4)
+    for i in range(4):
+        axle = 0 if i < 2 else 1
+        arm_m = rear_m if axle == 0 else p[P_FRONT]
+        left = 1.0 if i % 2 == 0 else -1.0
+        share_y = arm_m / base * mass * ay * p[P_HEIGHT] / p[P_TRACK + axle]
+        load = 0.5 * mass * G0 * arm_m / base - (shift_x if axle == 0 else -shift_x) - left * share_y
+        loads[i] = max(load, 200.0)
+        ground = speed - yaw_rate * left * 0.5 * p[P_TRACK + axle]
+        if axle == 0:
+            ground = ground * np.cos(steer) + (lateral + yaw_rate * p[P_FRONT]) * np.sin(steer)
+        along[i] = ground
+        torque = s[MOTOR_LAG + i] - s[FRICTION + i] * p[P_GAIN + axle] * s[PRESSURE_LAG + i]
+        forces[i] = (torque - inertia * acceleration / radius) / arm - p[P_ROLL] * loads[i]
+
+    # which wheels slide or stand
+    road = p[ROAD] > 0.5
+    any_sliding = False
+    locked_load = 0.0
+    s[LOCKED] = 0.0
+    for i in range(4):
+        s[SLIDING + i] = max(s[SLIDING + i] - dt, 0.0)
+        omega = z[WHEEL + i]
+        if road and not isnan(omega) and speed > 1.0:
+            slip = (omega * radius - along[i]) / max(along[i], 1.0)
+            if abs(slip) > p[P_SLIDE]:
+                s[SLIDING + i] = SLIDING_HOLD_S
+            if slip < LOCKED_SHARE - 1.0:
+                s[LOCKED] += 1.0
+                locked_load += loads[i]
+        if s[SLIDING + i] > 0.0:
+            any_sliding = True
+
+    # force balance: what the body feels against what the wheels give
+    resistance = 0.5 * p[P_DRAG] * speed * speed + mass * G0 * p[P_ROLL]
+    turn = 4.0 * inertia / (radius * arm)
+    fast = speed > p[P_SPEED_MIN]
+    h = np.zeros(N)
+    side = (rear_m / base) * mass * ay * np.sin(steer)
+    if body and pressures and fast and not any_sliding:
+        predicted = (force - resistance - side + turn * G0 * s[GRADE]) / (mass + turn) + s[BIAS]
+        h[BIAS] = 1.0
+        h[GRADE] = turn * G0 / (mass + turn)
+        h[MASS] = -(predicted - s[BIAS] + G0 * p[P_ROLL]) * p[P_MASS] / (mass + turn)
+        for i in range(4):
+            axle = 0 if i < 2 else 1
+            h[FRICTION + i] = -p[P_GAIN + axle] * s[PRESSURE_LAG + i] / arm / (mass + turn)
+        change = p[R_ALIGN] * force_rate / mass
+        variance = p[R_ACC] ** 2 + change * change + (0.05 * ay) ** 2
+        drive = not applied and abs(force) > MASS_FORCE_SHARE * mass and change < p[R_ACC]
+        if not drive:
+            h[MASS] = 0.0
+        correct(s, h, ax - predicted, variance, 1e6, not drive, not applied)
+
+    # wheel speeds: v (1 + kappa) / (R delta)
+    for i in range(4):
+        omega = z[WHEEL + i]
+        if isnan(omega) or s[SLIDING + i] > 0.0 or along[i] < 1.0:
+            continue
+        axle = 0 if i < 2 else 1
+        end = 1.0 if axle == 0 else -1.0
+        stiffness = loads[i] * (p[P_STIFF] + p[P_STIFF_SLOPE] * (loads[i] - 0.25 * p[P_MASS] * G0))
+        factor = s[STIFFNESS] + end * s[AXLE]
+        torque = s[MOTOR_LAG + i] - s[FRICTION + i] * p[P_GAIN + axle] * s[PRESSURE_LAG + i]
+        wheel_force = (torque - inertia * acceleration / radius) / arm - p[P_ROLL] * loads[i]
+        grip = wheel_force / (p[P_PEAK] * loads[i])
+        per_force = (1.0 + CURVATURE * min(grip * grip, 1.0)) / (stiffness * max(factor, 0.2))
+        slip = wheel_force * per_force
+        ground = along[i] + s[SPEED] - speed
+        ground -= (p[P_WHEEL_LAG] + p[P_TOOTH] / ground) * acceleration
+        rolling = radius * s[RADIUS + i]
+        predicted = ground * (1.0 + slip) / rolling
+        h[:] = 0.0
+        h[SPEED] = (1.0 + slip) / rolling
+        h[STIFFNESS] = -ground * slip / (rolling * factor)
+        h[AXLE] = end * h[STIFFNESS]
+        h[RADIUS + i] = -predicted / s[RADIUS + i]
+        if fast and pressures:
+            h[FRICTION + i] = -ground * per_force * p[P_GAIN + axle] * s[PRESSURE_LAG + i] / (arm * rolling)
+        sigma = (p[R_WHEEL] * along[i] + 0.01 + 0.002 * abs(acceleration) + (0.0 if fast else 0.1)) / rolling
+        sigma += p[R_ALIGN] * abs(force_rate) * 0.25 * per_force * ground / rolling
+        correct(s, h, omega - predicted, sigma * sigma, p[GATE], True, not applied)
+
+    # bounds and the wheels that stand: their torque is what the road gives
+    for i in range(4):
+        s[FRICTION + i] = min(max(s[FRICTION + i], 0.05), 1.2)
+        s[RADIUS + i] = min(max(s[RADIUS + i], 0.97), 1.03)
+    s[MASS] = min(max(s[MASS], 0.7), 1.5)
+    s[STIFFNESS] = min(max(s[STIFFNESS], 0.3), 3.0)
+    s[AXLE] = min(max(s[AXLE], -0.3), 0.3)
+    if road and locked_load > 0.0 and body:
+        rest = mass * (ax - s[BIAS]) + 0.5 * p[P_DRAG] * speed * speed
+        for i in range(4):
+            if z[WHEEL + i] * radius > LOCKED_SHARE * max(along[i], 1.0):
+                rest -= forces[i]
+        for i in range(4):
+            if z[WHEEL + i] * radius <= LOCKED_SHARE * max(along[i], 1.0):
+                held = rest * arm * loads[i] / locked_load
+                s[TORQUE + i] = min(max(held, s[TORQUE + i]), 0.0)
+    return s
