@@ -22,6 +22,7 @@ from hil.log.frames import (
 
 BLOCK_BYTES = 2 * 1024 * 1024
 MAX_LINE_BYTES = 4096
+MIN_LINE_BYTES = len("(0) c 000#")
 MAX_SECONDS = 9_000_000_000  # int64 nanoseconds reach a little farther
 SMALL_GROUP = 16  # fewer lines of one shape are not worth an array operation
 SHAPES_PER_GROUP = 4
@@ -41,6 +42,7 @@ _HEX = np.full(256, 255, np.uint8)
 for _i, _c in enumerate(b"0123456789ABCDEF"):
     _HEX[_c] = _i
     _HEX[ord(chr(_c).lower())] = _i
+_SPACE = np.isin(np.arange(256), list(b" \t\n\r\x0b\x0c"))
 
 
 class _Reader:
@@ -56,8 +58,7 @@ class _Reader:
     def channel(self, name: bytes) -> int:
         return self.channels.setdefault(name, len(self.channels))
 
-    def reject(self, offset: int, text: bytes) -> None:
-        self.rejected += 1
+    def show_rejected(self, offset: int, text: bytes) -> None:
         if len(self.first) < FIRST_REJECTED:
             self.first.append(Rejected(offset, text[:80].decode("ascii", "backslashreplace")))
 
@@ -103,7 +104,8 @@ def _blocks(file: BinaryIO, reader: _Reader) -> Iterator[tuple[int, bytes]]:
             yield offset, block[:end]
         offset, carry = offset + end, block[end:]
         if len(carry) > MAX_LINE_BYTES:
-            reader.reject(offset, carry)
+            reader.rejected += 1
+            reader.show_rejected(offset, carry)
             reader.truncated_at = offset  # until its line end is found
             overlong, offset, carry = True, offset + len(carry), b""
     if carry.strip():
@@ -114,9 +116,19 @@ def _parse_block(reader: _Reader, buffer: npt.NDArray[np.uint8], raw: bytes, off
     ends = np.flatnonzero(buffer == 10)
     starts = np.concatenate(([0], ends[:-1] + 1))
     ends = ends - ((ends > starts) & (buffer[ends - 1] == 13))
+    short = ends - starts < MIN_LINE_BYTES
+    if short.any():  # no frame; blank or not is all that matters
+        text = np.concatenate(([0], np.cumsum(~_SPACE[buffer], dtype=np.int32)))
+        bad_starts = starts[short & (text[ends] > text[starts])]
+        starts, ends = starts[~short], ends[~short]
+    else:
+        bad_starts = starts[:0]
     lengths = ends - starts
     hashes = np.flatnonzero(buffer == 35)
     line_of_hash = np.searchsorted(ends, hashes)
+    line_of_hash, hashes = line_of_hash[line_of_hash < len(starts)], hashes[line_of_hash < len(starts)]
+    inside = hashes >= starts[line_of_hash]
+    line_of_hash, hashes = line_of_hash[inside], hashes[inside]
     hash_at = np.zeros(len(starts), np.int64)
     hash_at[line_of_hash] = hashes - starts[line_of_hash]
     plain = (np.bincount(line_of_hash, minlength=len(starts)) == 1) & (lengths < 128)
@@ -130,12 +142,16 @@ def _parse_block(reader: _Reader, buffer: npt.NDArray[np.uint8], raw: bytes, off
         rows = order[a:b]
         if b - a >= SMALL_GROUP and keys[rows[0]] >= 0:
             _parse_group(reader, buffer, starts, int(lengths[rows[0]]), rows, table, done)
-    for row in np.flatnonzero(~done & (lengths > 0)).tolist():
+    bad: list[int] = []
+    for row in np.flatnonzero(~done).tolist():
         line = raw[starts[row] : ends[row]]
         if _parse_line(reader, line, table, row):
             done[row] = True
         elif line.strip():
-            reader.reject(offset + int(starts[row]), line)
+            bad.append(int(starts[row]))
+    reader.rejected += len(bad) + len(bad_starts)
+    for start in sorted([*bad_starts[:FIRST_REJECTED].tolist(), *bad[:FIRST_REJECTED]]):
+        reader.show_rejected(offset + start, raw[start : raw.find(b"\n", start)].rstrip(b"\r"))
     reader.parts.append(table.take(done))
 
 
