@@ -1,0 +1,106 @@
+"""``brakebench replay`` against a live ECU and against a live plant."""
+
+import json
+import signal
+from itertools import takewhile
+
+import numpy as np
+import pytest
+from processes import wait_until
+
+from dbc.contract import spec_of
+from dbc.frame import BusName, Frame
+from dbc.messages import BrakeMode, BrakeStatus, EhbDemandFront
+from ecu.node import EcuNode
+from hil.bus.bus import open_bus
+from hil.node_process import ECU, NODE_PERIOD_NS, PLANT
+from hil.rt.lockstep import Member, lockstep
+from hil.scenario import load_scenario
+from plant.node import PlantNode
+
+LOG_NS = 2_500_000_000
+EPOCH_NS = 1_700_000_000_000_000_000
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    """Frames of both nodes over the begin of a stop, in virtual time."""
+    scenario = load_scenario("stop72")
+    plant = PlantNode(scenario.plant, scenario.manoeuvre, 1, NODE_PERIOD_NS)
+    ecu = EcuNode(scenario.ecu, NODE_PERIOD_NS)
+    members = [Member(plant, NODE_PERIOD_NS, PLANT.phase_ns), Member(ecu, NODE_PERIOD_NS, ECU.phase_ns)]
+    steps = takewhile(lambda step: step.now_ns <= LOG_NS, lockstep(members))
+    return [frame for step in steps for frame in step.frames]
+
+
+@pytest.fixture
+def log(recorded, tmp_path):
+    path = tmp_path / "recording.log"
+    with path.open("w") as file:
+        for frame in recorded:
+            seconds, rest = divmod(EPOCH_NS + frame.time_ns, 1_000_000_000)
+            file.write(f"({seconds}.{rest // 1000:06d}) {frame.bus} {frame.can_id:03X}#{frame.data.hex().upper()}\n")
+    return path
+
+
+def decoded(frames, kind):
+    spec = spec_of(kind)
+    return [
+        spec.decode(f.data) for f in frames if isinstance(f, Frame) and (f.bus, f.can_id) == (spec.bus, spec.can_id)
+    ]
+
+
+def front_left_pa(frames):
+    return np.array([message.pressure_demand_fl_pa or 0.0 for message in decoded(frames, EhbDemandFront)])
+
+
+def test_the_ecu_alone_brakes_as_recorded(brakebench, start, channel, log, recorded):
+    with open_bus(channel, BusName.VEHICLE) as bus:
+        start("ecu", "--bus", channel)
+        seen = []
+        wait_until(lambda: seen.extend(bus.receive(0.1)) or decoded(seen, BrakeStatus), "frames of the ECU")
+        seen.clear()
+        done = brakebench("replay", str(log), "--role", "plant", "--bus", channel, "--json")
+        seen += bus.receive(0.0)
+    result = json.loads(done.stdout)
+    print("replay", {key: result[key] for key in ("sent", "late", "lateness_ms", "duration_s", "log_duration_s")})
+    played = {spec.can_id for spec in (spec_of(kind) for kind in (EhbDemandFront, BrakeStatus))}
+    assert result["sent"] + result["superseded"] == result["selected"]
+    assert (result["refused"], result["stopped"]) == ([], False)
+    assert played <= {frame.can_id for frame in seen}
+    assert BrakeMode.NORMAL in {status.mode for status in decoded(seen, BrakeStatus)}
+    then, now = front_left_pa(recorded), front_left_pa(seen)
+    peak = then.max()
+    assert peak > 20e5
+    assert now.max() > peak / 2
+    # aligned where the demand passes half its peak; with the log's end the ECU is alone and goes its own way
+    ahead = int(np.argmax(then > peak / 2)) - 20
+    behind = int(np.argmax(now > peak / 2)) - 20
+    length = min(len(then) - ahead, len(now) - behind)
+    difference = np.abs(then[ahead : ahead + length] - now[behind : behind + length])
+    print(f"pressure demand, recorded against replayed: largest difference {difference.max() / 1e5:.3f} bar")
+    assert length > 100
+    assert np.median(difference) < 0.01 * peak
+
+
+def test_a_live_plant_is_not_talked_over(brakebench, start, channel, log):
+    with open_bus(channel, BusName.VEHICLE) as bus:
+        start("plant", "--bus", channel)
+        wait_until(lambda: bus.receive(0.1), "frames of the plant", 150)
+        done = brakebench("replay", str(log), "--role", "plant", "--bus", channel, check=2)
+        assert "somebody already sends 0x" in done.stderr
+        assert "stop that one, or replay another role" in done.stderr
+        brakebench("replay", str(log), "--role", "ecu", "--speed", "10", "--bus", channel)
+
+
+def test_ctrl_c_ends_it_with_a_result(start, channel, log):
+    with open_bus(channel, BusName.VEHICLE) as bus:
+        process = start("replay", str(log), "--bus", channel, "--json")
+        wait_until(lambda: bus.receive(0.1), "replayed frames")
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=30)
+    result = json.loads(out)
+    assert process.returncode == 130, err
+    assert result["stopped"]
+    assert 0 < result["sent"] < result["selected"]
+    assert "Traceback" not in err
