@@ -1,11 +1,16 @@
-"""Contact of one tyre with the road: relaxed slips to forces, down to standstill."""
+# mypy: disable-error-code=no-any-return
+# (elements of a vector are Any to the type checker)
+"""Contact of the tyres with the road: loads, relaxed slips, forces, down to standstill."""
 
-from math import atan, cos, pi
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.brakes import per_axle
 from plant.compiled import equation
+from plant.fastmath import atan, sin
+from plant.suspension import link_force, spring_force
 from plant.tyre import (
     combined,
     cornering_stiffness,
@@ -17,70 +22,107 @@ from plant.tyre import (
     sliding_relaxation,
     slip_stiffness,
 )
-from plant.vectors import P, X, Y
+from plant.vectors import C, P, U, X, Y
+from plant.vehicle import GRAVITY_MPS2, rolling_resistance
 
 Vector = NDArray[np.float64]
 SLIP_LIMIT = 2.0  # a spinning wheel at standstill would wind its slip up without end
-LOAD_FLOOR_N = 100.0  # for relaxation lengths only
+LOAD_FLOOR_N = 50.0  # an unloaded tyre is computed at this load, and its force scaled down
+FRICTION_FLOOR = 1e-3
 
 
 @equation
-def slip_rate(slip: float, sliding_mps: float, transport_mps: float, length_m: float) -> float:
+def wheel_load(i: int, torque: float, cos_grade: float, x: Vector, p: Vector) -> float:
+    """Vertical load of one wheel, N: static share, unsprung weight, spring and links."""
+    front = 1.0 if i < 2 else -1.0
+    half = 0.5 - (i % 2)
+    front_m, rear_m = p[P.vehicle_cog_to_axle_m], p[P.vehicle_cog_to_axle_m + 1]
+    wheel_x = front_m if i < 2 else -rear_m
+    wheel_y = half * per_axle(i, p, P.vehicle_track_m)
+    share = (rear_m if i < 2 else front_m) / (front_m + rear_m)
+    drop = wheel_x * x[X.pitch_rad] - wheel_y * x[X.roll_rad] - x[X.heave_m]
+    drop_rate = wheel_x * x[X.pitch_rate_rad_s] - wheel_y * x[X.roll_rate_rad_s] - x[X.heave_rate_mps]
+    spring = spring_force(
+        drop, drop_rate, x[X.roll_rad], wheel_y, per_axle(i, p, P.suspension_ride_rate_n_m),
+        per_axle(i, p, P.suspension_progression_n_m3), per_axle(i, p, P.suspension_damping_ns_m),
+        per_axle(i, p, P.suspension_anti_roll_nm_rad),
+    )  # fmt: skip
+    links = link_force(
+        torque / p[P.wheel_rolling_radius_m], p[P.vehicle_mass_kg] * share * x[X.speed_mps] * x[X.yaw_rate_rad_s],
+        front, wheel_y, per_axle(i, p, P.suspension_brake_support_tangent),
+        per_axle(i, p, P.suspension_roll_centre_height_m),
+    )  # fmt: skip
+    unsprung = 0.5 * per_axle(i, p, P.vehicle_unsprung_mass_kg)
+    sprung = 0.5 * p[P.vehicle_mass_kg] * share - unsprung
+    return max((sprung + unsprung * cos_grade) * GRAVITY_MPS2 + spring + links, 0.0)
+
+
+@equation
+def slip_rate(slip: float, sliding_mps: float, transport_mps: float, gain_1_m: float) -> float:
     """Rate of a relaxed slip, 1/s: sigma s' = v_s - |v| s (Pacejka 2006, section 7.2), stopped at the limit."""
-    rate = (sliding_mps - transport_mps * slip) / length_m
-    if abs(slip) > SLIP_LIMIT and rate * slip > 0.0:
-        return 0.0
-    return rate
+    rate = (sliding_mps - transport_mps * slip) * gain_1_m
+    return 0.0 if (abs(slip) > SLIP_LIMIT) & (rate * slip > 0.0) else rate
 
 
 @equation
 def low_speed_damping(speed_mps: float, limit_mps: float, damping_ns_m: float) -> float:
-    """Damping of the contact below ``limit_mps``, N s/m (Pacejka 2006, section 8.6): fades in with a cosine."""
-    if speed_mps >= limit_mps:
-        return 0.0
-    return 0.5 * damping_ns_m * (1.0 + cos(pi * speed_mps / limit_mps))
+    """Damping of the contact, N s/m: fades in below ``limit_mps`` with a cosine (Pacejka 2006, section 8.6)."""
+    share = min(speed_mps / limit_mps, 1.0)
+    return 0.5 * damping_ns_m * (1.0 + sin(0.5 * pi - pi * share))
 
 
 @equation
-def tyre_contact(
-    i: int, along: float, across: float, load: float, friction: float, x: Vector, p: Vector, dx: Vector,
-    decay: Vector, gain: Vector, y: Vector,
-) -> tuple[float, float]:  # fmt: skip
-    """Rates of the relaxed slips of wheel ``i`` and the forces in its axes, N.
+def contacts(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, cos_grade: float, wheels: int) -> None:
+    """Wheel torques, loads, tyre forces; rates of the slips and the wheel speeds.
 
-    Parameters
-    ----------
-    along, across : velocity of the contact in the wheel's axes, m/s.  load : N.  friction : scale of the road.
-    The slips are states in ``x``; ``dx``, ``decay``, ``gain`` and ``y.slip_speed_mps`` are written.
+    Reads ``y.friction_torque_nm``, ``motor_torque_nm``, ``along_mps``, ``across_mps`` and ``road_friction``.
     """
-    slip, side_slip = x[X.slip + i], x[X.side_slip + i]
-    transport = abs(along)
-    sliding = x[X.wheel_speed_rad_s + i] * p[P.wheel_rolling_radius_m] - along
-    loaded = max(load, LOAD_FLOOR_N)
-    grip = max(friction, 1e-3)
-    dfz = load_offset(loaded, p)
-    stiffness_x = slip_stiffness(loaded, dfz, p)
-    stiffness_y = -cornering_stiffness(loaded, p)
-    floor = p[P.tyre_relaxation_floor]
-    length_x = sliding_relaxation(
-        relaxation_longitudinal(loaded, dfz, p), slip, stiffness_x, peak_longitudinal(loaded, dfz, grip, p), floor
-    )
-    length_y = sliding_relaxation(
-        relaxation_lateral(loaded, p), side_slip, stiffness_y, peak_lateral(loaded, dfz, grip, p), floor
-    )
-    dx[X.slip + i] = slip_rate(slip, sliding, transport, length_x)
-    dx[X.side_slip + i] = slip_rate(side_slip, across, transport, length_y)
-    decay[X.slip + i] = transport / length_x
-    decay[X.side_slip + i] = transport / length_y
-    gain[i] = 1.0 / length_x
-    y[Y.slip_speed_mps + i] = sliding
-    damping = low_speed_damping(transport, p[P.tyre_low_speed_mps], p[P.tyre_low_speed_damping_ns_m])
-    left = 1.0 if i % 2 == 0 else -1.0
-    return combined(
-        slip + damping * sliding / stiffness_x,
-        atan(side_slip + damping * across / stiffness_y),
-        load,
-        friction,
-        left,
-        p,
-    )
+    radius = p[P.wheel_rolling_radius_m]
+    for i in range(wheels):
+        given, made = u[U.wheel_torque_nm + i], y[Y.friction_torque_nm + i] + y[Y.motor_torque_nm + i]
+        torque = given if cut[C.wheel_torque + i] > 0.5 else made
+        y[Y.wheel_torque_nm + i] = torque
+        load = wheel_load(i, torque, cos_grade, x, p)
+        y[Y.wheel_load_n + i] = load
+
+        omega, slip, side_slip = x[X.wheel_speed_rad_s + i], x[X.slip + i], x[X.side_slip + i]
+        along, across = y[Y.along_mps + i], y[Y.across_mps + i]
+        transport = abs(along)
+        sliding = omega * radius - along
+        y[Y.slip_speed_mps + i] = sliding
+
+        loaded = max(load, LOAD_FLOOR_N)
+        grip = max(y[Y.road_friction + i], FRICTION_FLOOR)
+        dfz = load_offset(loaded, p)
+        stiffness_x, stiffness_y = slip_stiffness(loaded, dfz, p), -cornering_stiffness(loaded, p)
+        least = p[P.tyre_relaxation_least_m]
+        gain_x = 1.0 / sliding_relaxation(
+            relaxation_longitudinal(loaded, dfz, p), slip, stiffness_x, peak_longitudinal(loaded, dfz, grip, p), least
+        )
+        gain_y = 1.0 / sliding_relaxation(
+            relaxation_lateral(loaded, p), side_slip, stiffness_y, peak_lateral(loaded, dfz, grip, p), least
+        )
+        y[Y.slip_gain_1_m + i] = gain_x
+        y[Y.rate + X.slip + i] = slip_rate(slip, sliding, transport, gain_x)
+        y[Y.rate + X.side_slip + i] = slip_rate(side_slip, across, transport, gain_y)
+        y[Y.decay_1_s + X.slip + i] = transport * gain_x
+        y[Y.decay_1_s + X.side_slip + i] = transport * gain_y
+
+        damping = low_speed_damping(transport, p[P.tyre_low_speed_mps], p[P.tyre_low_speed_damping_ns_m])
+        side = 1.0 - 2.0 * (i % 2)
+        force, cross = combined(
+            slip + damping * sliding / stiffness_x, atan(side_slip + damping * across / stiffness_y), loaded, grip,
+            side, p,
+        )  # fmt: skip
+        carried = load / loaded
+        given = u[U.longitudinal_force_n + i]
+        force = given if cut[C.force + i] > 0.5 else force * carried
+        y[Y.longitudinal_force_n + i] = force
+        y[Y.lateral_force_n + i] = cross * carried
+
+        rolling = load * radius * rolling_resistance(
+            omega * radius, p[P.vehicle_rolling_resistance], p[P.vehicle_rolling_resistance_speed_s2_m2]
+        )  # fmt: skip
+        y[Y.rolling_torque_nm + i] = rolling
+        y[Y.rate + X.wheel_speed_rad_s + i] = (torque - radius * force - rolling) / p[P.wheel_inertia_kg_m2]
+        y[Y.rate + X.wheel_angle_rad + i] = omega

@@ -13,8 +13,11 @@ DEMANDS = (*EHB_DEMANDS, *MOTOR_DEMANDS)
 
 
 def ready(receiver: Receiver) -> bool:
-    """Whether every demand has been valid for `READY_FRAMES` frames in a row."""
-    return all(receiver.receptions[kind].valid_in_row >= READY_FRAMES for kind in DEMANDS)
+    """Whether every demand has been valid for `READY_FRAMES` frames in a row, and is available."""
+    return all(
+        receiver.receptions[kind].valid_in_row >= READY_FRAMES and None not in (receiver.latest(kind) or (None,))
+        for kind in DEMANDS
+    )
 
 
 def _alive(receiver: Receiver, kind: type[tuple[float | None, ...]], now_ns: int) -> bool:

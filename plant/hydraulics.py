@@ -21,9 +21,9 @@ def pressure_jerk(
     """
     omega = 2.0 * pi * frequency_hz
     jerk = omega * omega * (demand_pa - pressure_pa) - 2.0 * damping * omega * rate_pa_s
-    if (rate_pa_s >= build_pa_s and jerk > 0.0) or (rate_pa_s <= -release_pa_s and jerk < 0.0):
-        return 0.0
-    return jerk
+    held_up = (rate_pa_s >= build_pa_s) & (jerk > 0.0)
+    held_down = (rate_pa_s <= -release_pa_s) & (jerk < 0.0)
+    return 0.0 if held_up | held_down else jerk
 
 
 @equation

@@ -1,63 +1,67 @@
 """Fixed steps of the model: semi-implicit for everyday use, Runge-Kutta for reference."""
 
+from math import cos, sin
+
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.compiled import equation
+from plant.compiled import section
 from plant.equations import derivative
-from plant.vectors import RATES, P, X
+from plant.vectors import OUTPUT, RATES, STATE, P, X, Y
 
 Vector = NDArray[np.float64]
 N = RATES.size
 SEMI_IMPLICIT = 0
 RUNGE_KUTTA_4 = 1
+WORK_SHAPE = (3, max(STATE.size, OUTPUT.size))
 
 
-@equation
+@section
 def semi_implicit_step(
-    x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, step_s: float, work: Vector, y: Vector
+    x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, step_s: float, y: Vector
 ) -> None:
     """One step with one evaluation: each state implicit in its own decay, positions driven by the new speeds.
 
     A Rosenbrock-Euler step with a diagonal Jacobian, made symplectic where two states swing against each other
-    (body on springs, wheel on tyre, pressure loop).
+    (body on springs, wheel on tyre, pressure loop). ``y`` holds the outputs at its start; its rates are used up.
     """
-    dx, decay, gain = work[0], work[1], work[2]
-    derivative(x, u, cut, switch, p, road, dx, decay, gain, y)
+    derivative(x, u, cut, switch, p, road, y)
     for i in range(N):
-        dx[i] *= step_s / (1.0 + step_s * decay[i])
-    speed, lateral, yaw_rate = dx[X.speed_mps], dx[X.lateral_speed_mps], dx[X.yaw_rate_rad_s]
-    cos_yaw, sin_yaw = np.cos(x[X.yaw_rad]), np.sin(x[X.yaw_rad])
-    dx[X.x_m] += step_s * (speed * cos_yaw - lateral * sin_yaw)
-    dx[X.y_m] += step_s * (speed * sin_yaw + lateral * cos_yaw)
-    dx[X.yaw_rad] += step_s * yaw_rate
-    dx[X.distance_m] += step_s * speed * np.sign(x[X.speed_mps])
+        y[Y.rate + i] *= step_s / (1.0 + step_s * y[Y.decay_1_s + i])
+    d = Y.rate
+    speed, lateral = y[d + X.speed_mps], y[d + X.lateral_speed_mps]
+    cos_yaw, sin_yaw = cos(x[X.yaw_rad]), sin(x[X.yaw_rad])
+    y[d + X.x_m] += step_s * (speed * cos_yaw - lateral * sin_yaw)
+    y[d + X.y_m] += step_s * (speed * sin_yaw + lateral * cos_yaw)
+    y[d + X.yaw_rad] += step_s * y[d + X.yaw_rate_rad_s]
+    y[d + X.distance_m] += step_s * (speed if x[X.speed_mps] >= 0.0 else -speed)
     for i in range(3):
-        dx[X.heave_m + i] += step_s * dx[X.heave_rate_mps + i]
+        y[d + X.heave_m + i] += step_s * y[d + X.heave_rate_mps + i]
     for i in range(4):
-        dx[X.pressure_pa + i] += step_s * dx[X.pressure_rate_pa_s + i]
-        dx[X.wheel_angle_rad + i] += step_s * dx[X.wheel_speed_rad_s + i]
-        swing = p[P.wheel_rolling_radius_m] * dx[X.wheel_speed_rad_s + i] - speed
-        dx[X.slip + i] += step_s * swing * gain[i] / (1.0 + step_s * decay[X.slip + i])
+        swing = p[P.wheel_rolling_radius_m] * y[d + X.wheel_speed_rad_s + i] - speed
+        damped = 1.0 + step_s * y[Y.decay_1_s + X.slip + i]
+        y[d + X.slip + i] += step_s * swing * y[Y.slip_gain_1_m + i] / damped
+        y[d + X.pressure_pa + i] += step_s * y[d + X.pressure_rate_pa_s + i]
+        y[d + X.wheel_angle_rad + i] += step_s * y[d + X.wheel_speed_rad_s + i]
     for i in range(N):
-        x[i] += dx[i]
+        x[i] += y[d + i]
 
 
-@equation
+@section
 def runge_kutta_step(
     x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, step_s: float, work: Vector, y: Vector
 ) -> None:
-    """One classical fourth-order step; ``y`` holds the outputs at its start."""
-    k1, k2, k3, k4, trial, spare, more = work[0], work[1], work[2], work[3], work[4], work[5], work[6]
-    derivative(x, u, cut, switch, p, road, k1, spare, more, y)
+    """One classical fourth-order step; ``y`` holds the outputs at its start, ``work`` has shape `WORK_SHAPE`."""
+    trial, total, stage = work[0], work[1], work[2]
+    derivative(x, u, cut, switch, p, road, y)
     for i in range(N):
-        trial[i] = x[i] + 0.5 * step_s * k1[i]
-    derivative(trial, u, cut, switch, p, road, k2, spare, more, work[7])
+        total[i] = y[Y.rate + i]
+        trial[i] = x[i] + 0.5 * step_s * y[Y.rate + i]
+    for half in (0.5, 1.0):
+        derivative(trial, u, cut, switch, p, road, stage)
+        for i in range(N):
+            total[i] += 2.0 * stage[Y.rate + i]
+            trial[i] = x[i] + half * step_s * stage[Y.rate + i]
+    derivative(trial, u, cut, switch, p, road, stage)
     for i in range(N):
-        trial[i] = x[i] + 0.5 * step_s * k2[i]
-    derivative(trial, u, cut, switch, p, road, k3, spare, more, work[7])
-    for i in range(N):
-        trial[i] = x[i] + step_s * k3[i]
-    derivative(trial, u, cut, switch, p, road, k4, spare, more, work[7])
-    for i in range(N):
-        x[i] += step_s / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+        x[i] += step_s / 6.0 * (total[i] + stage[Y.rate + i])

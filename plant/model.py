@@ -5,17 +5,16 @@ from math import floor, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.compiled import entry, equation
+from plant.compiled import entry, section
 from plant.equations import derivative
 from plant.friction import mu_equilibrium
-from plant.integrate import SEMI_IMPLICIT, N, runge_kutta_step, semi_implicit_step
+from plant.integrate import SEMI_IMPLICIT, WORK_SHAPE, runge_kutta_step, semi_implicit_step
 from plant.layout import flatten
 from plant.parameters.plant import PlantParameters
 from plant.road import DRY, road_table
 from plant.vectors import CUT, DELAY_SLOTS, INPUT, OUTPUT, PARAMETER, STATE, SWITCH, P, U, X
 
 Vector = NDArray[np.float64]
-WORK_SHAPE = (8, max(N, OUTPUT.size))
 STEP_S = 1e-3
 
 
@@ -54,7 +53,7 @@ def initial_state(
     return x
 
 
-@equation
+@section
 def delay_demand(x: Vector, u: Vector, dead_time_s: float, step_s: float, delayed: Vector) -> None:
     """Put the pressure demand into the delay line and write the demand of a dead time ago into ``delayed``."""
     newest = int(x[X.delay_index])
@@ -70,7 +69,7 @@ def delay_demand(x: Vector, u: Vector, dead_time_s: float, step_s: float, delaye
         delayed[U.pressure_demand_pa + i] = (1.0 - part) * x[line + late] + part * x[line + later]
 
 
-@equation
+@section
 def count_teeth(x: Vector, before: Vector, step_s: float, pitch_rad: float) -> None:
     """Note the passing of teeth within the step just made: how many, and when the last one."""
     for i in range(4):
@@ -82,19 +81,20 @@ def count_teeth(x: Vector, before: Vector, step_s: float, pitch_rad: float) -> N
             x[X.tooth_count + i] += abs(passed)
 
 
-@equation
+@section
 def run(
     x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, step_s: float, steps: int,
     method: int, work: Vector, now: Vector, angles: Vector, y: Vector,
 ) -> None:  # fmt: skip
     """Advance ``x`` in place by ``steps`` steps under constant inputs."""
-    now[:] = u
+    for i in range(u.size):
+        now[i] = u[i]
     for _ in range(steps):
         delay_demand(x, u, p[P.ehb_dead_time_s], step_s, now)
         for i in range(4):
             angles[i] = x[X.wheel_angle_rad + i]
         if method == SEMI_IMPLICIT:
-            semi_implicit_step(x, now, cut, switch, p, road, step_s, work, y)
+            semi_implicit_step(x, now, cut, switch, p, road, step_s, y)
         else:
             runge_kutta_step(x, now, cut, switch, p, road, step_s, work, y)
         x[X.time_s] += step_s
@@ -118,7 +118,7 @@ def advance(
     now = u.copy()
     angles = np.empty(4)
     run(x, u, cut, switch, p, road, step_s, steps, method, work, now, angles, y)
-    derivative(x, now, cut, switch, p, road, work[0], work[1], work[2], y)
+    derivative(x, now, cut, switch, p, road, y)
 
 
 def compile_model() -> None:

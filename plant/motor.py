@@ -6,12 +6,8 @@ from plant.compiled import equation
 @equation
 def torque_limit(speed_rad_s: float, peak_nm: float, peak_w: float, max_speed_rad_s: float) -> float:
     """Torque magnitude of the map at a wheel speed, N m: constant torque, then constant power, none above top speed."""
-    speed = abs(speed_rad_s)
-    if speed > max_speed_rad_s:
-        return 0.0
-    if peak_nm * speed <= peak_w:
-        return peak_nm
-    return peak_w / speed
+    speed = max(abs(speed_rad_s), 1e-3)
+    return 0.0 if speed > max_speed_rad_s else min(peak_nm, peak_w / speed)
 
 
 @equation

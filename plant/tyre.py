@@ -5,15 +5,16 @@
 Source: Pacejka, Tyre and Vehicle Dynamics, 2nd ed. 2006, section 4.3.2, in the form of MSC Adams/Tire PAC2002.
 Symbols as there. Vehicle axes: a positive longitudinal slip drives, a positive side slip (motion to the left) gives a
 negative side force. ``side`` is 1 on the left and -1 on the right, where the tyre is mounted mirrored.
-cos(atan(q)) is written 1/sqrt(1 + q^2).
+cos(atan(q)) is written 1/sqrt(1 + q^2). No branches: four wheels go through at once.
 """
 
-from math import atan, cos, exp, sin, sqrt
+from math import pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from plant.compiled import equation
+from plant.fastmath import atan, exp, sin
 from plant.vectors import P
 
 Vector = NDArray[np.float64]
@@ -30,7 +31,7 @@ def magic(b: float, c: float, d: float, e: float, slip: float) -> float:
 def weighting(b: float, c: float, e: float, slip: float) -> float:
     """Cosine version for combined slip, cos(c atan(b s - e (b s - atan(b s))))."""
     bs = b * slip
-    return cos(c * atan(bs - e * (bs - atan(bs))))
+    return sin(0.5 * pi + c * atan(bs - e * (bs - atan(bs))))
 
 
 @equation
@@ -124,11 +125,9 @@ def combined(slip: float, angle: float, load_n: float, friction: float, side: fl
 
     Parameters
     ----------
-    slip : kappa.  angle : slip angle alpha, rad.  load_n : Fz.  friction : scale of the road.
+    slip : kappa.  angle : slip angle alpha, rad.  load_n : Fz, above 0.  friction : scale of the road, above 0.
     side : 1 left, -1 right.  p : parameter vector.
     """
-    if load_n < 1.0 or friction <= 0.0:
-        return 0.0, 0.0
     dfz = load_offset(load_n, p)
     peak_x = peak_longitudinal(load_n, dfz, friction, p)
     peak_y = peak_lateral(load_n, dfz, friction, p)
@@ -155,10 +154,10 @@ def relaxation_lateral(load_n: float, p: Vector) -> float:
 
 
 @equation
-def sliding_relaxation(length_m: float, slip: float, stiffness: float, peak: float, floor: float) -> float:
-    """Relaxation length left when the contact slides, m: sigma (1 - K |s| / (3 D)), at least ``floor`` of it.
+def sliding_relaxation(length_m: float, slip: float, stiffness: float, peak: float, least_m: float) -> float:
+    """Relaxation length left when the contact slides, m: sigma (1 - K |s| / (3 D)), at least ``least_m``.
 
     Pacejka 2006, chapter 7, restricted fully non-linear model: the carcass cannot be wound up further than the
     friction allows, so that a locked wheel does not spring back after the stop.
     """
-    return length_m * max(1.0 - abs(stiffness * slip) / (3.0 * peak), floor)
+    return max(length_m * (1.0 - abs(stiffness * slip) / (3.0 * peak)), least_m)

@@ -60,19 +60,26 @@ INPUTS = {
 }
 CUTS = {"pressure": 4, "motor_torque": 4, "wheel_torque": 4, "force": 4}
 SWITCHES = {"motor_alive": 4, "battery_accepts": 1}
+RATES = Layout("Rates", CONTINUOUS)
 OUTPUTS = {
+    "rate": RATES.size,  # of the continuous states, in their order
+    "decay_1_s": RATES.size,  # own decay rate of each state, for the semi-implicit step
     "acceleration_mps2": 1,
     "specific_force_x_mps2": 1,
     "specific_force_y_mps2": 1,
     "wheel_torque_nm": 4,
     "friction_torque_nm": 4,
+    "motor_target_nm": 4,
     "motor_torque_nm": 4,
     "pressure_pa": 4,
-    "longitudinal_force_n": 4,
+    "longitudinal_force_n": 4,  # in the wheel's axes
     "lateral_force_n": 4,
     "wheel_load_n": 4,
     "rolling_torque_nm": 4,
+    "along_mps": 4,  # velocity of the contact in the wheel's axes
+    "across_mps": 4,
     "slip_speed_mps": 4,
+    "slip_gain_1_m": 4,  # 1 / relaxation length
     "motor_available_nm": 4,
     "motor_derating": 4,
     "road_friction": 4,
@@ -83,7 +90,6 @@ OUTPUTS = {
 }
 
 STATE = Layout("State", CONTINUOUS | MEMORY)
-RATES = Layout("Rates", CONTINUOUS)
 INPUT = Layout("Input", INPUTS)
 CUT = Layout("Cut", CUTS)
 SWITCH = Layout("Switch", SWITCHES)

@@ -84,6 +84,6 @@ class TyreParameters:
     lyka: Scale
     lvyka: Scale
     lsgal: Scale
-    relaxation_floor: Annotated[float, "", 0.02, 1.0]  # share of the relaxation length left at full sliding
+    relaxation_least_m: Annotated[float, "m", 0.03, 0.3]  # what is left at full sliding or without load
     low_speed_mps: Annotated[float, "m/s", 0.1, 10.0]
     low_speed_damping_ns_m: Annotated[float, "N s/m", 0.0, 20000.0]
