@@ -129,18 +129,23 @@ class Rendezvous:
 
     def _open_lock(self) -> int | None:
         """Open the lock file, making the directories; None where the last member removed them meanwhile."""
-        base = self._directory.parent
         try:
-            base.mkdir(mode=0o700, exist_ok=True)
-            found = base.lstat()
-            if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
-                raise BusError(
-                    f"{base}: expected a directory of user {os.getuid()} with mode 0700, "
-                    f"got {stat.filemode(found.st_mode)} of user {found.st_uid}; remove it"
-                )
-            self._directory.mkdir(mode=0o700, exist_ok=True)
+            _make(self._directory.parent)
+            _make(self._directory)
             return os.open(self._directory / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
         except FileNotFoundError:
             return None
         except OSError as error:
             raise BusError(f"cannot use {self._directory} for a loopback channel: {error}") from error
+
+
+def _make(directory: Path) -> None:
+    """Make a directory that is ours alone, or see that the one there is."""
+    with contextlib.suppress(FileExistsError):
+        directory.mkdir(mode=0o700)
+    found = directory.lstat()
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
+        raise BusError(
+            f"{directory}: expected a directory of user {os.getuid()} with mode 0700, "
+            f"got {stat.filemode(found.st_mode)} of user {found.st_uid}; remove it"
+        )
