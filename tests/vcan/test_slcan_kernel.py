@@ -174,12 +174,11 @@ def test_an_interface_that_went_down_is_told_by_the_next_call_even_when_up_again
 ) -> None:
     slcan.down()
     slcan.up()
-    message = can.Message(arbitration_id=0x123, is_extended_id=False)
     with pytest.raises(can.CanOperationError) as lost:
-        bus.send(message)
+        bus.send(can.Message(arbitration_id=0x111, is_extended_id=False))  # this frame is lost
     assert lost.value.error_code == errno.ENETDOWN
-    bus.send(message)
-    assert slcan.device.receive().can_id == 0x123
+    bus.send(can.Message(arbitration_id=0x222, is_extended_id=False))
+    assert slcan.device.receive().can_id == 0x222
 
 
 def test_listen_only_drops_what_is_sent_and_counts_it(slcan: SlcanInterface) -> None:
