@@ -121,9 +121,12 @@ class Bench:
         self._children.append(Child(name, [*arguments, "--bus", self.spec], words))
 
     def _await_ready(self, children: Sequence[Child]) -> None:
+        """Wait until all are ready, then let all begin at once."""
         for child in children:
             if not child.wait_ready(READY_TIMEOUT_S):
-                raise BenchError(f"did not start: {child.why()}")
+                raise BenchError(f"did not start: {child.why()}; see {child.error_path.name}")
+        for child in children:
+            child.release()
 
     def _watch(self, bus: Bus) -> None:
         """Follow the plant's truth until the manoeuvre is over, a process dies, or somebody asks us to stop."""

@@ -5,6 +5,7 @@ import ctypes
 import os
 import select
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ from hil.rt.clock import WallClock
 
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
 STOP_TIMEOUT_NS = 3_000_000_000
+_READY, _GO = b"r", b"g"
 
 
 def end_with_parent() -> None:
@@ -47,7 +49,7 @@ class StopSignal:
 class Child:
     """A brakebench command as a process of its own.
 
-    It runs in its own session (a Ctrl-C reaches only us), ends when we end, and says ready over a pipe.
+    It runs in its own session (a Ctrl-C reaches only us), ends when we end, says ready and waits for its release.
 
     Parameters
     ----------
@@ -59,8 +61,8 @@ class Child:
     def __init__(self, name: str, arguments: Sequence[str], error_path: Path) -> None:
         self.name = name
         self.error_path = error_path
-        self._ready, child_end = os.pipe()
-        command = [sys.executable, "-m", "hil.cli.main", *arguments, "--ready-fd", str(child_end)]
+        self._ready, child_end = socket.socketpair()
+        command = [sys.executable, "-m", "hil.cli.main", *arguments, "--ready-fd", str(child_end.fileno())]
         try:
             with error_path.open("wb") as output:
                 self._process = subprocess.Popen(
@@ -68,11 +70,11 @@ class Child:
                     stdin=subprocess.DEVNULL,
                     stdout=output,
                     stderr=output,
-                    pass_fds=(child_end,),
+                    pass_fds=(child_end.fileno(),),
                     start_new_session=True,
                 )
         finally:
-            os.close(child_end)
+            child_end.close()
 
     @property
     def pid(self) -> int:
@@ -92,7 +94,12 @@ class Child:
     def wait_ready(self, timeout_s: float) -> bool:
         """Wait until the process says ready; False when it ends before or does not within ``timeout_s``."""
         readable, _, _ = select.select([self._ready], [], [], timeout_s)
-        return bool(readable) and os.read(self._ready, 1) == b"r"
+        return bool(readable) and self._ready.recv(1) == _READY
+
+    def release(self) -> None:
+        """Let a process that said ready begin."""
+        with contextlib.suppress(BrokenPipeError):
+            self._ready.send(_GO)
 
     def why(self) -> str:
         """How the process ended, with its last words."""
@@ -119,16 +126,15 @@ class Child:
         if not self.ended:
             self._process.kill()
             self._process.wait()
-        if self._ready >= 0:
-            os.close(self._ready)
-            self._ready = -1
+        self._ready.close()
 
 
 def say_ready(ready_fd: int | None) -> None:
-    """Tell the parent that waits at the other end of ``ready_fd`` (None: nobody waits)."""
+    """Tell the parent at the other end of ``ready_fd`` (None: there is none), and wait until it lets us begin."""
     if ready_fd is not None:
-        os.write(ready_fd, b"r")
-        os.close(ready_fd)
+        with socket.socket(fileno=ready_fd) as parent:
+            parent.send(_READY)
+            parent.recv(1)
 
 
 def wait_for_end(children: Sequence[Child], timeout_ns: int = STOP_TIMEOUT_NS) -> None:

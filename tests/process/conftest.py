@@ -19,6 +19,24 @@ def channel():
 
 
 @pytest.fixture
+def short(tmp_path):
+    """A scenario of three seconds: a stop from 18 km/h."""
+    path = tmp_path / "short.toml"
+    path.write_text(
+        """title = "short stop"
+[start]
+speed_mps = 5.0
+[driver]
+pedal = [[0.2, 0.0], [0.4, 0.6]]
+[end]
+duration_s = 8.0
+after_standstill_s = 0.3
+"""
+    )
+    return path.name
+
+
+@pytest.fixture
 def brakebench(tmp_path):
     """Run a command to its end in a folder of its own."""
 

@@ -5,7 +5,6 @@ import os
 import re
 import signal
 import sys
-from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -73,8 +72,8 @@ def test_the_main_job(brakebench, channel, tmp_path):
     assert leftovers(channel) == []
 
 
-def test_every_frame_keeps_its_cycle_time(brakebench, channel, tmp_path):
-    result = json.loads(brakebench("run", "--json", "--bus", channel).stdout)
+def test_every_frame_keeps_its_cycle_time(brakebench, channel, tmp_path, short):
+    result = json.loads(brakebench("run", short, "--json", "--bus", channel).stdout)
     decoded = json.loads(brakebench("decode", result["log"], "--json").stdout)
     assert decoded["frames"] == decoded["decoded"] + decoded["unknown"] + decoded["rejected"]
     assert (decoded["unknown"], decoded["rejected"], decoded["truncated_at"]) == (0, 0, None)
@@ -88,15 +87,15 @@ def test_every_frame_keeps_its_cycle_time(brakebench, channel, tmp_path):
         assert np.median(np.diff(t_s[t_s > 0.0])) == pytest.approx(cycle_s, rel=0.02)
 
 
-def test_two_benches_side_by_side(start):
-    first, second = start("run", "--json", "--bus", "auto"), start("run", "--json", "--bus", "auto")
+def test_two_benches_side_by_side(start, short):
+    first, second = start("run", short, "--json", "--bus", "auto"), start("run", short, "--json", "--bus", "auto")
     results = [result_of(first), result_of(second)]
-    assert all(60.0 < r["stop_distance_m"] < 75.0 for r in results)
+    assert all(3.5 < r["stop_distance_m"] < 6.5 for r in results)
     assert results[0]["bus"] != results[1]["bus"]
     assert all((r["frames_lost"], r["frames_corrupt"], r["processes"]) == (0, 0, 2) for r in results)
 
 
-@pytest.mark.parametrize("after_s", [0.2, 1.6, 3.0])
+@pytest.mark.parametrize("after_s", [0.1, 1.0, 3.0])
 @pytest.mark.parametrize("victim", ["plant", "ecu"])
 def test_a_killed_node_is_survived_and_named(start, channel, tmp_path, victim, after_s):
     bench = start("run", "--json", "--bus", channel, "--out", "out")
@@ -158,8 +157,8 @@ def test_a_killed_bench_leaves_no_orphan(start, channel, tmp_path):
     assert Signals(log_of(tmp_path)).decoded.rejected == 0
 
 
-def test_a_second_bench_on_the_channel_is_refused(start, brakebench, channel):
-    first = start("run", "--json", "--bus", channel)
+def test_a_second_bench_on_the_channel_is_refused(start, brakebench, channel, short):
+    first = start("run", short, "--json", "--bus", channel)
     driving(first, channel)
     refused = brakebench("run", "--bus", channel, check=2)
     assert re.search(rf"{channel}.*in use by another bench, process {first.pid}", refused.stderr)
@@ -167,9 +166,9 @@ def test_a_second_bench_on_the_channel_is_refused(start, brakebench, channel):
     result_of(first, expected=130)
 
 
-def test_nodes_started_separately_find_each_other(start, channel, tmp_path):
+def test_nodes_started_separately_find_each_other(start, channel, tmp_path, short):
     recorder = start("record", "apart.log", "--bus", channel)
-    ecu, plant = start("ecu", "--bus", channel), start("plant", "--bus", channel)
+    ecu, plant = start("ecu", short, "--bus", channel), start("plant", short, "--bus", channel)
     log = tmp_path / "apart.log"
 
     def stopped():
@@ -188,8 +187,8 @@ def test_nodes_started_separately_find_each_other(start, channel, tmp_path):
     assert leftovers(channel) == []
 
 
-def test_python_can_logger_sees_every_frame(start, channel, tmp_path):
-    bench = start("run", "--json", "--bus", channel)
+def test_python_can_logger_sees_every_frame(start, channel, tmp_path, short):
+    bench = start("run", short, "--json", "--bus", channel)
     name = channel.removeprefix("loopback:")
     logger_log = tmp_path / "logger.asc"
     program = [sys.executable, "-m", "can.logger"]
@@ -205,7 +204,7 @@ def test_python_can_logger_sees_every_frame(start, channel, tmp_path):
         if bus == "vehicle":
             identifier, data = frame.split("#")
             sent.append((int(identifier, 16), data))
-    assert len(seen) > 5000
+    assert len(seen) > 1500
     start_at = sent.index(seen[0])
     for can_id in {can_id for can_id, _ in seen}:  # per sender in order; two senders may interleave differently
         mine = [data for i, data in seen if i == can_id]
@@ -228,11 +227,10 @@ def test_wrong_use_is_exit_code_2(brakebench, arguments, message):
     assert message in brakebench(*arguments, check=2).stderr
 
 
-def test_a_failed_expectation_is_exit_code_1(brakebench, channel, tmp_path):
-    library = Path(__file__).parents[2] / "hil" / "scenarios" / "stop72.toml"
+def test_a_failed_expectation_is_exit_code_1(brakebench, channel, tmp_path, short):
     scenario = tmp_path / "strict.toml"
-    scenario.write_text(library.read_text() + "\n[expect.stop_distance_m]\nmax = 30.0\n")
+    scenario.write_text((tmp_path / short).read_text() + "[expect.stop_distance_m]\nmax = 1.0\n")
     done = brakebench("run", "strict.toml", "--bus", channel, "--json", check=1)
     result = json.loads(done.stdout)
     assert result["verdict"] == "failed"
-    assert "stop_distance_m: expected -inf to 30" in result["reason"]
+    assert "stop_distance_m: expected -inf to 1" in result["reason"]
