@@ -19,6 +19,7 @@ AUTO = "auto"
 _VCAN = "socketcan:vcan0"
 _LOOPBACK = "loopback:brakebench"
 _MOST_BENCHES = 100
+_ASKERS = 1000  # who may ask for the holder's name: nobody answers them, the kernel does
 _IFF_UP = 1  # linux/if.h
 
 
@@ -92,44 +93,43 @@ def claim_channel(spec: str) -> ChannelClaim:
     """
     if spec != AUTO:
         held = _hold(spec)
-        if isinstance(held, int):
-            raise BusError(
-                f"bus {spec}: in use by another bench, process {held}; stop that one, or take another channel"
-            )
+        if isinstance(held, str):
+            raise BusError(f"bus {spec}: in use by another bench, {held}; stop that one, or take another channel")
         return ChannelClaim(spec, "", held)
     refusal = vcan_refusal()
     if not refusal:
         held = _hold(_VCAN)
-        if not isinstance(held, int):
+        if not isinstance(held, str):
             return ChannelClaim(_VCAN, "vcan0 is there", held)
-        refusal = f"another bench, process {held}, has vcan0"
+        refusal = f"another bench, {held}, has vcan0"
     for number in range(1, _MOST_BENCHES + 1):
         candidate = _LOOPBACK if number == 1 else f"{_LOOPBACK}-{number}"
         held = _hold(candidate)
-        if not isinstance(held, int):
+        if not isinstance(held, str):
             return ChannelClaim(candidate, refusal, held)
     raise BusError(f"bus auto: {_MOST_BENCHES} benches have all of {_LOOPBACK} to {_LOOPBACK}-{_MOST_BENCHES}")
 
 
-def _hold(spec: str) -> socket.socket | int:
-    """Bind the channel's claim, or return the process that has it."""
+def _hold(spec: str) -> socket.socket | str:
+    """Bind the channel's claim, or return who has it."""
     parsed = parse_spec(spec)
     scope = str(base_directory()) if parsed.kind == "loopback" else "machine"
     address = b"\0brakebench/" + hashlib.sha256(f"{scope}\n{parsed.name}".encode()).hexdigest().encode()
     claim = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     try:
         claim.bind(address)
-        claim.listen(1)
+        claim.listen(_ASKERS)
     except OSError:
         claim.close()
         return _holder(address)
     return claim
 
 
-def _holder(address: bytes) -> int:
+def _holder(address: bytes) -> str:
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK) as asker:
         try:
             asker.connect(address)
         except OSError:
-            return 0
-        return int(struct.unpack("3i", asker.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))[0])
+            return "whose process is unknown"
+        process = struct.unpack("3i", asker.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))[0]
+        return f"process {process}"

@@ -98,7 +98,7 @@ class PythonCanBus:
             return -1
         try:
             return self._driver.fileno()
-        except NotImplementedError:
+        except Exception:  # it has none; or it is just being unplugged
             return -1
 
     def close(self) -> None:

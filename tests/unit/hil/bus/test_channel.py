@@ -133,3 +133,10 @@ import time; time.sleep(60)
             claim_channel("loopback:demo")
         other.kill()
     claim_channel("loopback:demo").close()
+
+
+def test_asking_who_has_it_never_wears_out():
+    with claim_channel("loopback:demo"):
+        for _ in range(20):
+            with pytest.raises(BusError, match=f"process {os.getpid()};"):
+                claim_channel("loopback:demo")
