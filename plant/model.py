@@ -1,5 +1,7 @@
-"""The vehicle as functions on flat vectors: start, advance (live), replay (batches)."""
+"""The vehicle as functions on flat vectors: start, advance (live), replay (measured inputs, batches)."""
 
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from math import floor, pi
 
 import numpy as np
@@ -16,6 +18,8 @@ from plant.vectors import CUT, DELAY_SLOTS, INPUT, OUTPUT, PARAMETER, STATE, SWI
 
 Vector = NDArray[np.float64]
 STEP_S = 1e-3
+_NOTHING = np.empty(0, dtype=np.int64)
+_NO_ROWS = np.empty((1, 0))
 
 
 def pack(parameters: PlantParameters) -> Vector:
@@ -81,48 +85,125 @@ def count_teeth(x: Vector, before: Vector, step_s: float, pitch_rad: float) -> N
             x[X.tooth_count + i] += abs(passed)
 
 
-@section
-def run(
-    x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, step_s: float, steps: int,
-    method: int, work: Vector, now: Vector, angles: Vector, y: Vector,
-) -> None:  # fmt: skip
-    """Advance ``x`` in place by ``steps`` steps under constant inputs."""
-    for i in range(u.size):
-        now[i] = u[i]
-    for _ in range(steps):
-        delay_demand(x, u, p[P.ehb_dead_time_s], step_s, now)
-        for i in range(4):
-            angles[i] = x[X.wheel_angle_rad + i]
-        if method == SEMI_IMPLICIT:
-            semi_implicit_step(x, now, cut, switch, p, road, step_s, y)
-        else:
-            runge_kutta_step(x, now, cut, switch, p, road, step_s, work, y)
-        x[X.time_s] += step_s
-        count_teeth(x, angles, step_s, 2.0 * pi / p[P.sensor_teeth])
-
-
 @entry
-def advance(
-    x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, step_s: float, steps: int,
-    method: int, y: Vector,
+def simulate(
+    x: Vector, inputs: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, step_s: float, steps: int,
+    method: int, columns: NDArray[np.int64], table: Vector, y: Vector,
 ) -> None:  # fmt: skip
-    """Advance the state ``x`` in place and write the outputs at its end into ``y``.
+    """Run the car through rows of inputs; the only compiled entry point.
 
     Parameters
     ----------
-    x, u, cut, switch, p, y : vectors ``STATE``, ``INPUT``, ``CUT``, ``SWITCH``, ``PARAMETER``, ``OUTPUT``.
-    road : rows of `plant.road.road_table`.  step_s : s.  steps : how many; 0 only evaluates the outputs.
-    method : `plant.integrate.SEMI_IMPLICIT` or `RUNGE_KUTTA_4`.
+    x : state (``STATE``), advanced in place.  inputs : one ``INPUT`` a row, each ``steps`` steps long. Demands hold
+        within a row; steering and measured values go linearly towards the next row.
+    cut, switch, p : vectors ``CUT``, ``SWITCH``, ``PARAMETER``.  road : rows of `plant.road.road_table`.
+    step_s : s.  method : `plant.integrate.SEMI_IMPLICIT` or `RUNGE_KUTTA_4`.
+    columns : what to note at the start of each row, as indices into the state followed by the outputs.
+    table : the notes, shape (rows, columns), written.  y : outputs (``OUTPUT``) at the end, written.
     """
     work = np.empty(WORK_SHAPE)
-    now = u.copy()
+    now = np.empty(inputs.shape[1])
     angles = np.empty(4)
-    run(x, u, cut, switch, p, road, step_s, steps, method, work, now, angles, y)
+    rows = inputs.shape[0]
+    for row in range(rows):
+        following = min(row + 1, rows - 1)
+        for i in range(now.size):
+            now[i] = inputs[row, i]
+        if columns.size > 0:
+            derivative(x, now, cut, switch, p, road, y)
+            for k in range(columns.size):
+                table[row, k] = x[columns[k]] if columns[k] < x.size else y[columns[k] - x.size]
+        for step in range(steps):
+            share = (step + 0.5) / steps
+            for i in range(U.steering_wheel_rad, now.size):
+                now[i] = inputs[row, i] + share * (inputs[following, i] - inputs[row, i])
+            delay_demand(x, inputs[row], p[P.ehb_dead_time_s], step_s, now)
+            for i in range(4):
+                angles[i] = x[X.wheel_angle_rad + i]
+            if method == SEMI_IMPLICIT:
+                semi_implicit_step(x, now, cut, switch, p, road, step_s, y)
+            else:
+                runge_kutta_step(x, now, cut, switch, p, road, step_s, work, y)
+            x[X.time_s] += step_s
+            count_teeth(x, angles, step_s, 2.0 * pi / p[P.sensor_teeth])
     derivative(x, now, cut, switch, p, road, y)
+
+
+def advance(
+    x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, y: Vector, steps: int,
+    step_s: float = STEP_S, method: int = SEMI_IMPLICIT,
+) -> None:  # fmt: skip
+    """Advance the state ``x`` in place under constant inputs; ``y`` holds the outputs at its end.
+
+    ``steps`` 0 only evaluates the outputs. The vectors are those of `simulate`, ``u`` one ``INPUT``.
+    """
+    simulate(x, u.reshape(1, -1), cut, switch, p, road, step_s, steps, method, _NOTHING, _NO_ROWS, y)
+
+
+def column_indices(names: Sequence[str]) -> NDArray[np.int64]:
+    """Indices for `simulate` of columns by name, e.g. ``wheel_speed_rad_s_fl``.
+
+    Outputs come before states of the same name: the pressure that acts, not the one the model makes. The prefix
+    ``state.`` asks for the state.
+
+    Raises
+    ------
+    KeyError
+        A name that neither outputs nor state have.
+    """
+    states = {name: k for k, name in enumerate(STATE.columns())}
+    outputs = {name: STATE.size + k for k, name in enumerate(OUTPUT.columns())}
+    known = states | {f"state.{name}": k for name, k in states.items()} | outputs
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise KeyError(f"no such column: {', '.join(unknown)}; see STATE.columns() and OUTPUT.columns()")
+    return np.array([known[name] for name in names], dtype=np.int64)
+
+
+def replay(
+    start: Vector, inputs: Vector, parameters: Vector, columns: Sequence[str], *, cut: Vector | None = None,
+    switch: Vector | None = None, road: Vector | None = None, steps: int = 10, step_s: float = STEP_S,
+    method: int = SEMI_IMPLICIT, workers: int = 1,
+) -> Vector:  # fmt: skip
+    """Run cars through the same rows of inputs, each with its own parameters and start.
+
+    Parameters
+    ----------
+    start : one state for all, or one a car, shape (STATE.size,) or (cars, STATE.size).
+    inputs : shape (rows, INPUT.size); a row lasts ``steps`` times ``step_s``.
+    parameters : shape (PARAMETER.size,) or (cars, PARAMETER.size).
+    columns : names as for `column_indices`.  cut, switch, road : none, healthy and dry by default.
+    workers : threads; the cars are shared out among them.
+
+    Returns
+    -------
+    Values at the start of each row, shape (cars, rows, columns).
+    """
+    cars = parameters.reshape(-1, PARAMETER.size)
+    starts = np.broadcast_to(start, (len(cars), STATE.size))
+    rows = np.ascontiguousarray(inputs, dtype=np.float64)
+    cut = CUT.zeros() if cut is None else cut
+    switch = healthy() if switch is None else switch
+    road = road_table(DRY) if road is None else road
+    indices = column_indices(columns)
+    table = np.empty((len(cars), len(rows), len(indices)))
+
+    def one(k: int) -> None:
+        simulate(
+            starts[k].copy(), rows, cut, switch, np.ascontiguousarray(cars[k]), road, step_s, steps, method, indices,
+            table[k], OUTPUT.zeros(),
+        )  # fmt: skip
+
+    if workers == 1:
+        for k in range(len(cars)):
+            one(k)
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            list(pool.map(one, range(len(cars))))
+    return table
 
 
 def compile_model() -> None:
     """Compile the model now, or load it from disk; else the first call does."""
-    x, y = STATE.zeros(), OUTPUT.zeros()
-    x[X.delay_index] = 0.0
-    advance(x, INPUT.zeros(), CUT.zeros(), healthy(), np.ones(PARAMETER.size), road_table(DRY), STEP_S, 0, 0, y)
+    p = np.ones(PARAMETER.size)
+    advance(STATE.zeros(), INPUT.zeros(), CUT.zeros(), healthy(), p, road_table(DRY), OUTPUT.zeros(), 0)

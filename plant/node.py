@@ -38,7 +38,6 @@ from dbc.messages import (
 )
 from plant import driver
 from plant.demands import DEMANDS, EHB_DEMANDS, PressureDemand, motor_demand_nm, ready
-from plant.integrate import SEMI_IMPLICIT
 from plant.manoeuvre import Manoeuvre, value_at
 from plant.model import STEP_S, advance, healthy, initial_state, pack
 from plant.parameters.plant import PlantParameters
@@ -123,7 +122,7 @@ class PlantNode:
 
     def _advance(self, elapsed_ns: int) -> None:
         steps = round(elapsed_ns * 1e-9 / STEP_S)
-        advance(self._x, self._u, self._cut, self._switch, self._p, self._road, STEP_S, steps, SEMI_IMPLICIT, self._y)
+        advance(self._x, self._u, self._cut, self._switch, self._p, self._road, self._y, steps)
 
     def _take_faults(self, now_ns: int, inbox: Sequence[Received]) -> None:
         """Fault commands one by one: two may come in one tick."""
