@@ -1,0 +1,7 @@
+"""Identification from measured records: the paper's pad friction model from a brake dynamometer (Figures 3 to 5).
+
+`record` reads a dynamometer's CSV, `model` integrates equations (3) and (4), `fit` finds their five parameters,
+`uncertainty` says how well, `validation` predicts another record, `coverage` checks the intervals on records whose
+truth is known, `study` puts all of it together and `summary` and `files` hand it to people and programs.
+`dyno` makes the shipped synthetic records from a different, richer brake.
+"""
