@@ -2,54 +2,26 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from dbc.bench_messages import (
-    FaultCommand,
-    ManoeuvreState,
-    PhysicalFault,
-    PlantReception,
-    StimulusDriver,
-    StimulusRoad,
-    TruthDiscTemperature,
-    TruthEnergy,
-    TruthFrictionTorque,
-    TruthLongitudinalForce,
-    TruthMotion,
-    TruthPadFriction,
-    TruthWheelLoad,
-    TruthWheelTorque,
-)
+from dbc.bench_messages import FaultCommand, ManoeuvreState, PhysicalFault, StimulusDriver, StimulusRoad
 from dbc.contract import Message, spec_of
 from dbc.exchange import Receiver, Transmitter
 from dbc.frame import Frame, Received
-from dbc.messages import (
-    BatteryStatus,
-    BodyMotion,
-    BrakePedal,
-    EhbPressureFront,
-    EhbPressureRear,
-    MotorState,
-    MotorStatusFront,
-    MotorStatusRear,
-    Steering,
-    WheelSpeedFront,
-    WheelSpeedRear,
-)
-from plant import driver
+from dbc.messages import BatteryStatus
+from plant import driver, reports
 from plant.demands import DEMANDS, EHB_DEMANDS, PressureDemand, motor_demand_nm, ready
 from plant.manoeuvre import Manoeuvre, value_at
 from plant.model import STEP_S, advance, healthy, initial_state, pack
 from plant.parameters.plant import PlantParameters
+from plant.partners import Partners
 from plant.road import road_table
 from plant.sensors import Sensors
-from plant.vectors import CUT, INPUT, OUTPUT, STATE, S, U, X, Y
+from plant.vectors import INPUT, OUTPUT, STATE, S, U, X, Y
 
 SENDERS = frozenset({"EHB", "IWM", "BATTERY", "SENSORS", "DRIVER"})
 STIMULUS_TIMEOUT_NS = 100_000_000
 STANDING_MPS = 0.02
-NO_COUNTER = 15
-CARRIED_FROM_START = (  # what a manoeuvre starts with, however long the start was awaited
+STEP_NS = round(STEP_S * 1e9)
+RESET_AT_START = (  # what a manoeuvre starts with, however long its start was awaited
     "x_m", "y_m", "yaw_rad", "winding_temperature_k", "pad_friction", "pad_temperature_k", "disc_temperature_k",
     "state_of_charge", "recuperated_j", "friction_heat_j", "distance_m",
 )  # fmt: skip
@@ -63,7 +35,7 @@ class PlantNode:
     parameters, manoeuvre : what drives, and how.
     seed : of all noise.
     period_ns : of `step`; the model takes steps of 1 ms inside.
-    play : nodes of brake.dbc whose frames it sends.
+    play : nodes of brake.dbc that it is; the frames of the others enter as measured values.
 
     Attributes
     ----------
@@ -79,9 +51,12 @@ class PlantNode:
         period_ns: int = 10_000_000,
         play: frozenset[str] = SENDERS,
     ) -> None:
+        if not play <= SENDERS:
+            raise ValueError(f"play: {sorted(play - SENDERS)} are no nodes of the vehicle; known: {sorted(SENDERS)}")
+        if period_ns <= 0 or period_ns % STEP_NS:
+            raise ValueError(f"period_ns: expected a positive multiple of {STEP_NS} ns, got {period_ns}")
         self._parameters = parameters
         self._manoeuvre = manoeuvre
-        self._period_ns = period_ns
         self._play = play
         self._p = pack(parameters)
         self._x = initial_state(
@@ -92,11 +67,11 @@ class PlantNode:
             manoeuvre.initial_pad_friction,
         )
         self._start = self._x.copy()
-        self._u, self._y, self._cut, self._switch = INPUT.zeros(), OUTPUT.zeros(), CUT.zeros(), healthy()
-        self._road = road_table(manoeuvre.road)
-        self._own_road = self._road
-        self._sensors = Sensors(parameters.sensor, parameters.motor.torque_constant_nm_a, seed)
-        self._sensors.start(self._x, manoeuvre.initial_speed_mps / parameters.wheel.rolling_radius_m)
+        self._partners = Partners(play, parameters.motor.torque_constant_nm_a)
+        self._u, self._y, self._cut, self._switch = INPUT.zeros(), OUTPUT.zeros(), self._partners.cut(), healthy()
+        self._own_road = self._road = road_table(manoeuvre.road)
+        first_speed = manoeuvre.initial_speed_mps / parameters.wheel.rolling_radius_m
+        self._sensors = Sensors(parameters.sensor, parameters.motor.torque_constant_nm_a, seed, self._x, first_speed)
         self._receiver = Receiver((*DEMANDS, StimulusDriver, StimulusRoad))
         self._faults = Receiver((FaultCommand,))
         self._transmitter = Transmitter()
@@ -115,20 +90,21 @@ class PlantNode:
         self._last_ns = now_ns
         self._advance(elapsed_ns)
         self._receiver.accept(now_ns, inbox)
+        self._partners.receiver.accept(now_ns, inbox)
         self._take_faults(now_ns, inbox)
         self._follow_manoeuvre(now_ns, elapsed_ns)
         self._drive(now_ns)
-        return self._transmitter.frames(now_ns, [*self._measured(now_ns), *self._truth()])
+        return self._transmitter.frames(now_ns, self._tell(now_ns))
 
     def _advance(self, elapsed_ns: int) -> None:
-        steps = round(elapsed_ns * 1e-9 / STEP_S)
+        steps = elapsed_ns // STEP_NS
         advance(self._x, self._u, self._cut, self._switch, self._p, self._road, self._y, steps)
 
     def _take_faults(self, now_ns: int, inbox: Sequence[Received]) -> None:
         """Fault commands one by one: two may come in one tick."""
-        key = spec_of(FaultCommand).can_id, spec_of(FaultCommand).bus
+        spec = spec_of(FaultCommand)
         for item in inbox:
-            if not isinstance(item, Frame) or (item.can_id, item.bus) != key:
+            if not isinstance(item, Frame) or (item.can_id, item.bus) != (spec.can_id, spec.bus):
                 continue
             self._faults.accept(now_ns, [item])
             command = self._faults.latest(FaultCommand)
@@ -147,7 +123,7 @@ class PlantNode:
         if self.manoeuvre_start_ns is None:
             if manoeuvre.wait_for_demands and not manoeuvre.direct.complete and not ready(self._receiver):
                 return
-            for part in CARRIED_FROM_START:
+            for part in RESET_AT_START:
                 where = STATE.slice(part)
                 self._x[where] = self._start[where]
             self.manoeuvre_start_ns = now_ns
@@ -165,38 +141,41 @@ class PlantNode:
 
     def _drive(self, now_ns: int) -> None:
         """Driver, road and demands from this tick on."""
-        manoeuvre, direct = self._manoeuvre, self._manoeuvre.direct
-        start = self.manoeuvre_start_ns
+        manoeuvre, start = self._manoeuvre, self.manoeuvre_start_ns
         time_s = 0.0 if start is None else (now_ns - start) * 1e-9
-        self._pedal = 0.0 if start is None else driver.pedal_travel(manoeuvre, time_s)
-        self._steering_rad = 0.0 if start is None else value_at(manoeuvre.steering_wheel_rad, time_s)
+        pedal = 0.0 if start is None else driver.pedal_travel(manoeuvre, time_s)
+        steering = 0.0 if start is None else value_at(manoeuvre.steering_wheel_rad, time_s)
         target = manoeuvre.initial_speed_mps if start is None else driver.target_speed(manoeuvre, time_s)
         live = self._stimulus(StimulusDriver, now_ns)
         if isinstance(live, StimulusDriver):
-            self._pedal = self._pedal if live.pedal_travel is None else live.pedal_travel
+            pedal = pedal if live.pedal_travel is None else live.pedal_travel
             target = target if live.target_speed_mps is None else live.target_speed_mps
-            angle = live.steering_wheel_angle_rad
-            self._steering_rad = self._steering_rad if angle is None else angle
+            steering = steering if live.steering_wheel_angle_rad is None else live.steering_wheel_angle_rad
+        theirs = self._partners.pedal_travel(), self._partners.steering_wheel_rad()
+        self._pedal = pedal if theirs[0] is None else theirs[0]
+        self._steering_rad = steering if theirs[1] is None else theirs[1]
         self._override_road(now_ns)
 
-        u = self._u
+        u, direct = self._u, manoeuvre.direct
         u[U.steering_wheel_rad] = self._steering_rad
         pressure = [v for d in self._pressure_demands for v in d.update(self._receiver, now_ns, self._pedal)]
-        motor = motor_demand_nm(self._receiver, now_ns)
         hold_nm = self._hold_torque_nm(target)
-        for i in range(4):
-            trace_p, trace_m = direct.pressure_pa[i], direct.motor_nm[i]
-            running = start is not None
-            u[U.pressure_demand_pa + i] = value_at(trace_p, time_s) if trace_p and running else pressure[i]
-            u[U.motor_demand_nm + i] = hold_nm + (value_at(trace_m, time_s) if trace_m and running else motor[i])
+        motor = [hold_nm + v for v in motor_demand_nm(self._receiver, now_ns)]
+        if start is not None:
+            pressure = [value_at(t, time_s) if t else v for t, v in zip(direct.pressure_pa, pressure, strict=True)]
+            motor = [value_at(t, time_s) if t else v for t, v in zip(direct.motor_nm, motor, strict=True)]
+        u[U.pressure_demand_pa : U.pressure_demand_pa + 4] = pressure
+        u[U.motor_demand_nm : U.motor_demand_nm + 4] = motor
+        self._partners.enter(now_ns, u)
 
     def _hold_torque_nm(self, target_mps: float | None) -> float:
         if target_mps is None or self._pedal > driver.PEDAL_FREE:
             return 0.0
         radius, y = self._parameters.wheel.rolling_radius_m, self._y
-        resistance = float(y[Y.drag_n] + y[OUTPUT.slice("rolling_torque_nm")].sum() / radius)
+        resistance = y[Y.drag_n] + y[Y.rolling_torque_nm : Y.rolling_torque_nm + 4].sum() / radius
         mass = self._parameters.vehicle.mass_kg
-        return driver.drive_force(target_mps, self._x[X.speed_mps], mass, resistance, y[Y.grade]) * radius / 4.0
+        speed, grade = float(self._x[X.speed_mps]), float(y[Y.grade])
+        return driver.drive_force(target_mps, speed, mass, float(resistance), grade) * radius / 4.0
 
     def _override_road(self, now_ns: int) -> None:
         live = self._stimulus(StimulusRoad, now_ns)
@@ -207,68 +186,20 @@ class PlantNode:
                 if value is not None:
                     self._road[:, column] = value
 
-    def _measured(self, now_ns: int) -> list[Message]:
-        """What the played nodes send."""
+    def _tell(self, now_ns: int) -> list[Message]:
+        """Frames of the played nodes, and the truth."""
         x, y, sensors, play = self._x, self._y, self._sensors, self._play
         out: list[Message] = []
         if "DRIVER" in play:
-            out += [
-                BrakePedal(*sensors.pedal(self._pedal)),
-                Steering(sensors.steering_wheel_rad(self._steering_rad)),
-            ]
+            out += reports.driver_messages(sensors, self._pedal, self._steering_rad)
         if "SENSORS" in play:
-            speed = sensors.wheel_speed_rad_s(x)
-            out += [
-                WheelSpeedFront(speed[0], speed[1]),
-                WheelSpeedRear(speed[2], speed[3]),
-                BodyMotion(*sensors.body_motion(x)),
-            ]
+            out += reports.sensor_messages(sensors, x)
         if "EHB" in play:
-            pressure = sensors.pressure_pa(y)
-            front, rear = self._pressure_demands
-            out += [
-                EhbPressureFront(pressure[0], pressure[1], front.state),
-                EhbPressureRear(pressure[2], pressure[3], rear.state),
-            ]
+            out += reports.ehb_messages(sensors, y, *[demand.state for demand in self._pressure_demands])
         if "IWM" in play:
-            current = sensors.current_a(y)
-            able = [float(v) for v in y[OUTPUT.slice("motor_available_nm")]]
-            state = [self._motor_state(i) for i in range(4)]
-            out += [
-                MotorStatusFront(current[0], able[0], state[0], current[1], able[1], state[1]),
-                MotorStatusRear(current[2], able[2], state[2], current[3], able[3], state[3]),
-            ]
+            out += reports.motor_messages(sensors, y, self._switch[S.motor_alive : S.motor_alive + 4].tolist())
         if "BATTERY" in play and self._transmitter.due(BatteryStatus, now_ns):
-            out.append(BatteryStatus(float(x[X.state_of_charge]), float(y[Y.charge_power_limit_w])))
+            out.append(reports.battery_message(x, y))
+        out += reports.truth_messages(x, y, self.state)
+        out.append(reports.reception_message(self._receiver))
         return out
-
-    def _motor_state(self, i: int) -> MotorState:
-        if self._switch[S.motor_alive + i] == 0.0:
-            return MotorState.FAILED
-        return MotorState.OK if self._y[Y.motor_derating + i] >= 1.0 else MotorState.DERATED
-
-    def _truth(self) -> list[Message]:
-        x, y = self._x, self._y
-
-        def four(vector: np.ndarray[tuple[int], np.dtype[np.float64]], where: slice) -> list[float]:
-            return [float(v) for v in vector[where]]
-
-        front_p, rear_p, front_m, rear_m = (self._receiver.counter(kind) for kind in DEMANDS)
-        return [
-            TruthMotion(float(x[X.speed_mps]), float(y[Y.acceleration_mps2]), float(x[X.distance_m]), self.state),
-            TruthWheelTorque(*four(y, OUTPUT.slice("wheel_torque_nm"))),
-            TruthFrictionTorque(*four(y, OUTPUT.slice("friction_torque_nm"))),
-            TruthPadFriction(*four(x, STATE.slice("pad_friction"))),
-            TruthDiscTemperature(*four(x, STATE.slice("disc_temperature_k"))),
-            TruthLongitudinalForce(*four(y, OUTPUT.slice("longitudinal_force_n"))),
-            TruthWheelLoad(*four(y, OUTPUT.slice("wheel_load_n"))),
-            TruthEnergy(float(x[X.recuperated_j]), float(x[X.friction_heat_j])),
-            PlantReception(
-                NO_COUNTER if front_p is None else front_p,
-                NO_COUNTER if rear_p is None else rear_p,
-                NO_COUNTER if front_m is None else front_m,
-                NO_COUNTER if rear_m is None else rear_m,
-                min(self._receiver.lost, 4095),
-                min(self._receiver.corrupt, 4095),
-            ),
-        ]

@@ -4,12 +4,12 @@ import zlib
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from plant.layout import Vector
 from plant.parameters.sensing import SensorParameters
-from plant.vectors import OUTPUT, STATE, X
+from plant.vectors import X, Y
 
-Vector = NDArray[np.float64]
+BLOCK = 256  # samples drawn at once
 
 
 class Noise:
@@ -18,14 +18,19 @@ class Noise:
     def __init__(self, seed: int) -> None:
         self._seed = seed
         self._streams: dict[str, np.random.Generator] = {}
+        self._drawn: dict[str, list[float]] = {}
 
-    def normal(self, signal: str, count: int) -> Vector:
+    def normal(self, signal: str, count: int) -> list[float]:
         """``count`` samples with standard deviation 1."""
-        stream = self._streams.get(signal)
-        if stream is None:
-            stream = np.random.default_rng([self._seed, zlib.crc32(signal.encode())])
-            self._streams[signal] = stream
-        return stream.standard_normal(count)
+        drawn = self._drawn.get(signal)
+        if not drawn:
+            if signal not in self._streams:
+                self._streams[signal] = np.random.default_rng([self._seed, zlib.crc32(signal.encode())])
+            drawn = self._streams[signal].standard_normal(count * BLOCK).tolist()
+            self._drawn[signal] = drawn
+        taken = drawn[-count:]
+        del drawn[-count:]
+        return taken
 
 
 class ToothedWheels:
@@ -39,70 +44,73 @@ class ToothedWheels:
     def __init__(self, parameters: SensorParameters, x: Vector, wheel_speed_rad_s: float) -> None:
         self._pitch = 2.0 * pi / parameters.teeth
         self._timeout_s = parameters.tooth_timeout_s
-        self._time = x[STATE.slice("tooth_time_s")].copy()
-        self._count = x[STATE.slice("tooth_count")].copy()
-        self.speed = np.full(4, abs(wheel_speed_rad_s))
+        self._time: list[float] = x[X.tooth_time_s : X.tooth_time_s + 4].tolist()
+        self._count: list[float] = x[X.tooth_count : X.tooth_count + 4].tolist()
+        self._speed = [abs(wheel_speed_rad_s)] * 4
 
-    def sample(self, x: Vector) -> Vector:
+    def sample(self, x: Vector) -> list[float]:
         """Speeds at the time of ``x``, rad/s."""
-        now = x[X.time_s]
-        times, counts = x[STATE.slice("tooth_time_s")], x[STATE.slice("tooth_count")]
+        now = float(x[X.time_s])
+        times: list[float] = x[X.tooth_time_s : X.tooth_time_s + 4].tolist()
+        counts: list[float] = x[X.tooth_count : X.tooth_count + 4].tolist()
         for i in range(4):
             passed = counts[i] - self._count[i]
+            waited = now - self._time[i]
             if passed > 0.0 and times[i] > self._time[i]:
-                self.speed[i] = passed * self._pitch / (times[i] - self._time[i])
+                self._speed[i] = passed * self._pitch / (times[i] - self._time[i])
                 self._time[i], self._count[i] = times[i], counts[i]
-            else:
-                waited = now - self._time[i]
-                bound = self._pitch / waited if 0.0 < waited < self._timeout_s else 0.0
-                if waited > 0.0:
-                    self.speed[i] = min(self.speed[i], bound)
-        return self.speed
+            elif waited >= self._timeout_s:
+                self._speed[i] = 0.0
+            elif waited > 0.0:
+                self._speed[i] = min(self._speed[i], self._pitch / waited)
+        return self._speed
 
 
 class Sensors:
-    """All measured signals of one car."""
+    """All measured signals of one car, whose wheels turn at a speed when it starts."""
 
-    def __init__(self, parameters: SensorParameters, torque_constant_nm_a: float, seed: int) -> None:
+    def __init__(
+        self, parameters: SensorParameters, torque_constant_nm_a: float, seed: int, x: Vector, wheel_speed_rad_s: float
+    ) -> None:
         self._p = parameters
         self._torque_constant = torque_constant_nm_a
         self._noise = Noise(seed)
-        self._pressure_offset = np.array(parameters.pressure_offset_pa)
-
-    def start(self, x: Vector, wheel_speed_rad_s: float) -> None:
-        """Begin with the wheels turning at a speed."""
-        self._wheels = ToothedWheels(self._p, x, wheel_speed_rad_s)
+        self._wheels = ToothedWheels(parameters, x, wheel_speed_rad_s)
 
     def wheel_speed_rad_s(self, x: Vector) -> list[float]:
-        """Toothed-wheel speeds with tooth errors in proportion."""
-        measured = self._wheels.sample(x) * (1.0 + self._p.wheel_speed_noise * self._noise.normal("wheel_speed", 4))
-        return [float(v) for v in measured]
+        """Toothed-wheel speeds; the teeth's errors grow with the speed."""
+        noise, share = self._noise.normal("wheel_speed", 4), self._p.wheel_speed_noise
+        return [speed * (1.0 + share * n) for speed, n in zip(self._wheels.sample(x), noise, strict=True)]
 
     def body_motion(self, x: Vector) -> tuple[float, float, float]:
         """Longitudinal and lateral specific force, m/s2, and yaw rate, rad/s."""
         p, noise = self._p, self._noise.normal("imu", 3)
+        longitudinal, lateral, yaw_rate = x[X.imu_longitudinal_mps2 : X.imu_longitudinal_mps2 + 3].tolist()
         return (
-            x[X.imu_longitudinal_mps2] + p.acceleration_offset_mps2[0] + p.acceleration_noise_mps2 * noise[0],
-            x[X.imu_lateral_mps2] + p.acceleration_offset_mps2[1] + p.acceleration_noise_mps2 * noise[1],
-            x[X.imu_yaw_rate_rad_s] + p.yaw_rate_offset_rad_s + p.yaw_rate_noise_rad_s * noise[2],
+            longitudinal + p.acceleration_offset_mps2[0] + p.acceleration_noise_mps2 * noise[0],
+            lateral + p.acceleration_offset_mps2[1] + p.acceleration_noise_mps2 * noise[1],
+            yaw_rate + p.yaw_rate_offset_rad_s + p.yaw_rate_noise_rad_s * noise[2],
         )
 
     def pressure_pa(self, y: Vector) -> list[float]:
         """Pressures at the calipers."""
-        noise = self._p.pressure_noise_pa * self._noise.normal("pressure", 4)
-        return [float(v) for v in y[OUTPUT.slice("pressure_pa")] + self._pressure_offset + noise]
+        noise, p = self._noise.normal("pressure", 4), self._p
+        true: list[float] = y[Y.pressure_pa : Y.pressure_pa + 4].tolist()
+        return [true[i] + p.pressure_offset_pa[i] + p.pressure_noise_pa * noise[i] for i in range(4)]
 
     def current_a(self, y: Vector) -> list[float]:
         """Torque-producing motor currents, signed like the torque."""
-        true = y[OUTPUT.slice("motor_torque_nm")] / self._torque_constant
-        return [float(v) for v in true + self._p.current_noise_a * self._noise.normal("current", 4)]
+        noise, sigma = self._noise.normal("current", 4), self._p.current_noise_a
+        true: list[float] = y[Y.motor_torque_nm : Y.motor_torque_nm + 4].tolist()
+        return [torque / self._torque_constant + sigma * n for torque, n in zip(true, noise, strict=True)]
 
     def pedal(self, travel: float) -> tuple[float, float]:
         """Both channels of the pedal travel."""
         noise, p = self._noise.normal("pedal", 2), self._p
-        one, two = (travel + p.pedal_offset[k] + p.pedal_noise * float(noise[k]) for k in (0, 1))
-        return one, two
+        return travel + p.pedal_offset[0] + p.pedal_noise * noise[0], travel + p.pedal_offset[
+            1
+        ] + p.pedal_noise * noise[1]
 
     def steering_wheel_rad(self, angle_rad: float) -> float:
         """Steering-wheel angle."""
-        return angle_rad + self._p.steering_noise_rad * float(self._noise.normal("steering", 1)[0])
+        return angle_rad + self._p.steering_noise_rad * self._noise.normal("steering", 1)[0]
