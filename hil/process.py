@@ -26,6 +26,15 @@ def end_with_parent() -> None:
         os.kill(os.getpid(), signal.SIGTERM)
 
 
+def output_of(command: Sequence[str], timeout_s: float) -> str | None:
+    """Return the standard output of a command; None where there is none such, it fails, or does not end in time."""
+    try:
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=timeout_s, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout.decode(errors="replace") if done.returncode == 0 else None
+
+
 class StopSignal:
     """Turns SIGTERM and SIGINT into a flag, so that a loop ends between two ticks.
 
