@@ -26,7 +26,7 @@ from plant.vectors import C, P, U, X, Y
 from plant.vehicle import GRAVITY_MPS2, rolling_resistance
 
 Vector = NDArray[np.float64]
-SLIP_LIMIT = 2.0  # a spinning wheel at standstill would wind its slip up without end
+BLEED_MPS = 1.0
 LOAD_FLOOR_N = 50.0  # an unloaded tyre is computed at this load, and its force scaled down
 FRICTION_FLOOR = 1e-3
 
@@ -58,10 +58,20 @@ def wheel_load(i: int, torque: float, cos_grade: float, x: Vector, p: Vector) ->
 
 
 @equation
-def slip_rate(slip: float, sliding_mps: float, transport_mps: float, gain_1_m: float) -> float:
-    """Rate of a relaxed slip, 1/s: sigma s' = v_s - |v| s (Pacejka 2006, section 7.2), stopped at the limit."""
-    rate = (sliding_mps - transport_mps * slip) * gain_1_m
-    return 0.0 if (abs(slip) > SLIP_LIMIT) & (rate * slip > 0.0) else rate
+def slip_rate(slip: float, sliding_mps: float, transport_mps: float, gain_1_m: float, limit: float) -> float:
+    """Rate of a relaxed slip, 1/s: sigma s' = v_s - |v| s (Pacejka 2006, section 7.2), less what bleeds off.
+
+    A carcass holds no more than the friction: slip beyond ``limit`` (where sliding is complete) bleeds off at
+    `BLEED_MPS` even at rest, so that a locked wheel does not spring back by its whole slip when the car stops.
+    """
+    excess = slip - min(max(slip, -limit), limit)
+    return (sliding_mps - transport_mps * slip - BLEED_MPS * excess) * gain_1_m
+
+
+@equation
+def slip_decay(slip: float, transport_mps: float, gain_1_m: float, limit: float) -> float:
+    """Own decay rate of a relaxed slip, 1/s."""
+    return (transport_mps + (BLEED_MPS if abs(slip) > limit else 0.0)) * gain_1_m
 
 
 @equation
@@ -96,17 +106,15 @@ def contacts(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, cos_grade:
         dfz = load_offset(loaded, p)
         stiffness_x, stiffness_y = slip_stiffness(loaded, dfz, p), -cornering_stiffness(loaded, p)
         least = p[P.tyre_relaxation_least_m]
-        gain_x = 1.0 / sliding_relaxation(
-            relaxation_longitudinal(loaded, dfz, p), slip, stiffness_x, peak_longitudinal(loaded, dfz, grip, p), least
-        )
-        gain_y = 1.0 / sliding_relaxation(
-            relaxation_lateral(loaded, p), side_slip, stiffness_y, peak_lateral(loaded, dfz, grip, p), least
-        )
+        limit_x = 3.0 * peak_longitudinal(loaded, dfz, grip, p) / stiffness_x
+        limit_y = 3.0 * peak_lateral(loaded, dfz, grip, p) / stiffness_y
+        gain_x = 1.0 / sliding_relaxation(relaxation_longitudinal(loaded, dfz, p), slip, limit_x, least)
+        gain_y = 1.0 / sliding_relaxation(relaxation_lateral(loaded, p), side_slip, limit_y, least)
         y[Y.slip_gain_1_m + i] = gain_x
-        y[Y.rate + X.slip + i] = slip_rate(slip, sliding, transport, gain_x)
-        y[Y.rate + X.side_slip + i] = slip_rate(side_slip, across, transport, gain_y)
-        y[Y.decay_1_s + X.slip + i] = transport * gain_x
-        y[Y.decay_1_s + X.side_slip + i] = transport * gain_y
+        y[Y.rate + X.slip + i] = slip_rate(slip, sliding, transport, gain_x, limit_x)
+        y[Y.rate + X.side_slip + i] = slip_rate(side_slip, across, transport, gain_y, limit_y)
+        y[Y.decay_1_s + X.slip + i] = slip_decay(slip, transport, gain_x, limit_x)
+        y[Y.decay_1_s + X.side_slip + i] = slip_decay(side_slip, transport, gain_y, limit_y)
 
         damping = low_speed_damping(transport, p[P.tyre_low_speed_mps], p[P.tyre_low_speed_damping_ns_m])
         side = 1.0 - 2.0 * (i % 2)

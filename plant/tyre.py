@@ -154,10 +154,10 @@ def relaxation_lateral(load_n: float, p: Vector) -> float:
 
 
 @equation
-def sliding_relaxation(length_m: float, slip: float, stiffness: float, peak: float, least_m: float) -> float:
-    """Relaxation length left when the contact slides, m: sigma (1 - K |s| / (3 D)), at least ``least_m``.
+def sliding_relaxation(length_m: float, slip: float, limit: float, least_m: float) -> float:
+    """Relaxation length left when the contact slides, m: sigma (1 - |s| / limit), at least ``least_m``.
 
-    Pacejka 2006, chapter 7, restricted fully non-linear model: the carcass cannot be wound up further than the
-    friction allows, so that a locked wheel does not spring back after the stop.
+    Pacejka 2006, chapter 7, restricted fully non-linear model; ``limit`` is 3 D / K, where a brush model slides
+    completely.
     """
-    return max(length_m * (1.0 - abs(stiffness * slip) / (3.0 * peak)), least_m)
+    return max(length_m * (1.0 - abs(slip) / limit), least_m)
