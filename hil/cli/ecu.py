@@ -23,6 +23,7 @@ def run(args: argparse.Namespace) -> int:
     scenario = load_scenario(args.scenario)
 
     def make() -> Node:
+        EcuNode(scenario.ecu, NODE_PERIOD_NS).step(0, [])  # compiles what the first tick would compile
         return EcuNode(scenario.ecu, NODE_PERIOD_NS)
 
     serve(ECU, make, args.bus, ready_fd=args.ready_fd, realtime=args.realtime, say=lambda s: print(s, file=sys.stderr))
