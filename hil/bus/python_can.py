@@ -11,10 +11,10 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from dbc.frame import BusName, Frame, LinkEvent, LinkState, Received
-from hil.bus.adapter import error_number, open_driver, shut
 from hil.bus.bus import BusError, BusSpec
 from hil.bus.can_frame import pack_frame
 from hil.bus.error_frame import append_event, link_events
+from hil.bus.python_can_driver import error_number, open_driver, shut
 from hil.rt.clock import monotonic_ns, wall_time_ns
 
 if TYPE_CHECKING:
