@@ -6,46 +6,55 @@ from plant.hydraulics import pedal_map_pa
 from plant.parameters.brakes import EhbParameters
 
 DEMAND_TIMEOUT_NS = 40_000_000  # since the last valid frame
-READY_FRAMES = 10  # valid frames in a row before the manoeuvre starts
+SEQUENCE = 10  # valid demands in a row before an actuator follows, and before the manoeuvre starts
 EHB_DEMANDS = (EhbDemandFront, EhbDemandRear)
 MOTOR_DEMANDS = (MotorDemandFront, MotorDemandRear)
 DEMANDS = (*EHB_DEMANDS, *MOTOR_DEMANDS)
+Demand = EhbDemandFront | EhbDemandRear | MotorDemandFront | MotorDemandRear
 
 
-def ready(receiver: Receiver) -> bool:
-    """Whether every demand has been valid for `READY_FRAMES` frames in a row, and is available."""
-    return all(
-        receiver.receptions[kind].valid_in_row >= READY_FRAMES and None not in (receiver.latest(kind) or (None,))
-        for kind in DEMANDS
-    )
+class DemandStream:
+    """Whether the demands of one message may be followed.
 
+    A demand is valid when its frame is, and both its values are available. An actuator follows after `SEQUENCE` valid
+    demands in a row, until one is not available or none has come for `DEMAND_TIMEOUT_NS`.
+    """
 
-def _alive(receiver: Receiver, kind: type[tuple[float | None, ...]], now_ns: int) -> bool:
-    age = receiver.age_ns(kind, now_ns)
-    return age is not None and age < DEMAND_TIMEOUT_NS
+    def __init__(self, kind: type[Demand]) -> None:
+        self._kind = kind
+        self._valid_in_row = 0
+        self.followed: tuple[float, float] | None = None
 
-
-def motor_demand_nm(receiver: Receiver, now_ns: int) -> list[float]:
-    """Torque demand of each motor; none on loss of the demand or where it is not available."""
-    demand: list[float] = []
-    for kind in MOTOR_DEMANDS:
-        message = receiver.latest(kind) if _alive(receiver, kind, now_ns) else None
-        demand += [0.0, 0.0] if message is None else [value or 0.0 for value in message]
-    return demand
+    def update(self, receiver: Receiver, now_ns: int) -> tuple[float, float] | None:
+        """Take the tick's frames; the values (left, right) to follow, or None."""
+        reception = receiver.receptions[self._kind]
+        age = receiver.age_ns(self._kind, now_ns)
+        message = receiver.latest(self._kind)
+        left, right = (None, None) if message is None else message
+        if left is None or right is None or age is None or age >= DEMAND_TIMEOUT_NS:
+            self._valid_in_row = 0
+            self.followed = None
+            return None
+        if reception.fresh:
+            self._valid_in_row = min(self._valid_in_row + 1, reception.valid_in_row)
+        if self._valid_in_row >= SEQUENCE or self.followed is not None:
+            self.followed = left, right
+        return self.followed
 
 
 class PressureDemand:
     """What the pressure control of one axle follows.
 
-    The demand while it is valid. Without it the brake's own pedal map, and never less for having lost the demand: at
-    the moment of loss the map is scaled up to the last demand, so that only the driver's foot releases the brake.
+    The demand while it may be followed. Without it the brake's own pedal map, and never less for having lost the
+    demand: at the moment of loss the map is scaled up to the last demand, so that only the driver's foot releases the
+    brake.
     """
 
     def __init__(self, kind: type[EhbDemandFront] | type[EhbDemandRear], parameters: EhbParameters) -> None:
-        self._kind = kind
+        self._stream = DemandStream(kind)
         self._p = parameters
-        self._last: list[float] = [0.0, 0.0]
-        self._scale: list[float] = [1.0, 1.0]
+        self._last = (0.0, 0.0)
+        self._scale = (1.0, 1.0)
         self.state = EhbState.OWN_PEDAL_MAP
 
     def _map_pa(self, travel: float) -> float:
@@ -54,15 +63,36 @@ class PressureDemand:
             travel, p.pedal_free_travel, p.pedal_map_linear_pa, p.pedal_map_square_pa, p.pedal_map_cubic_pa
         )
 
-    def update(self, receiver: Receiver, now_ns: int, travel: float) -> list[float]:
+    def update(self, receiver: Receiver, now_ns: int, travel: float) -> tuple[float, float]:
         """Pressures to follow from this tick on, Pa (left, right)."""
-        message = receiver.latest(self._kind) if _alive(receiver, self._kind, now_ns) else None
-        own = self._map_pa(travel)
-        if message is not None and None not in message:
+        demand = self._stream.update(receiver, now_ns)
+        if demand is not None:
             self.state = EhbState.DEMAND
-            self._last = [value or 0.0 for value in message]
-            return self._last
+            self._last = demand
+            return demand
+        own = self._map_pa(travel)
         if self.state is EhbState.DEMAND:
             self.state = EhbState.OWN_PEDAL_MAP
-            self._scale = [max(1.0, last / own) if own > 0.0 else 1.0 for last in self._last]
-        return [own * scale for scale in self._scale]
+            left, right = (max(1.0, last / own) if own > 0.0 else 1.0 for last in self._last)
+            self._scale = left, right
+        return own * self._scale[0], own * self._scale[1]
+
+
+class Demands:
+    """All four demand messages of the controller."""
+
+    def __init__(self, parameters: EhbParameters) -> None:
+        self.pressure = [PressureDemand(kind, parameters) for kind in EHB_DEMANDS]
+        self._motor = [DemandStream(kind) for kind in MOTOR_DEMANDS]
+
+    def update(self, receiver: Receiver, now_ns: int, travel: float) -> tuple[list[float], list[float]]:
+        """Pressures, Pa, and motor torques, N m, to follow from this tick on; a lost motor demand is none."""
+        pressure = [value for demand in self.pressure for value in demand.update(receiver, now_ns, travel)]
+        torque = [value for stream in self._motor for value in stream.update(receiver, now_ns) or (0.0, 0.0)]
+        return pressure, torque
+
+    @property
+    def followed(self) -> bool:
+        """Whether every actuator follows the controller."""
+        pressed = all(demand.state is EhbState.DEMAND for demand in self.pressure)
+        return pressed and all(stream.followed is not None for stream in self._motor)

@@ -8,7 +8,7 @@ from dbc.exchange import Receiver, Transmitter
 from dbc.frame import Frame, Received
 from dbc.messages import BatteryStatus
 from plant import driver, reports
-from plant.demands import DEMANDS, EHB_DEMANDS, PressureDemand, motor_demand_nm, ready
+from plant.demands import DEMANDS, Demands
 from plant.manoeuvre import Manoeuvre, value_at
 from plant.model import STEP_S, advance, healthy, initial_state, pack
 from plant.parameters.plant import PlantParameters
@@ -75,7 +75,7 @@ class PlantNode:
         self._receiver = Receiver((*DEMANDS, StimulusDriver, StimulusRoad))
         self._faults = Receiver((FaultCommand,))
         self._transmitter = Transmitter()
-        self._pressure_demands = [PressureDemand(kind, parameters.ehb) for kind in EHB_DEMANDS]
+        self._demands = Demands(parameters.ehb)
         self._pedal = 0.0
         self._steering_rad = 0.0
         self._last_ns: int | None = None
@@ -92,8 +92,9 @@ class PlantNode:
         self._receiver.accept(now_ns, inbox)
         self._partners.receiver.accept(now_ns, inbox)
         self._take_faults(now_ns, inbox)
+        pressure_pa, motor_nm = self._demands.update(self._receiver, now_ns, self._pedal)
         self._follow_manoeuvre(now_ns, elapsed_ns)
-        self._drive(now_ns)
+        self._drive(now_ns, pressure_pa, motor_nm)
         return self._transmitter.frames(now_ns, self._tell(now_ns))
 
     def _advance(self, elapsed_ns: int) -> None:
@@ -121,7 +122,7 @@ class PlantNode:
     def _follow_manoeuvre(self, now_ns: int, elapsed_ns: int) -> None:
         manoeuvre = self._manoeuvre
         if self.manoeuvre_start_ns is None:
-            if manoeuvre.wait_for_demands and not manoeuvre.direct.complete and not ready(self._receiver):
+            if manoeuvre.wait_for_demands and not manoeuvre.direct.complete and not self._demands.followed:
                 return
             for part in RESET_AT_START:
                 where = STATE.slice(part)
@@ -139,8 +140,8 @@ class PlantNode:
         age = self._receiver.age_ns(kind, now_ns)
         return None if age is None or age > STIMULUS_TIMEOUT_NS else self._receiver.latest(kind)
 
-    def _drive(self, now_ns: int) -> None:
-        """Driver, road and demands from this tick on."""
+    def _drive(self, now_ns: int, pressure: list[float], motor: list[float]) -> None:
+        """Driver, road and demands (Pa, N m) from this tick on."""
         manoeuvre, start = self._manoeuvre, self.manoeuvre_start_ns
         time_s = 0.0 if start is None else (now_ns - start) * 1e-9
         pedal = 0.0 if start is None else driver.pedal_travel(manoeuvre, time_s)
@@ -158,9 +159,8 @@ class PlantNode:
 
         u, direct = self._u, manoeuvre.direct
         u[U.steering_wheel_rad] = self._steering_rad
-        pressure = [v for d in self._pressure_demands for v in d.update(self._receiver, now_ns, self._pedal)]
         hold_nm = self._hold_torque_nm(target)
-        motor = [hold_nm + v for v in motor_demand_nm(self._receiver, now_ns)]
+        motor = [hold_nm + value for value in motor]
         if start is not None:
             pressure = [value_at(t, time_s) if t else v for t, v in zip(direct.pressure_pa, pressure, strict=True)]
             motor = [value_at(t, time_s) if t else v for t, v in zip(direct.motor_nm, motor, strict=True)]
@@ -195,7 +195,7 @@ class PlantNode:
         if "SENSORS" in play:
             out += reports.sensor_messages(sensors, x)
         if "EHB" in play:
-            out += reports.ehb_messages(sensors, y, *[demand.state for demand in self._pressure_demands])
+            out += reports.ehb_messages(sensors, y, *[demand.state for demand in self._demands.pressure])
         if "IWM" in play:
             out += reports.motor_messages(sensors, y, self._switch[S.motor_alive : S.motor_alive + 4].tolist())
         if "BATTERY" in play and self._transmitter.due(BatteryStatus, now_ns):

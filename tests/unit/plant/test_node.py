@@ -26,11 +26,13 @@ from dbc.messages import (
     EhbDemandFront,
     EhbDemandRear,
     EhbPressureFront,
+    EhbPressureRear,
     EhbState,
     MotorDemandFront,
     MotorDemandRear,
     MotorState,
     MotorStatusFront,
+    MotorStatusRear,
     WheelSpeedFront,
 )
 from plant.manoeuvre import DirectDemands, Manoeuvre, SpeedPhase
@@ -42,7 +44,9 @@ READ = (
     BodyMotion,
     WheelSpeedFront,
     EhbPressureFront,
+    EhbPressureRear,
     MotorStatusFront,
+    MotorStatusRear,
     TruthMotion,
     TruthWheelTorque,
     TruthFrictionTorque,
@@ -236,3 +240,71 @@ def test_wheel_speed_is_zero_at_standstill(make):
     rig = make(pressure_pa=60e5)
     rig.until(lambda: rig.node.state is ManoeuvreState.FINISHED)
     assert rig[WheelSpeedFront].wheel_speed_fl_rad_s == 0.0
+
+
+def test_demands_not_available_do_not_start_the_manoeuvre(make):
+    rig = make()
+    rig.silent = True
+    rig.extra = [
+        EhbDemandFront(None, None),
+        EhbDemandRear(None, None),
+        MotorDemandFront(None, None),
+        MotorDemandRear(None, None),
+    ]
+    rig.for_seconds(0.5)
+    assert rig.node.manoeuvre_start_ns is None
+    assert rig[EhbPressureFront].ehb_state_front is EhbState.OWN_PEDAL_MAP
+    rig.silent, rig.extra = False, []
+    rig.for_seconds(0.12)
+    assert rig.node.manoeuvre_start_ns is not None
+
+
+def test_the_brake_comes_back_after_ten_demands_in_a_row(make):
+    rig = make(pressure_pa=20e5)
+    rig.for_seconds(1.0)
+    rig.silent = True
+    rig.for_seconds(0.2)
+    rig.silent = False
+    states = [rig[EhbPressureFront].ehb_state_front for _ in rig.run(0.12)]
+    assert states.index(EhbState.DEMAND) in (10, 11)
+
+
+def test_real_brakes_beside_the_plant(paper_car):
+    """With the EHB elsewhere, its measured pressure brakes the car."""
+    node = PlantNode(paper_car, replace(STOP, wait_for_demands=False), 1, play=SENDERS - {"EHB"})
+    rig = Rig(node)
+    rig.silent = True
+    rig.extra = [EhbPressureFront(40e5, 40e5, EhbState.DEMAND), EhbPressureRear(40e5, 40e5, EhbState.DEMAND)]
+    rig.for_seconds(1.0)
+    assert rig[TruthMotion].acceleration_mps2 == pytest.approx(-5.2, abs=0.3)
+
+
+def test_real_motors_beside_the_plant(paper_car):
+    node = PlantNode(paper_car, replace(STOP, wait_for_demands=False, pedal=()), 1, play=SENDERS - {"IWM"})
+    rig = Rig(node)
+    rig.silent = True
+    one = (-100.0, 500.0, MotorState.OK)
+    rig.extra = [MotorStatusFront(*one, *one), MotorStatusRear(*one, *one)]
+    rig.for_seconds(1.0)
+    expected = -100.0 * paper_car.motor.torque_constant_nm_a
+    assert rig[TruthWheelTorque].wheel_torque_fl_nm == pytest.approx(expected, abs=1.0)
+    rig.extra = []
+    rig.for_seconds(0.1)
+    assert rig[TruthWheelTorque].wheel_torque_fl_nm == pytest.approx(0.0, abs=1.0)
+
+
+def test_a_real_driver_beside_the_plant(paper_car):
+    node = PlantNode(paper_car, STOP, 1, play=SENDERS - {"DRIVER"})
+    rig = Rig(node)
+    rig.silent = True
+    rig.extra = [BrakePedal(0.5, 0.5)]
+    rig.for_seconds(0.5)
+    assert rig[EhbPressureFront].pressure_fl_pa > 5e5  # its own pedal map
+
+
+@pytest.mark.parametrize(
+    ("argument", "message"), [({"play": frozenset({"RADIO"})}, "RADIO"), ({"period_ns": 1}, "multiple")]
+)
+def test_refuses_what_it_cannot_be(paper_car, argument, message):
+    with pytest.raises(ValueError, match=message):
+        PlantNode(paper_car, STOP, 1, **argument)
