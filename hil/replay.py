@@ -4,7 +4,7 @@
 
 ``start`` is the next multiple of 100 ms of the clock plus the role's phase, so that a replayed plant keeps its place
 between the ticks of a live ECU. Frames leave in the order of their stamps. After a stall of the machine whatever is
-overdue is sent at once and counted as late; but of what is overdue by more than one cycle of the nodes (10 ms), only
+overdue is sent at once and counted as late; but of what is overdue by more than two cycles of the nodes (20 ms), only
 each identifier's newest frame, and every frame of a message without a cycle: a burst of old values helps nobody. The
 rest is counted as superseded. The frames after a stall keep their own deadlines: no drift.
 """
@@ -32,7 +32,7 @@ LISTEN_NS = 250_000_000
 """How long the bus is listened to before the start: two cycles of the slowest message and more."""
 LATE_NS = 1_000_000
 """A frame sent more than this after its deadline counts as late."""
-STALL_NS = NODE_PERIOD_NS
+STALL_NS = 2 * NODE_PERIOD_NS
 """Overdue by more than this, an older frame gives way to a newer one of the same identifier."""
 _LOOK_NS = 20_000_000  # how often the bus and the stop are looked at in a gap of the log
 _LEAD_NS = 1_000_000  # at least this between now and the first deadline

@@ -25,8 +25,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         description="Send a recorded log back on a bus, each frame at its own time. The channels vehicle and bench of "
         "our own recordings go to the buses of these names, a foreign log's only channel goes to the vehicle bus.",
         epilog="The bus is listened to first: an identifier that somebody else sends is never sent (exit code 2 before "
-        "the start; during the replay that sender's messages are left to him, exit code 3 at the end). After a stall "
-        "overdue frames are sent at once, of each cyclic identifier no more than 10 ms of the past.",
+        "the start; during the replay that sender's messages are no longer sent: exit code 3 at the end). After a "
+        "stall overdue frames are sent at once, but no more than 20 ms of the past of each cyclic message.",
     )
     parser.add_argument("log", type=Path, metavar="LOG", help="candump, ASC, BLF, TRC, MF4, CSV or Parquet log")
     add_bus(parser)
@@ -140,7 +140,7 @@ def _print_text(facts: dict[str, Any]) -> None:
         Number("Lateness, 99th percentile", lateness["p99"], "ms"),
         Number("Lateness, largest", lateness["max"], "ms"),
         Number("Frames late", facts["late"], note=f"by more than {LATE_NS * 1e-6:g} ms"),
-        Number("Frames superseded", facts["superseded"], note="overdue after a stall, a newer one was due as well"),
+        Number("Frames superseded", facts["superseded"], note="older ones after a stall"),
         Number("Frames refused", refused, note="their sender is live on the bus"),
     ]
     numbers += [Number(f"Left out: {reason}", count) for reason, count in facts["left_out"].items()]

@@ -10,7 +10,7 @@ from processes import wait_until
 
 from dbc.contract import spec_of
 from dbc.frame import BusName, Frame
-from dbc.messages import BrakeMode, BrakeStatus, EhbDemandFront
+from dbc.messages import BrakeMode, BrakePedal, BrakeStatus, EhbDemandFront
 from ecu.node import EcuNode
 from hil.bus.bus import open_bus
 from hil.node_process import ECU, NODE_PERIOD_NS, PLANT
@@ -91,6 +91,20 @@ def test_a_live_plant_is_not_talked_over(brakebench, start, channel, log):
         assert "somebody already sends 0x" in done.stderr
         assert "stop that one, or replay another role" in done.stderr
         brakebench("replay", str(log), "--role", "ecu", "--speed", "10", "--bus", channel)
+
+
+def test_who_comes_in_during_the_replay_is_left_alone(start, channel, log):
+    pedal = spec_of(BrakePedal)
+    with open_bus(channel, BusName.VEHICLE) as bus:
+        process = start("replay", str(log), "--role", "plant", "--bus", channel, "--json")
+        wait_until(lambda: bus.receive(0.1), "replayed frames")
+        bus.send([Frame(BusName.VEHICLE, pedal.can_id, bytes(pedal.length))])
+        out, err = process.communicate(timeout=30)
+    result = json.loads(out)
+    assert process.returncode == 3, err
+    assert result["live"] == ["0xA0 (BRAKE_PEDAL of DRIVER) on the vehicle bus"]
+    assert {row["message"] for row in result["refused"]} == {"BRAKE_PEDAL", "STEERING"}
+    assert result["sent"] > 0
 
 
 def test_ctrl_c_ends_it_with_a_result(start, channel, log):
