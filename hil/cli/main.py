@@ -8,7 +8,7 @@ from importlib.metadata import version
 
 from hil.errors import BrakebenchError
 
-COMMANDS = ("run", "ecu", "plant", "record", "decode", "convert", "perf")
+COMMANDS = ("run", "ecu", "plant", "record", "replay", "decode", "convert", "doctor", "perf")
 """Subcommands in the order of the help; each is a module of this package."""
 
 
