@@ -118,8 +118,10 @@ def _coverage(args: argparse.Namespace, brake: "Brake") -> int:
 def _write(args: argparse.Namespace, study: "Study", parameters: "FrictionBrakeParameters", report: "Report") -> None:
     from hil.identify.files import as_json, pad_toml
     from hil.identify.summary import figures
+    from hil.parameters import ParameterError, load_set
     from hil.report.figure import write_figure
     from hil.report.html import write_html
+    from plant.parameters.brakes import OstermeyerParameters
 
     try:
         args.out.mkdir(parents=True, exist_ok=True)
@@ -131,6 +133,10 @@ def _write(args: argparse.Namespace, study: "Study", parameters: "FrictionBrakeP
         (args.out / "pad.toml").write_text(table, encoding="utf-8")
     except OSError as error:
         raise BrakebenchError(f"{args.out}: cannot be written ({error.strerror}); give another directory") from error
+    try:
+        load_set(args.out / "pad.toml", OstermeyerParameters)
+    except ParameterError as error:
+        print(f"the plant cannot take this pad: {error}; are geometry and units right?", file=sys.stderr)
     print(f"report, figures, result.json and pad.toml written to {args.out}", file=sys.stderr)
 
 
@@ -150,7 +156,10 @@ def _brake(args: argparse.Namespace, parameters: "FrictionBrakeParameters") -> "
 def _provenance(study: "Study", source: str, axle: str) -> dict[str, object]:
     records = [study.record] + ([study.validation.record] if study.validation else [])
     return {
-        "records": {r.name: {"samples": r.time_s.size, "head of the file": "; ".join(r.remarks)} for r in records},
+        "records": {
+            r.name: {"samples": r.time_s.size, "averaged from": r.averaged, "head of the file": "; ".join(r.remarks)}
+            for r in records
+        },
         "brake": {"parameter set": source, "axle": axle, **asdict(study.brake)},
         "brakebench": version("brakebench"),
     }

@@ -47,7 +47,7 @@ TESTS = (
     Test("dyno_test1.csv", frequency_hz=0.1, start_degc=70.0, film=0.48, seed=101),
     Test("dyno_test2.csv", frequency_hz=0.2, start_degc=70.0, film=0.44, seed=202),
 )
-"""As in the paper's Figure 3: test 2 at twice the frequency of test 1; 50 km/h at the rim."""
+"""As in the paper's Figure 3: test 2 at twice the frequency of test 1."""
 
 
 @dataclass(frozen=True)

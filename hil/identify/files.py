@@ -16,7 +16,8 @@ def as_json(study: Study) -> dict[str, Any]:
 
     Keys
     ----
-    record, validation_record : name, samples, duration_s, remarks of the file's head (null without validation).
+    record, validation_record : name, samples, duration_s, averaged (samples of the file in each), remarks of the
+        file's head (null without validation).
     brake : geometry taken, SI units.
     heating : "printed" (N v) or "friction" (mu N v), the form taken; forms : each form's residuals and likelihood.
     parameters : symbol, unit, meaning, value, low, high (95 %), half_width, told (well, roughly, poorly); in the order
@@ -105,6 +106,7 @@ def _record(record: Record) -> dict[str, Any]:
         "name": record.name,
         "samples": record.time_s.size,
         "duration_s": float(record.time_s[-1]),
+        "averaged": record.averaged,
         "remarks": list(record.remarks),
     }
 

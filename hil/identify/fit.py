@@ -25,6 +25,7 @@ _KEPT = 3
 _SAME = 1e-3  # relative difference of two costs that are the same valley
 _STEP = 1e-5  # of a logarithm, for central differences
 _ROUNDS = 6
+_FINEST = 0.01  # N m and K: no sensor is weighed as better than that
 _NAMES = ("mu at rest", "settling rate", "eps", "c", "temperature rise", "mu at the start", "temperature at the start")
 MODEL_COORDINATES = 5
 """The first coordinates are the model's; the two start values follow."""
@@ -91,7 +92,7 @@ def fit(record: Record, brake: Brake, heating: Heating) -> Fit:
             "record a brake that touches"
         )
     scale = Scale(float(driven.power_w.mean()), float(record.temperature_k.mean()))
-    weights = np.array([record.torque_nm.std(), record.temperature_k.std()])
+    weights = np.maximum([record.torque_nm.std(), record.temperature_k.std()], _FINEST)
     lower, upper = _bounds(scale, driven)
     best, valleys = _from_starts(record, driven, scale, heating, weights, lower, upper)
     for _ in range(_ROUNDS):
@@ -208,7 +209,7 @@ def _residual_sizes(record: Record, driven: Drive, scale: Scale, heating: Heatin
     course = predict(driven, scale.pad(x), _start(x), heating)
     torque, temperature = course.torque_nm - record.torque_nm, course.temperature_k - record.temperature_k
     sizes = np.sqrt([np.mean(torque**2), np.mean(temperature**2)])
-    return course, np.maximum(sizes, 1e-9)
+    return course, np.maximum(sizes, _FINEST)
 
 
 def _covariance(sensitivity: Floats, noises: tuple[Noise, Noise]) -> Floats:

@@ -24,6 +24,7 @@ _SHORTEST_S = 20.0
 _FEWEST = 200
 _LONGEST_GAP_S = 1.0
 _LEAST_STROKE_BAR = 2.0
+_SLOWEST_S = 0.05
 
 
 class RecordError(BrakebenchError):
@@ -40,6 +41,7 @@ class Record:
     time_s, pressure_pa, speed_mps, torque_nm, temperature_k : (n,) samples; the speed is the sliding speed at the
         effective radius, the torque is positive when it brakes.
     remarks : comment lines at the head of the file.
+    averaged : how many samples of the file each sample here is the mean of.
     """
 
     name: str
@@ -49,6 +51,19 @@ class Record:
     torque_nm: Floats
     temperature_k: Floats
     remarks: tuple[str, ...] = ()
+    averaged: int = 1
+
+
+def averaged(record: Record) -> Record:
+    """Average a record that was sampled faster than friction and temperature move, to a sample every 50 ms or less."""
+    count = int(_SLOWEST_S / float(np.median(np.diff(record.time_s))) + 1e-6)
+    if count < 2:
+        return record
+    blocks = record.time_s.size // count
+    columns = (record.time_s, record.pressure_pa, record.speed_mps, record.torque_nm, record.temperature_k)
+    means = [column[: blocks * count].reshape(blocks, count).mean(axis=1) for column in columns]
+    time, pressure, speed, torque, temperature = means
+    return Record(record.name, time - time[0], pressure, speed, torque, temperature, record.remarks, count)
 
 
 def read_record(path: Path | Traversable) -> Record:
@@ -61,7 +76,8 @@ def read_record(path: Path | Traversable) -> Record:
     ------
     RecordError
         Unreadable file, missing column, wrong unit, a cell that is no finite number or out of range, time that does
-        not increase, a gap above 1 s, less than 20 s or 200 samples, nothing that moves. It names file, line, column.
+        not increase, a gap above 1 s, less than 20 s or 200 samples, nothing that moves or brakes. It names file,
+        line and column.
     """
     remarks, head, rows = _lines(path)
     columns = _columns(str(path), *head)
@@ -187,3 +203,9 @@ def _check_excitation(file: str, values: dict[str, Floats]) -> None:
         )
     if float(np.mean(values["speed"])) < 0.05:
         raise RecordError(f"{file}: column '{_title('speed')}': the disc stands still; nothing can be identified")
+    mean_nm = float(np.mean(values["torque"]))
+    if mean_nm <= 0.0:
+        raise RecordError(
+            f"{file}: column '{_title('torque')}': the mean torque is {mean_nm:.3g} N m; a torque that brakes is "
+            "positive, so turn the sign or look at the sensor"
+        )

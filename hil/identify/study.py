@@ -7,7 +7,7 @@ from importlib.resources.abc import Traversable
 
 from hil.identify.fit import Fit, fit
 from hil.identify.model import HEATINGS, Brake, Heating
-from hil.identify.record import Record
+from hil.identify.record import Record, averaged
 from hil.identify.validation import Error, Validation, halves, validate
 
 
@@ -44,11 +44,13 @@ def identify(record: Record, brake: Brake, other: Record | None = None, heating:
     ----------
     heating : form of the heating term in equation (4); None tries both and takes the likelier.
     """
+    record = averaged(record)
     fits = {form: fit(record, brake, form) for form in ((heating,) if heating else HEATINGS)}
     chosen = max(fits, key=lambda form: fits[form].log_likelihood)
     errors = halves(record, fits[chosen].course)
     if other is None:
         return Study(record, brake, fits, chosen, errors, None, None)
+    other = averaged(other)
     return Study(record, brake, fits, chosen, errors, validate(fits[chosen], other, brake), fit(other, brake, chosen))
 
 

@@ -251,7 +251,7 @@ def _reason(study: Study) -> str:
 
 def _halves(first: Error, second: Error) -> str:
     return (
-        f"first half {first.torque_rms_nm:.2f} N m ({100.0 * first.torque_share:.1f} % of its mean torque), "
+        f"first half {first.torque_rms_nm:.2f} N m ({100.0 * first.torque_share:.1f} % of the mean torque), "
         f"second half {second.torque_rms_nm:.2f} N m ({100.0 * second.torque_share:.1f} %)"
     )
 

@@ -19,7 +19,7 @@ START_S = 10.0
 class Error:
     """Prediction minus measurement over part of a record.
 
-    ``torque_share`` is the rms of the torque error over the part's mean torque; biases are means of the error.
+    ``torque_share`` is the rms of the torque error over the whole record's mean torque; biases are means of the error.
     """
 
     from_s: float
@@ -78,7 +78,7 @@ def error(record: Record, course: Course, part: NDArray[np.bool_]) -> Error:
         float(time[-1]),
         rms,
         float(torque.mean()),
-        rms / float(record.torque_nm[part].mean()),
+        rms / float(record.torque_nm.mean()),
         float(np.sqrt(np.mean(temperature**2))),
         float(temperature.mean()),
     )
