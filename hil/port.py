@@ -9,6 +9,23 @@ from dbc.frame import BusName, Frame, Received
 from hil.bus.bus import Bus, open_bus
 from hil.bus.channel import bench_channel
 
+Owned = dict[tuple[BusName, int], int]
+
+
+def owned_by(senders: Iterable[str]) -> Owned:
+    """Lengths of the frames that DBC nodes may send, by bus and identifier."""
+    return {(bus, spec.can_id): spec.length for bus in BusName for spec in contract(bus).sent_by(*senders)}
+
+
+def check_owned(frames: Sequence[Frame], owned: Owned) -> None:
+    """Refuse (ValueError) a frame whose identifier or length a role does not own: a mistake of the node."""
+    for frame in frames:
+        if frame.extended or owned.get((frame.bus, frame.can_id)) != len(frame.data):
+            raise ValueError(
+                f"{frame.bus} bus: frame 0x{frame.can_id:X} with {len(frame.data)} bytes is not this role's to send; "
+                "its identifiers and lengths are those of its senders in the DBC"
+            )
+
 
 class Port:
     """Joins a node to the vehicle bus and the bench bus; refuses to send what its role does not own.
@@ -21,7 +38,7 @@ class Port:
 
     def __init__(self, vehicle: Bus, bench: Bus, senders: Iterable[str]) -> None:
         self._buses = {BusName.VEHICLE: vehicle, BusName.BENCH: bench}
-        self._owned = {(bus, spec.can_id): spec.length for bus in BusName for spec in contract(bus).sent_by(*senders)}
+        self._owned = owned_by(senders)
 
     @classmethod
     def open(cls, vehicle_spec: str, senders: Iterable[str]) -> Self:
@@ -46,14 +63,9 @@ class Port:
         ValueError
             A frame whose identifier or length the role does not own in the DBC: a mistake of the node.
         """
+        check_owned(frames, self._owned)
         for bus, out in self._buses.items():
             mine = [frame for frame in frames if frame.bus is bus]
-            for frame in mine:
-                if frame.extended or self._owned.get((bus, frame.can_id)) != len(frame.data):
-                    raise ValueError(
-                        f"{bus} bus: frame 0x{frame.can_id:X} with {len(frame.data)} bytes is not this role's to send; "
-                        "its identifiers and lengths are those of its senders in the DBC"
-                    )
             if mine:
                 out.send(mine)
 

@@ -3,9 +3,9 @@
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Protocol
 
 from dbc.frame import LinkEvent, LinkState, Received
-from hil.bus.bus import Bus
 from hil.errors import BrakebenchError
 from hil.rt.clock import WallClock, wall_time_ns
 
@@ -32,6 +32,14 @@ class RecorderError(BrakebenchError):
     exit_code = 3
 
 
+class Source(Protocol):
+    """What a recorder listens to."""
+
+    def receive(self, timeout_s: float) -> list[Received]:
+        """Return what arrived since the last call."""
+        ...
+
+
 class Recorder:
     """Appends frames to a candump log; what was received 20 ms before a kill is in the file.
 
@@ -42,14 +50,15 @@ class Recorder:
     ----------
     path : file to create; never overwritten.
     buses : what to listen to.
+    epoch_ns : time of day of monotonic time 0; None takes this machine's.
     """
 
-    def __init__(self, path: Path, buses: Sequence[Bus]) -> None:
+    def __init__(self, path: Path, buses: Sequence[Source], epoch_ns: int | None = None) -> None:
         self.path = path
         self.frames = 0
         self.lost = 0
         self._buses = buses
-        self._wall_offset_ns = wall_time_ns() - WallClock().now_ns()
+        self._wall_offset_ns = wall_time_ns() - WallClock().now_ns() if epoch_ns is None else epoch_ns
         try:
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
         except FileExistsError as error:

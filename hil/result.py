@@ -13,7 +13,7 @@ from dbc.contract import contract
 from dbc.frame import BusName, LinkEvent
 from hil.bus.error_frame import link_events as decode_error_frame
 from hil.log.decode import DecodedLog, decode_log, own_databases
-from hil.log.frames import FrameFlag
+from hil.log.frames import FrameFlag, Recording
 from hil.log.read import read_log
 
 Floats = NDArray[np.float64]
@@ -33,7 +33,7 @@ class Signals:
 
     Parameters
     ----------
-    log : the recording.
+    log : the recording, or the path of its file.
 
     Attributes
     ----------
@@ -41,8 +41,9 @@ class Signals:
     start_s : log time of the start of the manoeuvre (of the log where there is none).
     """
 
-    def __init__(self, log: Path) -> None:
-        self.decoded: DecodedLog = decode_log(read_log(log), own_databases())
+    def __init__(self, log: Path | Recording) -> None:
+        recording = read_log(log) if isinstance(log, Path) else log
+        self.decoded: DecodedLog = decode_log(recording, own_databases())
         self.start_s = float(self.decoded.time_s[0]) if len(self.decoded.time_s) else 0.0
         t_s, state = self.get("TRUTH_MOTION.MANOEUVRE")
         running = t_s[state >= ManoeuvreState.RUNNING]

@@ -1,27 +1,32 @@
-"""One run from start to report: bench, measurement, expectations, files."""
+"""One run from start to report: rig, measurement, expectations, files. Only the rig knows real from virtual time."""
 
 import json
+import math
 import os
 import platform
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TextIO
 
-from hil.bench import Bench, BenchState
+from hil.bench import Bench
 from hil.log.export import export
+from hil.process import StopSignal
 from hil.report.figure import write_figure
 from hil.report.html import write_html
 from hil.report.report import Number, Report, Verdict
 from hil.report.text import print_text
 from hil.result import RunResult, Signals, measure
+from hil.rig import BenchState, Rig
 from hil.rt.clock import wall_time_ns
 from hil.run_report import build_report
 from hil.scenario import Scenario, load_scenario
+from hil.virtual import VirtualBench
 
 EXIT_CODES = {Verdict.PASSED: 0, Verdict.FAILED: 1, Verdict.INCOMPLETE: 3}
+EXPECTED = "Expected: "
 INTERRUPTED_EXIT_CODE = 130  # 128 + SIGINT, as a shell reports it
 
 
@@ -63,8 +68,10 @@ def run_scenario(
     realtime: bool,
     command_line: str,
     say: Callable[[str], None],
+    virtual: bool = False,
+    without: Sequence[str] = (),
 ) -> Outcome:
-    """Run one scenario in real time and measure it.
+    """Run one scenario in real or in virtual time and measure it.
 
     Raises
     ------
@@ -73,36 +80,58 @@ def run_scenario(
     """
     scenario = load_scenario(name)
     started_ns = wall_time_ns()
-    with Bench(name, bus, Path(out) if out else _folder(scenario), seed, realtime, say) as bench:
-        say(f"bus {bench.spec}" + (f" ({bench.note})" if bench.note else ""))
-        bench.run()
+    folder = Path(out) if out else new_folder(scenario.name)
+    stop = StopSignal()
+    rig: Rig
+    if virtual:
+        rig = VirtualBench(scenario, folder, seed, say, stop)
+    else:
+        rig = Bench(scenario, bus, folder, seed, realtime, say, stop, without)
+    with rig:
+        say(f"bus {rig.spec}" + (f" ({rig.note})" if rig.note else ""))
+        rig.run()
     say("measuring")
-    signals = Signals(bench.log)
+    provenance = {"realtime asked for": realtime, "command line": command_line, "started": started_ns // 1_000_000_000}
+    return finish(rig, seed, provenance)
+
+
+def finish(rig: Rig, seed: int, provenance: Mapping[str, object], failure: str = "") -> Outcome:
+    """Measure a run that has ended, judge it, and write its files.
+
+    Parameters
+    ----------
+    provenance : what the caller knows of how it came about.
+    failure : why a test on this bench failed; empty where the scenario's expectations decide.
+    """
+    scenario = rig.scenario
+    signals = Signals(rig.log)
     result = measure(signals)
-    verdict, reason = _judge(bench, result, scenario)
-    provenance = _provenance(scenario, bench, seed, realtime, command_line, started_ns)
-    report = build_report(scenario.title, signals, result, verdict, reason, provenance)
-    report = _with_expectations(report, scenario, result)
+    met = list(_expected(scenario, result, signals))
+    verdict, reason = _judge(rig, met, failure)
+    report = build_report(
+        scenario.title, signals, result, verdict, reason, _provenance(scenario, rig, seed) | dict(provenance)
+    )
+    report = replace(report, numbers=report.numbers + tuple(met))
     facts = {
         "scenario": scenario.name,
         "verdict": verdict.value,
         "reason": reason,
-        "bus": bench.spec,
-        "processes": bench.alive_at_end,
+        "bus": rig.spec,
+        "processes": rig.alive_at_end,
         "seed": seed,
     }
-    facts |= _write(bench.out, report, signals)
-    code = INTERRUPTED_EXIT_CODE if bench.state is BenchState.INTERRUPTED else EXIT_CODES[verdict]
+    facts |= _write(rig.out, report, signals)
+    code = INTERRUPTED_EXIT_CODE if rig.state is BenchState.INTERRUPTED else EXIT_CODES[verdict]
     outcome = Outcome(result, report, facts, code)
-    (bench.out / "result.json").write_text(outcome.json_text() + "\n")
+    (rig.out / "result.json").write_text(outcome.json_text() + "\n")
     return outcome
 
 
-def _folder(scenario: Scenario) -> Path:
+def new_folder(name: str) -> Path:
     """A folder that does not exist yet: runs/NAME, runs/NAME-2, ..."""
     number = 1
     while True:
-        folder = Path("runs") / (scenario.name if number == 1 else f"{scenario.name}-{number}")
+        folder = Path("runs") / (name if number == 1 else f"{name}-{number}")
         try:
             folder.mkdir(parents=True)
         except FileExistsError:
@@ -111,49 +140,43 @@ def _folder(scenario: Scenario) -> Path:
         return folder
 
 
-def _judge(bench: Bench, result: RunResult, scenario: Scenario) -> tuple[Verdict, str]:
-    if bench.state is BenchState.BROKEN:
-        return Verdict.INCOMPLETE, bench.reason
-    if bench.state is BenchState.INTERRUPTED:
-        return Verdict.INCOMPLETE, "interrupted"
+def _expected(scenario: Scenario, result: RunResult, signals: Signals) -> Iterator[Number]:
+    """What the scenario expects, and whether it came."""
     values = result.as_json()
-    for expectation in scenario.expectations:
-        value = values[expectation.name]
-        if value is None or not expectation.minimum <= value <= expectation.maximum:
-            limits = f"{expectation.minimum:g} to {expectation.maximum:g}"
-            return Verdict.FAILED, f"{expectation.name}: expected {limits}, got {value}"
+    for e in scenario.expectations:
+        value = values[e.name]
+        met = value is not None and e.minimum <= value <= e.maximum
+        yield Number(f"{EXPECTED}{e.name}", value, limit=f"{e.minimum:g} to {e.maximum:g}", met=met)
+    for x in scenario.signal_expectations:
+        t_s, samples = signals.get(x.signal)
+        inside = samples[(t_s >= x.from_s - 1e-6) & (t_s <= x.to_s + 1e-6)]
+        low, high = (float(inside.min()), float(inside.max())) if len(inside) else (math.nan, math.nan)
+        met = x.minimum <= low and high <= x.maximum
+        shown = f"{low:.6g} to {high:.6g}" if len(inside) else None
+        yield Number(f"{EXPECTED}{x.name}", shown, limit=f"{x.minimum:g} to {x.maximum:g}", met=met)
+
+
+def _judge(rig: Rig, expected: Sequence[Number], failure: str) -> tuple[Verdict, str]:
+    if rig.state is BenchState.BROKEN:
+        return Verdict.INCOMPLETE, rig.reason
+    if rig.state is BenchState.INTERRUPTED:
+        return Verdict.INCOMPLETE, "interrupted"
+    if failure:
+        return Verdict.FAILED, failure
+    for number in expected:
+        if not number.met:
+            return Verdict.FAILED, f"{number.label.removeprefix(EXPECTED)}: expected {number.limit}, got {number.value}"
     return Verdict.PASSED, ""
 
 
-def _with_expectations(report: Report, scenario: Scenario, result: RunResult) -> Report:
-    values = result.as_json()
-    rows = tuple(
-        Number(
-            f"Expected: {e.name}",
-            values[e.name],
-            limit=f"{e.minimum:g} to {e.maximum:g}",
-            met=values[e.name] is not None and e.minimum <= values[e.name] <= e.maximum,
-        )
-        for e in scenario.expectations
-    )
-    return Report(
-        report.title, report.verdict, report.reason, report.numbers + rows, report.sections, report.provenance
-    )
-
-
-def _provenance(
-    scenario: Scenario, bench: Bench, seed: int, realtime: bool, command_line: str, started_ns: int
-) -> dict[str, object]:
+def _provenance(scenario: Scenario, rig: Rig, seed: int) -> dict[str, object]:
     packages = ("brakebench", "numpy", "numba", "python-can", "cantools", "pyarrow")
     return {
         "scenario": {"name": scenario.name, "file": scenario.source, "sha256": scenario.sha256},
         "parameter sets": {"plant": scenario.plant_set, "ecu": scenario.ecu_set},
         "seed": seed,
-        "bus": bench.spec,
-        "realtime asked for": realtime,
-        "command line": command_line,
-        "started": started_ns // 1_000_000_000,
-        "processes": {child.name: child.error_path.read_text(errors="replace").strip() for child in bench.processes},
+        "bus": rig.spec,
+        "processes": {child.name: child.error_path.read_text(errors="replace").strip() for child in rig.processes},
         "versions": {"python": platform.python_version()} | {name: version(name) for name in packages},
         "host": {"kernel": platform.release(), "machine": platform.machine(), "processors": os.cpu_count()},
         "executable": Path(sys.executable).name,

@@ -1,25 +1,28 @@
 """A scenario: one TOML file, validated, as one value."""
 
 import hashlib
-import itertools
 import math
 import tomllib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any
 
+from dbc.bench_messages import PhysicalFault
+from dbc.contract import contract
+from dbc.frame import BusName
 from ecu.parameters.ecu import EcuParameters
-from hil.errors import BrakebenchError
 from hil.parameters import load_set, override
+from hil.scenario_table import Files, ScenarioError, Table, as_number
+from hil.stimulus import ALL_WHEELS, WHEELS, FaultEvent
 from plant.manoeuvre import DirectDemands, Manoeuvre, SpeedPhase, Trace
 from plant.parameters.plant import PlantParameters
 from plant.road import DRY, RoadSegment
 
 DEFAULT_SCENARIO = "stop72"
-WHEELS = ("fl", "fr", "rl", "rr")
+FAULT_NAMES = tuple(fault.name.lower() for fault in PhysicalFault if fault is not PhysicalFault.NONE)
 EXPECTABLE = (
     "stop_distance_m",
     "stop_time_s",
@@ -27,11 +30,8 @@ EXPECTABLE = (
     "energy_recuperated_j",
     "frames_lost",
     "frames_corrupt",
+    "overruns",
 )
-
-
-class ScenarioError(BrakebenchError):
-    """A scenario that cannot be used as it is; the message names file and key."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,17 +44,44 @@ class Expectation:
 
 
 @dataclass(frozen=True, slots=True)
+class SignalExpectation:
+    """Limits of every sample of a signal, SI, between two times of the manoeuvre."""
+
+    signal: str
+    from_s: float
+    to_s: float
+    minimum: float
+    maximum: float
+
+    @property
+    def name(self) -> str:
+        """What is expected of what, for people."""
+        return f"{self.signal} from {self.from_s:g} to {self.to_s:g} s"
+
+
+@dataclass(frozen=True, slots=True)
+class StartOrder:
+    """How much later than the bench each node joins, s."""
+
+    plant_s: float = 0.0
+    ecu_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """Everything that decides a run, seed apart.
 
     Attributes
     ----------
     name, title : short name and one line for people.
-    source, sha256 : the file and the hash of its text.
+    source, sha256 : the file, and the hash of its text and of the CSV files it names.
     plant, ecu : parameter sets with the scenario's changes.
     plant_set, ecu_set : names of the sets they started from.
     manoeuvre : driver, road, start.
-    expectations : what decides between exit code 0 and 1.
+    start_order : which node joins when.
+    blending : blending factor over time that the bench sends; empty leaves it to the controller.
+    faults : what breaks when.
+    expectations, signal_expectations : what decides between exit code 0 and 1.
     """
 
     name: str
@@ -66,74 +93,11 @@ class Scenario:
     plant_set: str
     ecu_set: str
     manoeuvre: Manoeuvre
+    start_order: StartOrder
+    blending: Trace
+    faults: tuple[FaultEvent, ...]
     expectations: tuple[Expectation, ...]
-
-
-class _Table:
-    """A TOML table that knows where it stands and refuses keys nobody asked for."""
-
-    def __init__(self, values: Any, where: str) -> None:
-        if not isinstance(values, Mapping):
-            raise ScenarioError(f"{where}: expected a table, got {values!r}")
-        self._values = dict(values)
-        self._where = where
-        self._known: list[str] = []
-
-    def take(self, key: str, default: Any = None) -> Any:
-        self._known.append(key)
-        return self._values.pop(key, default)
-
-    def number(self, key: str, default: float | None, low: float = -math.inf, high: float = math.inf) -> float:
-        value = self.take(key, default)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise ScenarioError(f"{self.at(key)}: expected a number from {low:g} to {high:g}, got {value!r}")
-        return float(value)
-
-    def text(self, key: str, default: str | None = None) -> str:
-        value = self.take(key, default)
-        if not isinstance(value, str) or not value:
-            raise ScenarioError(f"{self.at(key)}: expected a text, got {value!r}")
-        return value
-
-    def table(self, key: str) -> "_Table":
-        return _Table(self.take(key, {}), self.at(key))
-
-    def tables(self, key: str) -> list["_Table"]:
-        values = self.take(key, [])
-        if not isinstance(values, list):
-            raise ScenarioError(f"{self.at(key)}: expected a list of tables ([[{key}]]), got {values!r}")
-        return [_Table(value, f"{self.at(key)}[{i}]") for i, value in enumerate(values)]
-
-    def trace(self, key: str, low: float = -math.inf, high: float = math.inf) -> Trace:
-        """``[[time_s, value], ...]`` in order of time."""
-        points = self.take(key, [])
-        good = isinstance(points, list) and all(
-            isinstance(p, list) and len(p) == 2 and all(type(v) in (int, float) and math.isfinite(v) for v in p)
-            for p in points
-        )
-        if not good:
-            raise ScenarioError(f"{self.at(key)}: expected a list of [time_s, value] pairs, got {points!r}")
-        trace = tuple((float(t), float(v)) for t, v in points)
-        for (t0, _), (t1, _) in itertools.pairwise(trace):
-            if t1 < t0:
-                raise ScenarioError(f"{self.at(key)}: times must not decrease, but {t1:g} s follows {t0:g} s")
-        for _, value in trace:
-            if not low <= value <= high:
-                raise ScenarioError(f"{self.at(key)}: expected values from {low:g} to {high:g}, got {value:g}")
-        return trace
-
-    def rest(self) -> dict[str, Any]:
-        """Whatever has not been asked for; the caller checks it."""
-        values, self._values = self._values, {}
-        return values
-
-    def at(self, key: str) -> str:
-        return f"{self._where}: {key}" if self._where.endswith(".toml") else f"{self._where}.{key}"
-
-    def done(self) -> None:
-        if self._values:
-            odd = ", ".join(map(repr, self._values))
-            raise ScenarioError(f"{self._where}: unknown key {odd}; known here: {', '.join(sorted(set(self._known)))}")
+    signal_expectations: tuple[SignalExpectation, ...]
 
 
 def scenario_names() -> list[str]:
@@ -146,7 +110,7 @@ def load_scenario(name: str) -> Scenario:
 
     Raises
     ------
-    ScenarioError, hil.parameters.ParameterError
+    hil.scenario_table.ScenarioError, hil.parameters.ParameterError
         No such scenario, or a wrong field; the message names file, key and what is allowed.
     """
     source = _find(name)
@@ -155,28 +119,34 @@ def load_scenario(name: str) -> Scenario:
         values = tomllib.loads(text.decode("utf-8"))
     except OSError as error:
         raise ScenarioError(f"{source}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # of the text's encoding or of TOML
         raise ScenarioError(f"{source}: not valid TOML: {error}") from error
-    top = _Table(values, source.name)
+    files = Files(source.parent if isinstance(source, Path) else _library())
+    top = Table(values, source.name, files)
     title = top.text("title")
-    plant_table, ecu_table = top.table("plant"), top.table("ecu")
+    plant_table, ecu_table, start = top.table("plant"), top.table("ecu"), top.table("start")
     plant_set, ecu_set = plant_table.text("set", "paper_car"), ecu_table.text("set", "paper_ecu")
+    order = StartOrder(start.number("plant_after_s", 0.0, 0.0, 10.0), start.number("ecu_after_s", 0.0, 0.0, 10.0))
     scenario = Scenario(
         name=source.name.removesuffix(".toml"),
         title=title,
         source=str(source),
-        sha256=hashlib.sha256(text).hexdigest(),
+        sha256="",
         plant=override(
             load_set(_set("plant", plant_set), PlantParameters), plant_table.rest(), f"{source.name}: plant"
         ),
         ecu=override(load_set(_set("ecu", ecu_set), EcuParameters), ecu_table.rest(), f"{source.name}: ecu"),
         plant_set=plant_set,
         ecu_set=ecu_set,
-        manoeuvre=_manoeuvre(top),
+        manoeuvre=_manoeuvre(top, start),
+        start_order=order,
+        blending=_blending(top),
+        faults=tuple(event for table in top.tables("faults") for event in _faults(table)),
         expectations=tuple(_expectations(top.table("expect"))),
+        signal_expectations=tuple(_signal_expectation(table) for table in top.tables("expect_signal")),
     )
     top.done()
-    return scenario
+    return replace(scenario, sha256=hashlib.sha256(b"".join([text, *files.read])).hexdigest())
 
 
 def _library() -> Traversable:
@@ -199,15 +169,14 @@ def _set(package: str, name: str) -> Path | Traversable:
     return Path(name) if name.endswith(".toml") else resources.files(package) / "parameters" / f"{name}.toml"
 
 
-def _manoeuvre(top: _Table) -> Manoeuvre:
-    start, driver, end, direct = top.table("start"), top.table("driver"), top.table("end"), top.table("direct")
-    standstill = end.take("after_standstill_s", 1.0)
+def _manoeuvre(top: Table, start: Table) -> Manoeuvre:
+    driver, end, direct = top.table("driver"), top.table("end"), top.table("direct")
     manoeuvre = Manoeuvre(
         initial_speed_mps=start.number("speed_mps", None, 0.0, 60.0),
         initial_disc_temperature_k=start.number("disc_temperature_k", 423.15, 200.0, 1200.0),
         initial_state_of_charge=start.number("state_of_charge", 0.7, 0.0, 1.0),
-        duration_s=end.number("duration_s", None, 0.0, 3600.0),
-        end_after_standstill_s=None if standstill is False else float(standstill),
+        duration_s=end.number("duration_s", None, 0.1, 3600.0),
+        end_after_standstill_s=_standstill(end),
         pedal=driver.trace("pedal", 0.0, 1.0),
         steering_wheel_rad=driver.trace("steering_wheel_rad", -15.0, 15.0),
         speed_phases=tuple(_speed_phase(table) for table in driver.tables("hold_speed")),
@@ -216,14 +185,22 @@ def _manoeuvre(top: _Table) -> Manoeuvre:
             pressure_pa=_four(direct.table("pressure_pa"), 0.0, 25e6),
             motor_nm=_four(direct.table("motor_nm"), -1500.0, 1500.0),
         ),
-        wait_for_demands=bool(start.take("wait_for_ecu", True)),
+        wait_for_demands=start.switch("wait_for_ecu", True),
     )
     for table in (start, driver, end, direct):
         table.done()
     return manoeuvre
 
 
-def _speed_phase(table: _Table) -> SpeedPhase:
+def _standstill(end: Table) -> float | None:
+    """``false`` runs to the end of the duration."""
+    if end.has("after_standstill_s") and end.peek("after_standstill_s") is False:
+        end.take("after_standstill_s")
+        return None
+    return end.number("after_standstill_s", 1.0, 0.0, 3600.0)
+
+
+def _speed_phase(table: Table) -> SpeedPhase:
     phase = SpeedPhase(
         table.number("start_s", None, 0.0), table.number("end_s", None, 0.0), table.number("speed_mps", None, 0.0, 60.0)
     )
@@ -231,7 +208,27 @@ def _speed_phase(table: _Table) -> SpeedPhase:
     return phase
 
 
-def _segment(table: _Table) -> RoadSegment:
+def _blending(top: Table) -> Trace:
+    """One number, or a course over time."""
+    number = as_number(top.peek("blending"))
+    if number is None:
+        return top.trace("blending", 0.0, 1.0)
+    return ((0.0, top.number("blending", None, 0.0, 1.0)),)
+
+
+def _faults(table: Table) -> Iterator[FaultEvent]:
+    """One fault, and its end where ``until_s`` is given."""
+    at_s = table.number("at_s", None, 0.0, 3600.0)
+    fault = PhysicalFault[table.choice("fault", FAULT_NAMES).upper()]
+    names = table.names("wheels", WHEELS)
+    wheels = sum(1 << WHEELS.index(name) for name in names) if names else ALL_WHEELS
+    yield FaultEvent(at_s, fault, wheels)
+    if table.has("until_s"):
+        yield FaultEvent(table.number("until_s", None, at_s, 3600.0), fault, wheels, active=False)
+    table.done()
+
+
+def _segment(table: Table) -> RoadSegment:
     friction = table.number("friction", 1.0, 0.0, 2.0)
     segment = RoadSegment(
         start_m=table.number("start_m", None),
@@ -243,18 +240,38 @@ def _segment(table: _Table) -> RoadSegment:
     return segment
 
 
-def _four(table: _Table, low: float, high: float) -> tuple[Trace, Trace, Trace, Trace]:
+def _four(table: Table, low: float, high: float) -> tuple[Trace, Trace, Trace, Trace]:
     everywhere = table.trace("all", low, high)
     fl, fr, rl, rr = (table.trace(wheel, low, high) or everywhere for wheel in WHEELS)
     table.done()
     return fl, fr, rl, rr
 
 
-def _expectations(table: _Table) -> Iterator[Expectation]:
+def _expectations(table: Table) -> Iterator[Expectation]:
     for name in EXPECTABLE:
         limits = table.table(name)
-        low, high = limits.number("min", -math.inf), limits.number("max", math.inf)
-        limits.done()
+        low, high = _limits(limits)
         if math.isfinite(low) or math.isfinite(high):
             yield Expectation(name, low, high)
     table.done()
+
+
+def _limits(table: Table) -> tuple[float, float]:
+    low, high = table.number("min", -math.inf), table.number("max", math.inf)
+    table.done()
+    return low, high
+
+
+def _signal_expectation(table: Table) -> SignalExpectation:
+    """``signal`` is MESSAGE.SIGNAL of either bus; one of ``min`` and ``max`` at least."""
+    known = {f"{s.name}.{f.signal}" for bus in BusName for s in contract(bus).by_id.values() for f in s.fields}
+    name = table.text("signal")
+    if name not in known:
+        near = get_close_matches(name, sorted(known), 3) or ["MESSAGE.SIGNAL of brake.dbc or bench.dbc"]
+        raise ScenarioError(f"{table.at('signal')}: no signal {name!r}; did you mean {', '.join(near)}?")
+    from_s = table.number("from_s", 0.0, 0.0, 3600.0)
+    to_s = table.number("to_s", 3600.0, from_s, 3600.0)
+    low, high = _limits(table)
+    if low == -math.inf and high == math.inf:
+        raise ScenarioError(f"{table.at('min')}: expected min, max or both")
+    return SignalExpectation(name, from_s, to_s, low, high)

@@ -1,4 +1,4 @@
-"""``brakebench run``: ECU and plant as two processes on one bus, one scenario, recorded and measured."""
+"""``brakebench run``: ECU and plant on one bus, one scenario, recorded and measured."""
 
 import argparse
 import sys
@@ -11,6 +11,18 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser = subparsers.add_parser("run", help="run a scenario: ECU and plant as two processes on one CAN bus")
     add_scenario(parser)
     add_bus(parser)
+    parser.add_argument(
+        "--virtual",
+        action="store_true",
+        help="virtual time: both nodes in this process, as fast as it goes; the same seed gives the same bytes",
+    )
+    parser.add_argument(
+        "--without",
+        action="append",
+        choices=("ecu", "plant"),
+        default=[],
+        help="do not start this node: it is somebody else's, on the same bus",
+    )
     parser.add_argument("--out", metavar="DIR", help="folder for log, signals, figure and report (default: runs/...)")
     add_seed(parser)
     add_realtime(parser)
@@ -20,14 +32,19 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Run, measure, report."""
+    from hil.errors import BrakebenchError
     from hil.run import run_scenario
 
+    if args.virtual and (args.without or args.realtime or args.bus != "auto"):
+        raise BrakebenchError("--virtual has no bus and no processes: leave out --bus, --without and --realtime")
     outcome = run_scenario(
         args.scenario,
         args.bus,
         out=args.out,
         seed=args.seed,
         realtime=args.realtime,
+        virtual=args.virtual,
+        without=args.without,
         command_line=" ".join(sys.argv[1:]),
         say=lambda line: print(line, file=sys.stderr, flush=True),
     )
