@@ -200,6 +200,7 @@ def paper_parameters(parameters: EcuParameters) -> Vector:
             o.pressure_min_pa,
             s.friction_speed_min_mps,
             float(parameters.compensation.road_correction),
+            v.dive_gradient_rad_s2_m,
         ),
         dtype=np.float64,
     )

@@ -31,8 +31,12 @@ PRESSURE_LAG = PRESSURE_ZERO + 4
 MOTOR_LAG = PRESSURE_LAG + 4
 SLIDING = MOTOR_LAG + 4  # seconds that a wheel still counts as sliding
 TORQUE = SLIDING + 4
-PITCH, PITCH_RATE, LOAD_ACCELERATION, FORCE_LAG, RELEASED_S, STARTED, LOCKED = (TORQUE + 4 + i for i in range(7))
-SIZE = TORQUE + 11
+LOCKED = TORQUE + 4  # seconds that a wheel has stood while the car moves
+LAST_WHEEL = LOCKED + 4
+PITCH, PITCH_RATE, LOAD_ACCELERATION, FORCE_LAG, RELEASED_S, STARTED, REJECTED_S = (
+    LAST_WHEEL + 4 + i for i in range(7)
+)
+SIZE = LAST_WHEEL + 11
 
 # inputs
 AX, AY, YAW_RATE, STEER, DEMAND = 0, 1, 2, 3, 4
@@ -49,8 +53,13 @@ START = 42  # variances: bias, grade, mass, stiffness, axle, radius, friction co
 PARAMETERS = 52
 
 G0 = 9.80665
-SLIDING_HOLD_S = 0.06
-LOCKED_SHARE = 0.15  # of the speed of the car: slower than that a wheel counts as locked
+SLIDING_HOLD_S = 0.15
+REJECT_S = 0.5
+LOCKED_SHARE = 0.15  # of the speed of the car: slower than that a wheel may be locked
+SPIN_UP_RAD_S = 1.0  # faster in one sample: it is turning again
+BOUNCE_RAD_S = 3.0
+STANDING_RAD_S = 3.5  # below it a wheel that spins down stands within two samples
+TOOTH_WAIT_S = 0.08  # a wheel that stops jumps back to what the missing tooth allows at most, and decays from there
 RELEASED_PA = 3e5
 SETTLED_S = 0.4
 APPLIED_PA = 1e5
@@ -258,17 +267,34 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     road = p[ROAD] > 0.5
     any_sliding = False
     locked_load = 0.0
-    s[LOCKED] = 0.0
+    spin = np.zeros(4)
     for i in range(4):
         s[SLIDING + i] = max(s[SLIDING + i] - dt, 0.0)
         omega = z[WHEEL + i]
         if road and not isnan(omega) and speed > 1.0:
             slip = (omega * radius - along[i]) / max(along[i], 1.0)
-            if abs(slip) > p[P_SLIDE]:
+            expected = forces[i] / (loads[i] * p[P_STIFF] * s[STIFFNESS])
+            if abs(slip - expected) > p[P_SLIDE]:
                 s[SLIDING + i] = SLIDING_HOLD_S
-            if slip < LOCKED_SHARE - 1.0:
-                s[LOCKED] += 1.0
+            step = omega - s[LAST_WHEEL + i]
+            spin[i] = step / dt
+            slow = slip < LOCKED_SHARE - 1.0
+            if s[LOCKED + i] > 0.0:
+                s[LOCKED + i] += dt
+                if s[LOCKED + i] > TOOTH_WAIT_S and (not slow or step > SPIN_UP_RAD_S):
+                    s[LOCKED + i] = 0.0
+            elif (slow and (omega < STANDING_RAD_S or omega + 2.0 * step <= 0.0)) or (
+                # the jump of a stopped toothed wheel, told from a wheel that turns again by the force the car lacks
+                step > BOUNCE_RAD_S
+                and s[LAST_WHEEL + i] * radius < 2.0 * LOCKED_SHARE * along[i]
+                and mass * (s[BIAS] - ax) < 0.75 * abs(force)
+            ):
+                s[LOCKED + i] = dt
+            if s[LOCKED + i] > 0.0:
                 locked_load += loads[i]
+        else:
+            s[LOCKED + i] = 0.0
+        s[LAST_WHEEL + i] = 0.0 if isnan(omega) else omega
         if s[SLIDING + i] > 0.0:
             any_sliding = True
 
@@ -291,7 +317,12 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
         drive = not applied and abs(force) > MASS_FORCE_SHARE * mass and change < p[R_ACC]
         if not drive:
             h[MASS] = 0.0
-        correct(s, h, ax - predicted, variance, 1e6, not drive, not applied)
+        # a sudden change is the road's before it is the pads': wait a little before believing it
+        gate = p[GATE] if road and s[REJECTED_S] < REJECT_S else 1e6
+        if correct(s, h, ax - predicted, variance, gate, not drive, not applied):
+            s[REJECTED_S] = 0.0
+        else:
+            s[REJECTED_S] += dt
 
     # wheel speeds: v (1 + kappa) / (R delta)
     for i in range(4):
@@ -322,20 +353,24 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
         sigma += p[R_ALIGN] * abs(force_rate) * 0.25 * per_force * ground / rolling
         correct(s, h, omega - predicted, sigma * sigma, p[GATE], True, not applied)
 
-    # bounds and the wheels that stand: their torque is what the road gives
+    # bounds
     for i in range(4):
         s[FRICTION + i] = min(max(s[FRICTION + i], 0.05), 1.2)
         s[RADIUS + i] = min(max(s[RADIUS + i], 0.97), 1.03)
     s[MASS] = min(max(s[MASS], 0.7), 1.5)
     s[STIFFNESS] = min(max(s[STIFFNESS], 0.3), 3.0)
     s[AXLE] = min(max(s[AXLE], -0.3), 0.3)
-    if road and locked_load > 0.0 and body:
+    # a wheel that stands: its torque is what the road gives, the force the turning wheels leave over
+    if locked_load > 0.0 and body:
         rest = mass * (ax - s[BIAS]) + 0.5 * p[P_DRAG] * speed * speed
         for i in range(4):
-            if z[WHEEL + i] * radius > LOCKED_SHARE * max(along[i], 1.0):
-                rest -= forces[i]
+            if s[LOCKED + i] == 0.0:
+                own = forces[i]
+                if s[SLIDING + i] > 0.0:
+                    own += inertia * (acceleration / radius - spin[i]) / arm
+                rest -= own
         for i in range(4):
-            if z[WHEEL + i] * radius <= LOCKED_SHARE * max(along[i], 1.0):
+            if s[LOCKED + i] > 0.0:
                 held = rest * arm * loads[i] / locked_load
                 s[TORQUE + i] = min(max(held, s[TORQUE + i]), 0.0)
     return s

@@ -34,8 +34,8 @@ FRICTION = 88
 CONFIDENCE = 92
 PRESSURE_LAG = 96
 MOTOR_LAG = 100
-SPEED, K, LOAD_ACCELERATION, STARTED, K_NUMBER, K_NEXT, MU_NUMBER, MU_NEXT = range(104, 112)
-K_MODEL = 112
+SPEED, K, LOAD_ACCELERATION, STARTED, K_NUMBER, K_NEXT, MU_NUMBER, MU_NEXT, OFFSET = range(104, 113)
+K_MODEL = 113
 K_SENSOR = K_MODEL + MAX_WINDOW
 MU_TORQUE = K_SENSOR + MAX_WINDOW  # per wheel
 MU_PRESSURE = MU_TORQUE + 4 * MAX_WINDOW
@@ -49,9 +49,10 @@ P_MASS, P_BASE, P_FRONT, P_HEIGHT, P_RADIUS, P_INERTIA, P_DRAG, P_ROLL, P_STEER_
 P_TRACK, P_GAIN = 9, 11
 P_THRESHOLD, P_MU, P_C1, P_C2, P_C3, P_CORNER = range(13, 19)
 Q_RATE, Q_FORCE, Q_TORQUE, R_OMEGA, R_FORCE = range(19, 24)
-P_K_WINDOW, P_K_LIMIT, P_FORCE_MIN, P_MU_WINDOW, P_DELAY, P_PRESSURE_MIN, P_SPEED_MIN, ROAD = range(24, 32)
+P_K_WINDOW, P_K_LIMIT, P_FORCE_MIN, P_MU_WINDOW, P_DELAY, P_PRESSURE_MIN, P_SPEED_MIN, ROAD, P_DIVE = range(24, 33)
 
 G0 = 9.80665
+SPEED_GAIN, OFFSET_GAIN = 5.0, 5.0  # reference speed while the wheels roll free: 1/s, 1/s2
 
 
 @compiled
@@ -177,10 +178,14 @@ def paper_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
 
     # reference speed: the wheels while they roll free, the acceleration while they slip
     braking = z[DEMAND] > 0.0
-    s[SPEED] += dt * ax
-    mean = 0.25 * (z[WHEEL] + z[WHEEL + 1] + z[WHEEL + 2] + z[WHEEL + 3]) * radius
-    s[SPEED] += min(dt * (0.2 if braking else 10.0), 1.0) * (mean - s[SPEED])
-    s[SPEED] = max(s[SPEED], 0.0)
+    level = ax / (1.0 + G0 * p[P_DIVE])
+    s[SPEED] += dt * (level - s[OFFSET])
+    if braking:
+        s[SPEED] = max(s[SPEED], fastest * radius)
+    else:
+        mean = 0.25 * (z[WHEEL] + z[WHEEL + 1] + z[WHEEL + 2] + z[WHEEL + 3]) * radius
+        s[OFFSET] -= min(dt * OFFSET_GAIN, 1.0) * (mean - s[SPEED])
+        s[SPEED] += min(dt * SPEED_GAIN, 1.0) * (mean - s[SPEED])
     speed = s[SPEED]
 
     # wheel loads (Doumiati et al.) and tyre model

@@ -77,6 +77,8 @@ class _Stimulus:
 
     def step(self, now_ns: int, inbox: list[Received]) -> list[Frame]:
         out: list[tuple[object, ...]] = [StimulusEcu(self._blending)]
+        if now_ns < 2 * TICK_NS:  # the receiver wants a sequence before it believes a command
+            out.append(FaultCommand(PhysicalFault.NONE, 0, 0))
         start = self._plant.manoeuvre_start_ns
         if start is not None:
             for fault in [f for f in self._waiting if now_ns - start >= f.at_s * 1e9]:
@@ -152,7 +154,7 @@ def drive(
                     float(o.mode),
                 ]
             )
-            observer.append(m.observer[:14])
+            observer.append(m.observer)
     n = min(len(truth), len(belief))
     t, b = np.array(truth[:n]), np.array(belief[:n])
     return Run(

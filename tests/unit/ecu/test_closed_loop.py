@@ -1,0 +1,83 @@
+"""The controller against the vehicle, in virtual time: what the driver gets."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from dbc.bench_messages import PhysicalFault
+from hil.parameters import override
+from hil.reproduce import runs
+from plant.manoeuvre import Manoeuvre, SpeedPhase
+from plant.road import RoadSegment
+
+
+@pytest.fixture(scope="module")
+def car():
+    return runs.plant_parameters()
+
+
+def two_stops(seconds=16.0):
+    """From 20 m/s to 4 m/s, up to 20 m/s again, and to rest."""
+    return Manoeuvre(
+        20.0,
+        seconds,
+        pedal=((1.5, 0.0), (1.8, 0.6), (6.5, 0.6), (6.6, 0.0), (13.0, 0.0), (13.3, 0.6)),
+        speed_phases=(SpeedPhase(0.0, 1.5, 20.0), SpeedPhase(6.7, 13.0, 20.0)),
+        initial_pad_friction=0.7 * 0.38,
+    )
+
+
+def steady(run, start_s, end_s):
+    return (run.time_s > start_s) & (run.time_s < end_s)
+
+
+def test_weak_pads_are_found_and_compensated(car, parameters):
+    weak = override(car, {"pad": {"a_1_ks": 0.7 * car.pad.a_1_ks}}, "weak pads")
+    run = runs.drive(two_stops(), weak, parameters, seed=1)
+    learned = steady(run, 3.0, 6.0)
+    error = run.estimated_friction[learned] / run.pad_friction[learned] - 1.0
+    assert np.abs(error).max() < 0.05
+    second = steady(run, 13.9, 15.9)
+    assert -run.acceleration_mps2[second].mean() == pytest.approx(run.demanded_mps2[second].mean(), rel=0.03)
+
+    off = dataclasses.replace(parameters, compensation=dataclasses.replace(parameters.compensation, enabled=False))
+    run = runs.drive(two_stops(), weak, off, seed=1)
+    lack = 1.0 + run.acceleration_mps2[second].mean() / run.demanded_mps2[second].mean()
+    assert 0.15 < lack < 0.4
+
+
+@pytest.mark.parametrize(
+    ("wheels", "depth_mps2", "above_one_s"), [(0b0001, 1.0, 0.0), (0b0011, 1.6, 0.1), (0b1111, 2.6, 0.1)]
+)
+def test_friction_takes_over_from_failed_motors(car, parameters, wheels, depth_mps2, above_one_s):
+    fault = runs.Fault(PhysicalFault.MOTOR_DEAD, wheels, at_s=3.0)
+    manoeuvre = Manoeuvre(20.0, 5.0, pedal=((1.0, 0.0), (1.3, 0.6)), speed_phases=(SpeedPhase(0.0, 1.0, 20.0),))
+    run = runs.drive(manoeuvre, car, parameters, seed=2, blending=0.7, faults=(fault,))
+    lack = (run.demanded_mps2 + run.acceleration_mps2)[steady(run, 2.99, 4.9)]
+    assert lack.max() < depth_mps2
+    assert 0.01 * (lack > 1.0).sum() <= above_one_s + 1e-9
+    assert 0.01 * (lack > 0.3).sum() <= 0.15
+    assert np.abs(lack[100:]).max() < 0.1
+
+
+def test_a_slippery_patch_is_told_from_the_pads(car, parameters):
+    road = (RoadSegment(-1e9), RoadSegment(60.0, 0.17, 0.17), RoadSegment(68.0))
+    manoeuvre = Manoeuvre(
+        20.0, 8.0, pedal=((1.0, 0.0), (1.3, 0.6)), speed_phases=(SpeedPhase(0.0, 1.0, 20.0),), road=road
+    )
+    frozen = override(parameters, {"compensation": {"road_correction": False}}, "frozen road")
+    errors = []
+    for ecu in (parameters, frozen):
+        run = runs.drive(manoeuvre, car, ecu, seed=3)
+        braking = (run.demanded_mps2 > 0.1) & (run.speed_mps > 1.5)
+        errors.append(np.sqrt(np.mean((run.estimated_torque_nm - run.wheel_torque_nm)[braking, 0] ** 2)))
+    assert errors[0] < 25.0
+    assert errors[0] < 0.4 * errors[1]
+
+
+def test_the_same_frames_give_the_same_bytes(car, parameters):
+    manoeuvre = Manoeuvre(20.0, 2.0, pedal=((0.5, 0.0), (0.8, 0.6)))
+    first, second = (runs.drive(manoeuvre, car, parameters, seed=4, blending=0.5) for _ in range(2))
+    assert first.pressure_demand_pa.tobytes() == second.pressure_demand_pa.tobytes()
+    assert first.observer.tobytes() == second.observer.tobytes()
