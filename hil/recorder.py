@@ -1,22 +1,24 @@
 """The recorder: a process of its own that appends every frame of both buses to one candump file."""
 
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
-from dbc.frame import LinkEvent, LinkState, Received
+from dbc.frame import BusName, LinkEvent, LinkState, Received
+from hil.bus.error_frame import link_events
 from hil.errors import BrakebenchError
 from hil.rt.clock import WallClock, wall_time_ns
 
 FLUSH_PERIOD_NS = 20_000_000
 
-# link state -> class and data[1], data[4] of the CAN error frame that says it (linux/can/error.h)
+# link state -> class, data[1], data[4] of the CAN error frame that says it (linux/can/error.h)
 _ERROR_FRAMES: dict[LinkState, tuple[int, int, int]] = {
     LinkState.RX_OVERFLOW: (0x004, 0x01, 0),
     LinkState.TX_OVERFLOW: (0x004, 0x02, 0),
-    LinkState.ERROR_WARNING: (0x004, 0x08, 0),
-    LinkState.ERROR_PASSIVE: (0x004, 0x20, 0),
+    LinkState.ERROR_WARNING: (0x004, 0x0C, 0),
+    LinkState.ERROR_PASSIVE: (0x004, 0x30, 0),
     LinkState.ERROR_ACTIVE: (0x004, 0x40, 0),
     LinkState.DISCONNECTED: (0x010, 0, 0x44),  # transceiver: no wire on either line
     LinkState.NO_ACK: (0x020, 0, 0),
@@ -24,6 +26,32 @@ _ERROR_FRAMES: dict[LinkState, tuple[int, int, int]] = {
     LinkState.BUS_ERROR: (0x080, 0, 0),
     LinkState.RESTARTED: (0x100, 0, 0),
 }
+_RECEIVING, _SENDING = 0x14, 0x28  # bits of data[1]: which side's errors led to warning or passive
+_COUNTERS, _COUNTED = 0x200, re.compile(r"counters tx (\d+) rx (\d+)")
+_LOST_FRAMES = {LinkState.RX_OVERFLOW, LinkState.TX_OVERFLOW}  # their number counts frames, not events
+_DOWN = {LinkState.BUS_OFF: "went bus-off", LinkState.DISCONNECTED: "was disconnected"}
+_UP = {LinkState.ERROR_ACTIVE, LinkState.RESTARTED}
+
+
+def error_frame(event: LinkEvent) -> tuple[int, bytes]:
+    """Class and data of the error frame that says what a link event says; several occurrences are as many frames."""
+    error_class, controller, transceiver = _ERROR_FRAMES[event.state]
+    if event.state in (LinkState.ERROR_WARNING, LinkState.ERROR_PASSIVE):
+        sides = _RECEIVING * ("receive" in event.detail) | _SENDING * ("transmit" in event.detail)
+        controller &= sides or controller
+    sent = received = 0
+    if counted := _COUNTED.search(event.detail):
+        error_class |= _COUNTERS
+        sent, received = (min(int(count), 255) for count in counted.groups())
+    return error_class, bytes((0, controller, 0, 0, transceiver, 0, sent, received))
+
+
+def recorded_events(error_class: int, data: bytes, bus: BusName, time_ns: int) -> list[LinkEvent]:
+    """Link events of an error frame in a recording: those of the kernel, and the one it has no frame of."""
+    disconnected, _, no_wire = _ERROR_FRAMES[LinkState.DISCONNECTED]
+    if error_class == disconnected and data[4] == no_wire:
+        return [LinkEvent(bus, LinkState.DISCONNECTED, time_ns)]
+    return link_events(error_class, data, bus, time_ns)
 
 
 class RecorderError(BrakebenchError):
@@ -58,6 +86,7 @@ class Recorder:
         self.frames = 0
         self.lost = 0
         self._buses = buses
+        self._down: dict[BusName, LinkEvent] = {}
         self._wall_offset_ns = wall_time_ns() - WallClock().now_ns() if epoch_ns is None else epoch_ns
         try:
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
@@ -80,18 +109,41 @@ class Recorder:
             raise RecorderError(f"{self.path}: recording is INCOMPLETE ({error.strerror})") from error
 
     def _line(self, item: Received) -> str:
+        times = 1
         if isinstance(item, LinkEvent):
-            if item.state is LinkState.RX_OVERFLOW:
-                self.lost += item.number
-            error_class, controller, transceiver = _ERROR_FRAMES[item.state]
-            identifier, data = f"{0x20000000 | error_class:08X}", bytes((0, controller, 0, 0, transceiver, 0, 0, 0))
+            self._note(item)
+            error_class, data = error_frame(item)
+            identifier = f"{0x20000000 | error_class:08X}"
+            times = 1 if item.state in _LOST_FRAMES else item.number
         else:
             self.frames += 1
             identifier, data = f"{item.can_id:08X}" if item.extended else f"{item.can_id:03X}", item.data
         seconds, rest = divmod(item.time_ns + self._wall_offset_ns, 1_000_000_000)
-        return f"({seconds}.{rest // 1000:06d}) {item.bus} {identifier}#{data.hex().upper()}\n"
+        return f"({seconds}.{rest // 1000:06d}) {item.bus} {identifier}#{data.hex().upper()}\n" * times
+
+    def _note(self, event: LinkEvent) -> None:
+        """Keep in mind what the end of the recording has to tell."""
+        if event.state is LinkState.RX_OVERFLOW:
+            self.lost += event.number
+        elif event.state in _DOWN:
+            self._down[event.bus] = event
+        elif event.state in _UP:
+            self._down.pop(event.bus, None)
 
     def close(self) -> None:
-        """Write what is left and close the file."""
+        """Write what is left and close the file.
+
+        Raises
+        ------
+        RecorderError
+            A link had failed and not come back, so that the file is not what was on the bus.
+        """
         self.flush()
         os.close(self._file)
+        if self._down:
+            bus, event = next(iter(self._down.items()))
+            raise RecorderError(
+                f"{self.path}: recording is INCOMPLETE: the {bus} bus {_DOWN[event.state]} ({event.detail}) and did "
+                "not come back; frames recorded after that were heard on this machine only. Check wires, bit rate and "
+                "the other nodes, then take the link down and up"
+            )

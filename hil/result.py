@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from dbc.bench_messages import ManoeuvreState
 from dbc.contract import contract
 from dbc.frame import BusName, LinkEvent
-from hil.bus.error_frame import link_events as decode_error_frame
 from hil.log.decode import DecodedLog, decode_log, own_databases
 from hil.log.frames import FrameFlag, Recording
 from hil.log.read import read_log
+from hil.recorder import recorded_events
 
 Floats = NDArray[np.float64]
 
@@ -195,5 +195,5 @@ def link_events(signals: Signals) -> list[LinkEvent]:
     for row in np.flatnonzero((frames.flags & FrameFlag.ERROR) != 0):
         bus = BusName(frames.channels[frames.channel[row]])
         time_ns = round((float(signals.decoded.time_s[row]) - signals.start_s) * 1e9)
-        events += decode_error_frame(int(frames.can_id[row]), frames.data[row].tobytes(), bus, time_ns)
+        events += recorded_events(int(frames.can_id[row]), frames.data[row].tobytes(), bus, time_ns)
     return events
