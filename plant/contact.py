@@ -32,6 +32,15 @@ FRICTION_FLOOR = 1e-3
 
 
 @equation
+def static_load(i: int, cos_grade: float, p: Vector) -> float:
+    """Load of one wheel at rest, N; of the sprung mass as on the flat, where the springs are at their zero."""
+    front_m, rear_m = p[P.vehicle_cog_to_axle_m], p[P.vehicle_cog_to_axle_m + 1]
+    share = (rear_m if i < 2 else front_m) / (front_m + rear_m)
+    unsprung = 0.5 * per_axle(i, p, P.vehicle_unsprung_mass_kg)
+    return GRAVITY_MPS2 * (0.5 * p[P.vehicle_mass_kg] * share - unsprung + unsprung * cos_grade)
+
+
+@equation
 def wheel_load(i: int, torque: float, cos_grade: float, x: Vector, p: Vector) -> float:
     """Vertical load of one wheel, N: static share, unsprung weight, spring and links."""
     front = 1.0 if i < 2 else -1.0
@@ -52,9 +61,7 @@ def wheel_load(i: int, torque: float, cos_grade: float, x: Vector, p: Vector) ->
         front, wheel_y, per_axle(i, p, P.suspension_brake_support_tangent),
         per_axle(i, p, P.suspension_roll_centre_height_m),
     )  # fmt: skip
-    unsprung = 0.5 * per_axle(i, p, P.vehicle_unsprung_mass_kg)
-    sprung = 0.5 * p[P.vehicle_mass_kg] * share - unsprung
-    return max((sprung + unsprung * cos_grade) * GRAVITY_MPS2 + spring + links, 0.0)
+    return max(static_load(i, cos_grade, p) + spring + links, 0.0)
 
 
 @equation

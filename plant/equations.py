@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from plant.brakes import brakes
 from plant.compiled import block, equation
-from plant.contact import contacts
+from plant.contact import contacts, static_load
 from plant.motors import motors
 from plant.road import segment_at
 from plant.vectors import P, U, X, Y
@@ -60,8 +60,7 @@ def body(x: Vector, u: Vector, p: Vector, y: Vector, cos_grade: float, sin_grade
         force, cross = y[Y.longitudinal_force_n + i], y[Y.lateral_force_n + i]
         body_x, body_y = force * c - cross * s, force * s + cross * c
         lift = 0.5 * p[P.vehicle_lift_coefficient + axle] * abs(aero)
-        unsprung = 0.5 * p[P.vehicle_unsprung_mass_kg + axle]
-        up = y[Y.wheel_load_n + i] - unsprung * GRAVITY_MPS2 * cos_grade + lift
+        up = y[Y.wheel_load_n + i] - static_load(i, cos_grade, p) + lift
         sum_x += body_x
         sum_y += body_y
         sum_yaw += wheel_x * body_y - wheel_y * body_x
@@ -82,7 +81,7 @@ def body(x: Vector, u: Vector, p: Vector, y: Vector, cos_grade: float, sin_grade
     y[rate + X.heave_m] = x[X.heave_rate_mps]
     y[rate + X.pitch_rad] = x[X.pitch_rate_rad_s]
     y[rate + X.roll_rad] = x[X.roll_rate_rad_s]
-    y[rate + X.heave_rate_mps] = sum_up / sprung - GRAVITY_MPS2 * cos_grade
+    y[rate + X.heave_rate_mps] = sum_up / sprung + GRAVITY_MPS2 * (1.0 - cos_grade)
     y[rate + X.pitch_rate_rad_s] = sum_pitch / p[P.vehicle_pitch_inertia_kg_m2]
     y[rate + X.roll_rate_rad_s] = sum_roll / p[P.vehicle_roll_inertia_kg_m2]
     y[rate + X.distance_m] = sqrt(speed * speed + lateral * lateral)
