@@ -5,8 +5,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from dbc.frame import BusName, Frame, Received
-from hil.bus.bus import Bus, open_bus
+from hil.bus.bus import Bus
 from hil.bus.channel import bench_channel, claim_channel
+from hil.bus.open import open_bus
 from hil.node_process import NODE_PERIOD_NS
 from hil.process import Child, StopSignal, wait_for_end
 from hil.rig import BenchError, BenchState, Rig, Say, silent

@@ -6,8 +6,9 @@ from typing import Self
 
 from dbc.contract import contract
 from dbc.frame import BusName, Frame, Received
-from hil.bus.bus import Bus, open_bus
+from hil.bus.bus import Bus
 from hil.bus.channel import bench_channel
+from hil.bus.open import open_bus
 
 Owned = dict[tuple[BusName, int], int]
 

@@ -1,15 +1,15 @@
-"""The bus protocol, and how a bus is named and opened.
+"""The bus protocol, and how a bus is named.
 
 A bus is named ``KIND:CHANNEL[,OPTION=VALUE...]``: ``loopback:demo``, ``socketcan:vcan0``,
 ``kvaser:0,bitrate=250000``. A kind that is not ours is python-can's interface of that name, its options go to it.
 """
 
 import select
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from types import TracebackType
 from typing import NamedTuple, Protocol, Self
 
-from dbc.frame import BusName, Frame, Received
+from dbc.frame import Frame, Received
 from hil.errors import BrakebenchError
 
 Option = str | int | float | bool
@@ -57,6 +57,10 @@ class Bus(Protocol):
     ) -> None: ...
 
 
+OWN_KINDS = ("loopback", "socketcan")
+"""Kinds of bus of our own (`hil.bus.open`); any other is left to python-can."""
+
+
 class BusSpec(NamedTuple):
     """A bus by name: ``kind:channel`` and the driver's options."""
 
@@ -99,58 +103,6 @@ def _option(text: str) -> Option:
         except ValueError:
             pass
     return text
-
-
-def _open_loopback(spec: BusSpec, bus: BusName) -> Bus:
-    from hil.bus.loopback import LoopbackBus
-
-    if spec.options:
-        raise BusError(f"bus {spec.name}: a loopback has no options, got {', '.join(spec.options)}")
-    return LoopbackBus(spec.channel, bus)
-
-
-def _open_socketcan(spec: BusSpec, bus: BusName) -> Bus:
-    from hil.bus.socketcan import SocketcanBus
-
-    return SocketcanBus(spec, bus)
-
-
-def _open_python_can(spec: BusSpec, bus: BusName) -> Bus:
-    from hil.bus.python_can import PythonCanBus
-
-    return PythonCanBus(spec, bus)
-
-
-class BusKind(NamedTuple):
-    """A kind of bus of our own."""
-
-    kind: str
-    open: Callable[[BusSpec, BusName], Bus]
-
-
-BUS_KINDS: tuple[BusKind, ...] = (BusKind("loopback", _open_loopback), BusKind("socketcan", _open_socketcan))
-"""Our own kinds; any other is left to python-can."""
-
-
-def open_bus(spec: str, bus: BusName) -> Bus:
-    """Join a bus.
-
-    Parameters
-    ----------
-    spec : ``KIND:CHANNEL[,OPTION=VALUE...]`` or ``auto`` (see `hil.bus.channel.resolve`).
-    bus : which of the two buses it carries.
-
-    Raises
-    ------
-    BusError : malformed, unknown kind, no such channel, no permission.
-    """
-    from hil.bus.channel import resolve
-
-    parsed = parse_spec(resolve(spec))
-    for kind in BUS_KINDS:
-        if kind.kind == parsed.kind:
-            return kind.open(parsed, bus)
-    return _open_python_can(parsed, bus)
 
 
 def wait(buses: Sequence[Bus], timeout_s: float) -> None:

@@ -3,7 +3,7 @@
 import logging
 from typing import TYPE_CHECKING, Any
 
-from hil.bus.bus import BUS_KINDS, BusError, BusSpec
+from hil.bus.bus import OWN_KINDS, BusError, BusSpec
 
 if TYPE_CHECKING:
     import can
@@ -33,7 +33,7 @@ def open_driver(spec: BusSpec) -> tuple["can.BusABC", "can.Message | None"]:
         log.setLevel(logging.CRITICAL)
     channel: Any = int(spec.channel) if spec.channel.isdigit() else spec.channel
     if spec.kind not in can.VALID_INTERFACES:
-        kinds = ", ".join(sorted({kind.kind for kind in BUS_KINDS} | can.VALID_INTERFACES))
+        kinds = ", ".join(sorted(set(OWN_KINDS) | can.VALID_INTERFACES))
         raise BusError(f"bus {spec.name}: there is no kind {spec.kind!r}, only {kinds}")
     try:
         driver = can.Bus(channel=channel, interface=spec.kind, ignore_config=True, **_options(spec))

@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 from dbc.frame import BusName
-from hil.bus.bus import open_bus
 from hil.bus.channel import bench_channel
+from hil.bus.open import open_bus
 from hil.cli.options import add_bus, add_ready_fd
 from hil.process import StopSignal, end_with_parent, say_ready
 from hil.recorder import FLUSH_PERIOD_NS, Recorder

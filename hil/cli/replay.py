@@ -55,8 +55,8 @@ def _speed(text: str) -> float:
 def run(args: argparse.Namespace) -> int:
     """Replay until the log ends or somebody says stop."""
     from dbc.frame import BusName
-    from hil.bus.bus import open_bus
     from hil.bus.channel import bench_channel, resolve
+    from hil.bus.open import open_bus
     from hil.log.read import read_log
     from hil.process import StopSignal
     from hil.rt.clock import WallClock

@@ -6,8 +6,9 @@ import statistics
 import sys
 
 from dbc.frame import BusName, Frame
-from hil.bus.bus import BusError, open_bus
+from hil.bus.bus import BusError
 from hil.bus.channel import claim_channel
+from hil.bus.open import open_bus
 from hil.bus.rendezvous import base_directory
 from hil.doctor.line import Line, Status
 from hil.process import output_of

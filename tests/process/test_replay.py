@@ -12,7 +12,7 @@ from dbc.contract import spec_of
 from dbc.frame import BusName, Frame
 from dbc.messages import BrakeMode, BrakePedal, BrakeStatus, EhbDemandFront
 from ecu.node import EcuNode
-from hil.bus.bus import open_bus
+from hil.bus.open import open_bus
 from hil.node_process import ECU, NODE_PERIOD_NS, PLANT
 from hil.rt.lockstep import Member, lockstep
 from hil.scenario import load_scenario
