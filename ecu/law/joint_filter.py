@@ -33,10 +33,10 @@ SLIDING = MOTOR_LAG + 4  # seconds that a wheel still counts as sliding
 TORQUE = SLIDING + 4
 LOCKED = TORQUE + 4  # seconds that a wheel has stood while the car moves
 LAST_WHEEL = LOCKED + 4
-PITCH, PITCH_RATE, LOAD_ACCELERATION, FORCE_LAG, RELEASED_S, STARTED, REJECTED_S = (
-    LAST_WHEEL + 4 + i for i in range(7)
-)
-SIZE = LAST_WHEEL + 11
+SPIN = LAST_WHEEL + 4  # speed and rate with which a wheel spins down
+SPIN_RATE = SPIN + 4
+PITCH, PITCH_RATE, LOAD_ACCELERATION, FORCE_LAG, RELEASED_S, STARTED, REJECTED_S = (SPIN_RATE + 4 + i for i in range(7))
+SIZE = SPIN_RATE + 11
 
 # inputs
 AX, AY, YAW_RATE, STEER, DEMAND = 0, 1, 2, 3, 4
@@ -57,8 +57,8 @@ SLIDING_HOLD_S = 0.15
 REJECT_S = 0.5
 LOCKED_SHARE = 0.15  # of the speed of the car: slower than that a wheel may be locked
 SPIN_UP_RAD_S = 1.0  # faster in one sample: it is turning again
-BOUNCE_RAD_S = 3.0
-STANDING_RAD_S = 3.5  # below it a wheel that spins down stands within two samples
+TOOTH_RAD_S = 14.0  # about one tooth in a sample
+STANDING_RAD_S = 1.0
 TOOTH_WAIT_S = 0.08  # a wheel that stops jumps back to what the missing tooth allows at most, and decays from there
 RELEASED_PA = 3e5
 SETTLED_S = 0.4
@@ -278,17 +278,17 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
                 s[SLIDING + i] = SLIDING_HOLD_S
             step = omega - s[LAST_WHEEL + i]
             spin[i] = step / dt
+            if omega > TOOTH_RAD_S:
+                s[SPIN_RATE + i] += 0.3 * (spin[i] - s[SPIN_RATE + i])
+                s[SPIN + i] = omega + s[SPIN_RATE + i] * p[P_WHEEL_LAG]
+            else:  # too few teeth pass to see the wheel stop: go on as it went
+                s[SPIN + i] += s[SPIN_RATE + i] * dt
             slow = slip < LOCKED_SHARE - 1.0
             if s[LOCKED + i] > 0.0:
                 s[LOCKED + i] += dt
                 if s[LOCKED + i] > TOOTH_WAIT_S and (not slow or step > SPIN_UP_RAD_S):
                     s[LOCKED + i] = 0.0
-            elif (slow and (omega < STANDING_RAD_S or omega + 2.0 * step <= 0.0)) or (
-                # the jump of a stopped toothed wheel, told from a wheel that turns again by the force the car lacks
-                step > BOUNCE_RAD_S
-                and s[LAST_WHEEL + i] * radius < 2.0 * LOCKED_SHARE * along[i]
-                and mass * (s[BIAS] - ax) < 0.75 * abs(force)
-            ):
+            elif slow and (s[SPIN + i] + 0.5 * s[SPIN_RATE + i] * dt <= 0.0 or omega < STANDING_RAD_S):
                 s[LOCKED + i] = dt
             if s[LOCKED + i] > 0.0:
                 locked_load += loads[i]
