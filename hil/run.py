@@ -106,7 +106,7 @@ def finish(rig: Rig, seed: int, provenance: Mapping[str, object], failure: str =
     scenario = rig.scenario
     signals = Signals(rig.log)
     result = measure(signals)
-    met = list(_expected(scenario, result, signals))
+    met = list(expected(scenario, result, signals))
     verdict, reason = _judge(rig, met, failure)
     report = build_report(
         scenario.title, signals, result, verdict, reason, _provenance(scenario, rig, seed) | dict(provenance)
@@ -140,7 +140,7 @@ def new_folder(name: str) -> Path:
         return folder
 
 
-def _expected(scenario: Scenario, result: RunResult, signals: Signals) -> Iterator[Number]:
+def expected(scenario: Scenario, result: RunResult, signals: Signals) -> Iterator[Number]:
     """What the scenario expects, and whether it came."""
     values = result.as_json()
     for e in scenario.expectations:

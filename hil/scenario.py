@@ -22,6 +22,7 @@ from plant.parameters.plant import PlantParameters
 from plant.road import DRY, RoadSegment
 
 DEFAULT_SCENARIO = "stop72"
+LONGEST_S = 3600.0
 FAULT_NAMES = tuple(fault.name.lower() for fault in PhysicalFault if fault is not PhysicalFault.NONE)
 EXPECTABLE = (
     "stop_distance_m",
@@ -56,7 +57,8 @@ class SignalExpectation:
     @property
     def name(self) -> str:
         """What is expected of what, for people."""
-        return f"{self.signal} from {self.from_s:g} to {self.to_s:g} s"
+        until = "the end" if self.to_s >= LONGEST_S else f"{self.to_s:g} s"
+        return f"{self.signal} from {self.from_s:g} s to {until}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +177,7 @@ def _manoeuvre(top: Table, start: Table) -> Manoeuvre:
         initial_speed_mps=start.number("speed_mps", None, 0.0, 60.0),
         initial_disc_temperature_k=start.number("disc_temperature_k", 423.15, 200.0, 1200.0),
         initial_state_of_charge=start.number("state_of_charge", 0.7, 0.0, 1.0),
-        duration_s=end.number("duration_s", None, 0.1, 3600.0),
+        duration_s=end.number("duration_s", None, 0.1, LONGEST_S),
         end_after_standstill_s=_standstill(end),
         pedal=driver.trace("pedal", 0.0, 1.0),
         steering_wheel_rad=driver.trace("steering_wheel_rad", -15.0, 15.0),
@@ -197,7 +199,7 @@ def _standstill(end: Table) -> float | None:
     if end.has("after_standstill_s") and end.peek("after_standstill_s") is False:
         end.take("after_standstill_s")
         return None
-    return end.number("after_standstill_s", 1.0, 0.0, 3600.0)
+    return end.number("after_standstill_s", 1.0, 0.0, LONGEST_S)
 
 
 def _speed_phase(table: Table) -> SpeedPhase:
@@ -218,13 +220,13 @@ def _blending(top: Table) -> Trace:
 
 def _faults(table: Table) -> Iterator[FaultEvent]:
     """One fault, and its end where ``until_s`` is given."""
-    at_s = table.number("at_s", None, 0.0, 3600.0)
+    at_s = table.number("at_s", None, 0.0, LONGEST_S)
     fault = PhysicalFault[table.choice("fault", FAULT_NAMES).upper()]
     names = table.names("wheels", WHEELS)
     wheels = sum(1 << WHEELS.index(name) for name in names) if names else ALL_WHEELS
     yield FaultEvent(at_s, fault, wheels)
     if table.has("until_s"):
-        yield FaultEvent(table.number("until_s", None, at_s, 3600.0), fault, wheels, active=False)
+        yield FaultEvent(table.number("until_s", None, at_s, LONGEST_S), fault, wheels, active=False)
     table.done()
 
 
@@ -269,8 +271,8 @@ def _signal_expectation(table: Table) -> SignalExpectation:
     if name not in known:
         near = get_close_matches(name, sorted(known), 3) or ["MESSAGE.SIGNAL of brake.dbc or bench.dbc"]
         raise ScenarioError(f"{table.at('signal')}: no signal {name!r}; did you mean {', '.join(near)}?")
-    from_s = table.number("from_s", 0.0, 0.0, 3600.0)
-    to_s = table.number("to_s", 3600.0, from_s, 3600.0)
+    from_s = table.number("from_s", 0.0, 0.0, LONGEST_S)
+    to_s = table.number("to_s", LONGEST_S, from_s, LONGEST_S)
     low, high = _limits(table)
     if low == -math.inf and high == math.inf:
         raise ScenarioError(f"{table.at('min')}: expected min, max or both")
