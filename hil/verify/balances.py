@@ -30,7 +30,7 @@ def topic() -> Topic:
         {
             "pressure_demand_pa": lambda t: 25e5 * np.clip((t - 0.5) / 0.3, 0.0, 1.0),
             "motor_demand_nm": lambda t: -150.0 * np.clip((t - 0.5) / 0.3, 0.0, 1.0),
-            "steering_wheel_rad": lambda t: 0.35 * np.clip(t / 1.0, 0.0, 1.0),
+            "steering_wheel_rad": lambda t: 0.12 * np.clip(t / 1.0, 0.0, 1.0),
         },
     )
     run = drive(table, 30.0, COLUMNS, method=RUNGE_KUTTA_4)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from hil.report.report import Panel, Section, Trace
+from hil.report.report import Chart, Curve, Panel, Section, Trace
 from hil.report.units import KMH, Display
 from hil.verify.car import drive, inputs, paper_car
 from hil.verify.topic import Topic, below, within
@@ -49,26 +49,29 @@ def topic() -> Topic:
         below("Over charge limit", over_kw, 2.0, "kW", "the motors' lag lets it pass shortly"),
         below("Promised over limit", float((promised - limit).max()) / 1e3, 0.01, "kW", "sum of torque times speed"),
         below("Full battery", float(np.abs(full.four("motor_torque_nm")).max()), 1e-6, "N m", "charge of 96 %"),
-        below("Below 3 km/h", float(np.abs(regen.four("motor_torque_nm")[last][20:]).max()), 1e-3, "N m", "faded out"),
+        below("Below 3 km/h", float(np.abs(regen.four("motor_torque_nm")[last][20:]).max()), 0.01, "N m", "faded out"),
         within("Friction used", float(used.max()), 0.10, 0.21, "", "locked wheels slide below the peak of 0.2"),
         within("Wheel recovers", float(behind), -0.1, 0.1, "m/s", "behind the patch"),
         within("Yaw, split", turned / pushed, 0.85, 1.02, "", "angular momentum over the forces' moment, 0.15 s"),
     )
+    braking = slice(0, 1300)
+    time_s = regen.time_s[braking]
     power_traces = (
-        Trace("motors", regen.time_s, total),
-        Trace("battery accepts", regen.time_s, limit, "demand"),
-        Trace("promised", regen.time_s, promised, "estimate"),
+        Trace("motors", time_s, total[braking]),
+        Trace("battery accepts", time_s, limit[braking], "demand"),
+        Trace("promised", time_s, promised[braking], "estimate"),
     )
     wheels = [
-        Trace(f"wheel {w}", slide.time_s, slide[f"wheel_speed_rad_s_{w}"] * radius, group=w) for w in ("fl", "rl")
+        Curve(f"wheel {w}", slide.time_s, slide[f"wheel_speed_rad_s_{w}"] * radius, group=w) for w in ("fl", "rl")
     ]
-    yaw = Trace("yaw", split.time_s, split["yaw_rad"])
-    panels = (
-        Panel("Regeneration from 130 km/h", KW, power_traces),
-        Panel("A patch of 0.2 from 30 to 45 m", KMH, (Trace("car", slide.time_s, slide["speed_mps"]), *wheels)),
-        Panel("Split friction 1 left, 0.2 right, 60 bar, no steering", DEG, (yaw,)),
+    car_speed = Curve("car", slide.time_s, slide["speed_mps"])
+    yaw = Curve("yaw", split.time_s, split["yaw_rad"])
+    panels = (Panel("Regeneration from 130 km/h", KW, power_traces),)
+    charts = (
+        Chart("A patch of 0.2 from 30 to 45 m, 34 bar", "time", "s", "speed", KMH, (car_speed, *wheels)),
+        Chart("Split friction 1 left, 0.2 right, 60 bar, no steering", "time", "s", "yaw angle", DEG, (yaw,)),
     )
-    return Topic("Limits", "their own statements", numbers, Section("Limits", panels))
+    return Topic("Limits", "their own statements", numbers, Section("Limits", panels, charts=charts))
 
 
 def _lateral_positions() -> tuple[float, float, float, float]:

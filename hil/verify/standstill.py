@@ -24,24 +24,24 @@ def topic() -> Topic:
             drift = float(np.ptp(run["x_m"][held]))
             numbers.append(below(f"{100 * grade:+.0f} %, {name}", 1e3 * drift, 1.0, "mm", "drift in 30 s"))
             if method == SEMI_IMPLICIT:
-                first = slice(stood - 400, stood + 200)
+                first = slice(stood - 310, stood - 150)  # from 0.1 s before standing
                 t = run.time_s[first] - run.time_s[stood - 300]
                 label = f"{100 * grade:+.0f} %"
                 position.append(Trace(label, t, 1e3 * (run["x_m"][first] - run["x_m"][stood])))
                 speed.append(Trace(label, t, run["speed_mps"][first]))
     locked = drive(inputs(8.0, {"pressure_demand_pa": 140e5}), 20.0, COLUMNS)
-    end = slice(int(np.argmax(locked["speed_mps"] <= 0.0)) - 30, None)
-    t = locked.time_s[end] - locked.time_s[end][30]
+    end = slice(int(np.argmax(locked["speed_mps"] <= 0.0)) - 10, None)
+    t = (locked.time_s[end] - locked.time_s[end][10])[:160]
     rest = float(np.abs(locked["speed_mps"][-200:]).max())
     force = float(np.ptp(locked.four("longitudinal_force_n")[-200:], axis=0).max())
     numbers += [
-        below("Speed after a locked stop", 1e3 * rest, 1.0, "mm/s", "3 s after it"),
+        below("Speed after locking", 1e3 * rest, 1.0, "mm/s", "3 s after it"),
         below("Force ripple then", force, 20.0, "N", "a chattering tyre would show hundreds"),
     ]
     panels = (
         Panel("Speed as the car comes to rest on a grade", "m/s", tuple(speed)),
-        Panel("Way to the resting place", "mm", tuple(position)),
-        Panel("Stop with locked wheels on the flat", "m/s", (Trace("speed", t, locked["speed_mps"][end]),)),
+        Panel("Position from the resting place", "mm", tuple(position)),
+        Panel("Stop with locked wheels on the flat", "m/s", (Trace("speed", t, locked["speed_mps"][end][:160]),)),
     )
-    text = "The rocking after a stop is the car on its tyres and brakes; its frequency is 2 to 3 Hz."
+    text = "The rocking after a stop is the car on its tyres and brakes, at about 4 Hz."
     return Topic("Standstill", "rest", tuple(numbers), Section("Standstill", panels, text=text))

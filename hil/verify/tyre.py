@@ -90,8 +90,8 @@ def topic() -> Topic:
             )
         charts.append(Chart(title, label, unit, "force", KN, tuple(curves)))
     numbers = [
-        below("Longitudinal, largest", 1e6 * worst_x, 1.0, "ppm of the load", "difference over all slips and loads"),
-        below("Lateral, largest", 1e6 * worst_y, 1.0, "ppm of the load", "difference over all slips and loads"),
+        below("Longitudinal, largest", 1e6 * worst_x, 1.0, "ppm", "of the load, over all slips and loads"),
+        below("Lateral, largest", 1e6 * worst_y, 1.0, "ppm", "of the load, over all slips and loads"),
     ]
     for load, published in PUBLISHED_STIFFNESS_N.items():
         stiffness_kn = slip_stiffness(load, load_offset(load, p), p) / 1e3
