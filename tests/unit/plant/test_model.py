@@ -1,0 +1,194 @@
+"""The model as a whole: replays, cuts, batches, the inertial sensor on a grade, symmetry."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from plant.integrate import RUNGE_KUTTA_4
+from plant.model import advance, column_indices, compile_model, healthy, initial_state, pack, replay
+from plant.road import DRY, RoadSegment, road_table
+from plant.vectors import CUT, INPUT, OUTPUT, STATE, SWITCH, U, X, Y
+
+ROWS = 300
+
+
+@pytest.fixture
+def stop(paper_car):
+    """Start, inputs and parameters of three seconds of braking with brakes and motors."""
+    inputs = np.zeros((ROWS, INPUT.size))
+    inputs[30:, INPUT.slice("pressure_demand_pa")] = 25e5
+    inputs[30:, INPUT.slice("motor_demand_nm")] = -80.0
+    return initial_state(paper_car, 25.0, 423.15, 0.7), inputs, pack(paper_car)
+
+
+def test_compiles():
+    compile_model()
+
+
+def test_own_pressure_at_the_pressure_cut_gives_the_same_stop(stop):
+    """At the 10 ms of a log: what is left is the line drawn between its samples."""
+    start, inputs, p = stop
+    pressures = [f"pressure_pa_{w}" for w in ("fl", "fr", "rl", "rr")]
+    first = replay(start, inputs, p, ["speed_mps", *pressures])[0]
+    measured = inputs.copy()
+    measured[:, INPUT.slice("pressure_demand_pa")] = 0.0
+    measured[:, INPUT.slice("pressure_pa")] = first[:, 1:]
+    cut = CUT.zeros()
+    cut[CUT.slice("pressure")] = 1.0
+    again = replay(start, measured, p, ["speed_mps"], cut=cut)[0]
+    assert np.abs(again[:, 0] - first[:, 0]).max() < 2e-3
+
+
+@pytest.mark.parametrize(("cut_name", "part", "source"), [
+    ("motor_torque", "motor_torque_nm", "motor_torque_nm"),
+    ("wheel_torque", "wheel_torque_nm", "wheel_torque_nm"),
+    ("force", "longitudinal_force_n", "longitudinal_force_n"),
+])  # fmt: skip
+def test_own_values_at_the_other_cuts(stop, cut_name, part, source):
+    start, inputs, p = stop
+    columns = [f"{source}_{w}" for w in ("fl", "fr", "rl", "rr")]
+    first = replay(start, inputs, p, ["speed_mps", *columns])[0]
+    measured = inputs.copy()
+    measured[:, INPUT.slice(part)] = first[:, 1:]
+    cut = CUT.zeros()
+    cut[CUT.slice(cut_name)] = 1.0
+    again = replay(start, measured, p, ["speed_mps"], cut=cut)[0]
+    assert np.abs(again[:, 0] - first[:, 0]).max() < 0.02
+
+
+def test_demand_still_makes_its_pressure_while_a_measured_one_brakes(stop):
+    start, inputs, p = stop
+    inputs[:, INPUT.slice("pressure_pa")] = 10e5
+    cut = CUT.zeros()
+    cut[CUT.slice("pressure")] = 1.0
+    table = replay(start, inputs, p, ["pressure_pa_fl", "state.pressure_pa_fl"], cut=cut)[0]
+    assert table[-1, 0] == 10e5
+    assert table[-1, 1] == pytest.approx(25e5, rel=1e-3)
+
+
+def test_one_wheel_can_be_cut_alone(stop):
+    start, inputs, p = stop
+    cut = CUT.zeros()
+    cut[CUT.slice("pressure").start] = 1.0  # fl, its measured pressure stays 0
+    table = replay(start, inputs, p, ["friction_torque_nm_fl", "friction_torque_nm_fr"], cut=cut)[0]
+    assert table[-1, 0] == 0.0
+    assert table[-1, 1] < -300.0
+
+
+def test_batch_equals_single_runs_in_any_number_of_threads(stop, paper_car):
+    start, inputs, p = stop
+    heavy = pack(replace(paper_car, vehicle=replace(paper_car.vehicle, mass_kg=1600.0)))
+    cars = np.stack([p, heavy, p])
+    together = replay(start, inputs, cars, ["speed_mps", "pad_friction_rr"], workers=2)
+    assert np.array_equal(together[0], replay(start, inputs, p, ["speed_mps", "pad_friction_rr"])[0])
+    assert np.array_equal(together[0], together[2])
+    assert together[1, -1, 0] > together[0, -1, 0] + 0.5
+
+
+def test_replay_leaves_its_start_alone(stop):
+    start, inputs, p = stop
+    before = start.copy()
+    replay(start, inputs, p, ["speed_mps"])
+    assert np.array_equal(start, before)
+
+
+def test_unknown_columns_are_named():
+    with pytest.raises(KeyError, match="spede_mps"):
+        column_indices(["speed_mps", "spede_mps"])
+
+
+@pytest.mark.parametrize("method", [0, RUNGE_KUTTA_4])
+def test_a_straight_stop_stays_straight(stop, method):
+    start, inputs, p = stop
+    table = replay(start, inputs, p, ["lateral_speed_mps", "yaw_rate_rad_s", "y_m"], method=method)[0]
+    assert np.abs(table).max() < 1e-9
+
+
+def test_left_and_right_bends_mirror_each_other(stop):
+    start, inputs, p = stop
+    left, right = inputs.copy(), inputs.copy()
+    left[:, INPUT.slice("steering_wheel_rad")] = 0.5
+    right[:, INPUT.slice("steering_wheel_rad")] = -0.5
+    columns = ["yaw_rate_rad_s", "y_m", "roll_rad", "imu_lateral_mps2", "wheel_load_n_fl"]
+    one = replay(start, left, p, columns)[0]
+    other = replay(start, right, p, [*columns[:4], "wheel_load_n_fr"])[0]
+    assert one[:, :4] == pytest.approx(-other[:, :4], abs=1e-6)
+    assert one[:, 4] == pytest.approx(other[:, 4], abs=1e-6)
+    assert one[-1, 0] > 0.1  # a steering wheel turned left turns the car left
+
+
+def test_inertial_sensor_on_a_grade(paper_car):
+    """It feels the specific force: at rest on a grade g sin, whatever the wheels say."""
+    inputs = np.zeros((600, INPUT.size))
+    inputs[:, INPUT.slice("pressure_demand_pa")] = 40e5
+    start = initial_state(paper_car, 0.0, 423.15, 0.7)
+    road = road_table((RoadSegment(-1e9, grade=0.05),))
+    table = replay(start, inputs, pack(paper_car), ["imu_longitudinal_mps2", "pitch_rad"], road=road)[0]
+    felt, pitch = table[-1]
+    assert felt == pytest.approx(9.81 * math.sin(math.atan(0.05) - pitch), abs=2e-3)
+    assert pitch < 0.0  # nose up
+
+
+def test_braking_dives_and_the_sensor_feels_more_than_the_car_does(stop):
+    start, inputs, p = stop
+    table = replay(start, inputs, p, ["pitch_rad", "imu_longitudinal_mps2", "acceleration_mps2"])[0]
+    pitch, felt, true = table[-1]
+    assert math.degrees(pitch) / (-true / 9.81) == pytest.approx(1.3, abs=0.2)  # deg/g, nose down
+    assert felt == pytest.approx(true * math.cos(pitch) - 9.81 * math.sin(pitch), abs=0.05)
+
+
+def test_dead_motor_and_refusing_battery(stop):
+    start, inputs, p = stop
+    switch = healthy()
+    switch[SWITCH.slice("motor_alive").start] = 0.0
+    table = replay(start, inputs, p, ["motor_torque_nm_fl", "motor_torque_nm_fr"], switch=switch)[0]
+    assert table[-1].tolist() == pytest.approx([0.0, -80.0], abs=0.1)
+    switch = healthy()
+    switch[SWITCH.slice("battery_accepts")] = 0.0
+    table = replay(start, inputs, p, ["motor_torque_nm_fl", "motor_available_nm_fl"], switch=switch)[0]
+    assert np.abs(table).max() < 1e-9
+
+
+def test_dead_time_is_one(paper_car):
+    inputs = np.zeros((20, INPUT.size))
+    inputs[5:, INPUT.slice("pressure_demand_pa")] = 20e5
+    start = initial_state(paper_car, 20.0, 423.15, 0.7)
+    pressure = replay(start, inputs, pack(paper_car), ["pressure_pa_fl"])[0][:, 0]
+    assert pressure[:8].max() == 0.0  # demanded at 50 ms, nothing up to 70 ms
+    assert pressure[8] > 0.0
+
+
+def test_split_friction_under_left_and_right_wheels(stop):
+    start, inputs, p = stop
+    road = road_table((RoadSegment(-1e9, 0.9, 0.3),))
+    table = replay(start, inputs[:40], p, ["road_friction_fl", "road_friction_fr", "road_friction_rr"], road=road)[0]
+    assert table[0].tolist() == [0.9, 0.3, 0.3]
+
+
+def test_nothing_goes_wild_far_from_the_road(paper_car):
+    """Full steering, full brakes and motors at 60 m/s on ice: finite, and the car slows down."""
+    inputs = np.zeros((1500, INPUT.size))
+    inputs[:, INPUT.slice("pressure_demand_pa")] = 180e5
+    inputs[:, INPUT.slice("motor_demand_nm")] = -700.0
+    inputs[:, U.steering_wheel_rad] = 8.0
+    start = initial_state(paper_car, 60.0, 423.15, 0.7)
+    road = road_table((RoadSegment(-1e9, 0.3, 0.05), RoadSegment(200.0, 1.0, 0.6, 0.1)))
+    for method in (0, RUNGE_KUTTA_4):
+        x, y = start.copy(), OUTPUT.zeros()
+        for row in inputs:
+            advance(x, row, CUT.zeros(), healthy(), pack(paper_car), road, y, 10, 1e-3, method)
+            assert np.isfinite(x).all()
+            assert np.isfinite(y).all()
+        assert math.hypot(x[X.speed_mps], x[X.lateral_speed_mps]) < 40.0
+        assert y[OUTPUT.slice("wheel_load_n")].min() >= 0.0
+
+
+def test_zero_steps_only_look(stop):
+    start, inputs, p = stop
+    x, y = start.copy(), OUTPUT.zeros()
+    advance(x, inputs[0], CUT.zeros(), healthy(), p, road_table(DRY), y, 0)
+    assert np.array_equal(x, start)
+    assert y[Y.wheel_load_n] == pytest.approx(1463.0 * 9.81 * 1.39 / 2.59 / 2.0)
+    assert STATE.size == x.size
