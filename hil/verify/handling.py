@@ -51,7 +51,7 @@ def commonroad_sine(car: PlantParameters, speed_mps: float, time_s: Vector) -> V
 
     ST has one stiffness per load for both axles, given here as the mean of ours; its lateral load transfer is none.
     """
-    from vehiclemodels.vehicle_dynamics_st import vehicle_dynamics_st  # type: ignore[import-untyped]
+    from vehiclemodels.vehicle_dynamics_st import vehicle_dynamics_st
 
     front, rear = axle_stiffness_n_rad(car)
     v = car.vehicle

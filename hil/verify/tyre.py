@@ -33,7 +33,7 @@ def independent(tyre: TyreParameters, slip: Vector, angle_rad: Vector, load_n: f
     It has no dependence on the load, so it is given coefficients that our load makes of ours. Its side force has the
     other sign and its longitudinal slip too; the shifts are off on both sides.
     """
-    from vehiclemodels.utils.tire_model import (  # type: ignore[import-untyped]
+    from vehiclemodels.utils.tire_model import (
         formula_lateral,
         formula_lateral_comb,
         formula_longitudinal,
