@@ -1,0 +1,155 @@
+"""Drive the hidden car through one manoeuvre: fourth-order Runge-Kutta, 2.5 ms."""
+
+from dataclasses import dataclass
+from math import floor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.hide.body import rates
+from hil.hide.car import Car
+from hil.hide.compiled import entry, equation
+from hil.hide.manoeuvres import TICK_S, Manoeuvre
+from hil.hide.strengths import OUTPUTS, ROWS, STATES, E, S, Y
+
+Vector = NDArray[np.float64]
+STEP_S = 0.0025
+PER_TICK = round(TICK_S / STEP_S)
+HOLD_LIMIT_NM = 350.0
+STANDSTILL_S = 0.8
+APPLIED_PA = 1.5e5
+
+
+@dataclass(frozen=True)
+class Driven:
+    """What happened, every 2.5 ms from the start: states, outputs, and the demands every 10 ms."""
+
+    manoeuvre: Manoeuvre
+    states: Vector
+    outputs: Vector
+    motor_demand_nm: Vector
+
+    @property
+    def t_s(self) -> Vector:
+        """Time of each row of states."""
+        return np.arange(len(self.states)) * STEP_S
+
+
+def start_state(manoeuvre: Manoeuvre, car: Car) -> Vector:
+    """A car that rolls straight; pads and tyres at rest with their temperature."""
+    x = np.zeros(STATES)
+    x[S.speed_mps] = manoeuvre.speed_mps
+    x[S.state_of_charge] = manoeuvre.state_of_charge
+    disc = manoeuvre.disc_temperature_k
+    for i in range(4):
+        x[S.omega_rad_s + i] = manoeuvre.speed_mps / car.rolling_radius_m
+        x[S.mu + i] = car.pad_a_1_ks / car.pad_b_1_j * disc / car.pad_epsilon_w
+        x[S.pad_k + i] = disc
+        x[S.disc_k + i] = disc
+        x[S.winding_k + i] = 323.15
+        x[S.tyre_k + i] = 313.15
+        x[S.pressure_pa + i] = manoeuvre.pressure_pa[0, i]
+        x[S.line_pa + i] = manoeuvre.pressure_pa[0, i]
+    return x
+
+
+def drive(manoeuvre: Manoeuvre, car: Car, strength: Vector, onset_s: Vector, law: int, gust_mps2: Vector) -> Driven:
+    """Drive to the end of the demands, or until the car has stood for a while.
+
+    Parameters
+    ----------
+    strength : the hidden effects, (rows, 4).  onset_s : when each row begins in this log, (rows,).
+    law : number of a law that is in no list, 0 for none.  gust_mps2 : force over mass on the body, one a tick.
+    """
+    ticks = manoeuvre.ticks
+    states, outputs = np.zeros((ticks * PER_TICK, STATES)), np.zeros((ticks * PER_TICK, OUTPUTS))
+    demand = manoeuvre.motor_nm.copy()
+    rows = _integrate(
+        start_state(manoeuvre, car), car, strength, onset_s, law, manoeuvre.pressure_pa, demand,
+        manoeuvre.steering_wheel_rad, manoeuvre.hold_mps, gust_mps2, float(manoeuvre.direction), states, outputs,
+    )  # fmt: skip
+    return Driven(manoeuvre, states[:rows], outputs[:rows], demand[: rows // PER_TICK])
+
+
+@equation
+def _held_demand(x: Vector, target_mps: float, car: Car) -> float:
+    push = 0.25 * car.rolling_radius_m * car.mass_kg * 1.5 * (target_mps - x[S.speed_mps])
+    for i in range(4):
+        gain = car.brake_gain_front_nm_pa if i < 2 else car.brake_gain_rear_nm_pa
+        push += 0.25 * gain * x[S.pressure_pa + i]
+    return min(max(push, -HOLD_LIMIT_NM), HOLD_LIMIT_NM)
+
+
+@entry
+def _integrate(
+    x: Vector, car: Car, strength: Vector, onset_s: Vector, law: int, pressure_demand: Vector, motor_demand: Vector,
+    steering: Vector, hold: Vector, gust: Vector, direction: float, states: Vector, outputs: Vector,
+) -> int:  # fmt: skip
+    """March with steps of 2.5 ms and fill ``states`` and ``outputs``; return the rows written."""
+    ticks = steering.size
+    e = np.zeros((ROWS, 4))
+    play, since = x[S.pressure_pa : S.pressure_pa + 4].copy(), np.zeros(4)
+    demand_pa, y, stages, trial = np.zeros(4), np.zeros(OUTPUTS), np.zeros((4, STATES)), np.zeros(STATES)
+    stood = 0.0
+    started = x[S.speed_mps] > 0.0
+    row = 0
+    for tick in range(ticks):
+        now = tick * TICK_S
+        for k in range(ROWS):
+            for i in range(4):
+                e[k, i] = strength[k, i] if now >= onset_s[k] else 0.0
+        if hold[tick] == hold[tick]:
+            motor_demand[tick, :] = _held_demand(x, hold[tick], car)
+        for sub in range(PER_TICK):
+            late = now + sub * STEP_S
+            for i in range(4):
+                delayed = floor((late - car.ehb_dead_time_s - e[E.ehb_dead_time, i]) / TICK_S + 1e-6)
+                demand_pa[i] = pressure_demand[max(delayed, 0), i]
+            for stage in range(4):
+                share = (0.0, 0.5, 0.5, 1.0)[stage] * STEP_S
+                before = stages[max(stage - 1, 0)]
+                for k in range(STATES):
+                    trial[k] = x[k] + share * before[k]
+                rates(
+                    trial, demand_pa, motor_demand[max(tick - 1, 0)], steering[tick], gust[tick], direction, car, e,
+                    law, play, since, stages[stage], y,
+                )  # fmt: skip
+                if stage == 0:
+                    states[row] = x
+                    outputs[row] = y
+            for k in range(STATES):
+                x[k] += STEP_S / 6.0 * (stages[0, k] + 2.0 * stages[1, k] + 2.0 * stages[2, k] + stages[3, k])
+            for i in range(4):
+                width = e[E.pressure_hysteresis, i]
+                p = x[S.pressure_pa + i]
+                play[i] = min(max(play[i], p - width), p + width)
+                since[i] = since[i] + STEP_S if p > APPLIED_PA else 0.0
+                if e[E.pressure_location, i] <= 1e-4:
+                    x[S.line_pa + i] = p
+            row += 1
+        stood = stood + TICK_S if started and x[S.speed_mps] < 0.08 else 0.0
+        if stood > STANDSTILL_S:
+            break
+    return row
+
+
+def energy_balance(driven: Driven, car: Car) -> float:
+    """Energy that does not add up over the drive without gusts, grade and hidden effects, as a share of the losses.
+
+    Kinetic energy of body and wheels lost = work of the brakes and motors, slip, rolling and air.
+    """
+    first, last = driven.states[0], driven.states[-1]
+
+    def kinetic(x: Vector) -> float:
+        body = 0.5 * car.mass_kg * (x[S.speed_mps] ** 2 + x[S.lateral_mps] ** 2)
+        turning = 0.5 * car.yaw_inertia_kg_m2 * x[S.yaw_rate_rad_s] ** 2
+        spin: float = 0.5 * car.wheel_inertia_kg_m2 * float(np.sum(x[S.omega_rad_s : S.omega_rad_s + 4] ** 2))
+        return float(body + turning) + spin
+
+    omega = driven.states[:, S.omega_rad_s : S.omega_rad_s + 4]
+    torque = driven.outputs[:, Y.brake_nm : Y.brake_nm + 4] + driven.outputs[:, Y.motor_true_nm : Y.motor_true_nm + 4]
+    power = np.sum(torque * omega, axis=1) - driven.outputs[:, Y.drag_w]
+    power -= driven.outputs[:, Y.slip_w] + driven.outputs[:, Y.rolling_w]
+    work = float(np.trapezoid(power, dx=STEP_S))
+    lost = float(np.trapezoid(np.abs(power), dx=STEP_S))
+    return (kinetic(last) - kinetic(first) - work) / max(lost, 1.0)
