@@ -135,7 +135,8 @@ class Bench(Rig):
         if not self._stopped:
             self.alive_at_end = sum(not child.ended for child in nodes)
         self._stopped = True
-        for _, child in self._waiting:  # who waits for its release does not hear us
+        waiting, self._waiting = self._waiting, []
+        for _, child in waiting:  # who waits for its release does not hear us
             child.release()
         for group in (nodes, recorder):
             for child in group:

@@ -80,6 +80,7 @@ class Rig(ABC):
         self._say = say
         self._stop_signal = stop
         self._second = -1
+        self._left = False
         out.mkdir(parents=True, exist_ok=True)
 
     @property
@@ -111,12 +112,19 @@ class Rig(ABC):
         """Let one period pass; False where the run is over."""
         if self.state not in (BenchState.STARTED, BenchState.DRIVING):
             return False
+        if self._left:
+            self.state = BenchState.FINISHED
+            return False
         try:
             now_ns = self._pass_period()
             self._follow(now_ns)
         except BenchError as error:
             self._break(str(error))
         return self.state in (BenchState.STARTED, BenchState.DRIVING)
+
+    def leave(self) -> None:
+        """Let the run be over at the next tick, whatever the manoeuvre; may come from another thread."""
+        self._left = True
 
     def run(self) -> None:
         """Run the scenario to its end; ``state`` then says how it went."""

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from threading import Lock
 
 from dbc.bench_messages import (
     FaultCommand,
@@ -54,7 +55,7 @@ class FaultEvent:
 
 
 class Director:
-    """The bench's own node.
+    """The bench's own node. A step and a command may come from two threads.
 
     Parameters
     ----------
@@ -79,6 +80,7 @@ class Director:
         self._start_ns: int | None = None
         self._opening = _OPENING_FRAMES
         self._extra: list[Frame] = []
+        self._lock = Lock()
         self._receiver = Receiver((TruthMotion,))
         self._transmitter = Transmitter()
 
@@ -94,15 +96,16 @@ class Director:
 
     def move(self, channel: Channel, value: float, within_s: float = 0.0) -> None:
         """Bring a channel to a value from now on, linearly within a time."""
-        now = self.next_s
-        past = tuple(point for point in self._traces.get(channel, ()) if point[0] < now)
-        begin = self.value(channel)
-        ramp = ((now, begin if begin is not None and within_s > 0.0 else value), (now + within_s, value))
-        self._traces[channel] = (*past[-1:], *ramp)
+        with self._lock:
+            now, begin = self.next_s, self.value(channel)
+            past = tuple(point for point in self._traces.get(channel, ()) if point[0] < now)
+            ramp = ((now, value if begin is None or within_s == 0.0 else begin), (now + within_s, value))
+            self._traces[channel] = (*past[-1:], *ramp)
 
     def leave(self, channel: Channel) -> None:
         """Stimulate a channel no longer: scenario and parameters decide again."""
-        self._traces.pop(channel, None)
+        with self._lock:
+            self._traces.pop(channel, None)
 
     def value(self, channel: Channel) -> float | None:
         """Value of a channel that acts next; None where it is not stimulated."""
@@ -111,24 +114,27 @@ class Director:
 
     def plan(self, event: FaultEvent) -> None:
         """Add a fault to come."""
-        self._waiting = sorted([*self._waiting, event], key=lambda event: event.at_s)
+        with self._lock:
+            self._waiting = sorted([*self._waiting, event], key=lambda event: event.at_s)
 
     def also_send(self, frames: Iterable[Frame]) -> None:
         """Send frames of any sender, as they are, with the next step."""
-        self._extra += frames
+        with self._lock:
+            self._extra += frames
 
     def step(self, now_ns: int, inbox: list[Received]) -> list[Frame]:
         """Take what the nodes sent, and send what acts next."""
-        self.inbox = inbox
-        self._receiver.accept(now_ns, inbox)
-        self.motion = self._receiver.latest(TruthMotion)
-        if self.motion is not None:
-            if self._start_ns is None and self.motion.manoeuvre is not ManoeuvreState.HOLDING:
-                self._start_ns = now_ns
-            if self._start_ns is not None:
-                self.time_s = (now_ns - self._start_ns) * 1e-9
-        extra, self._extra = self._extra, []
-        return self._transmitter.frames(now_ns, self._outgoing()) + extra
+        with self._lock:
+            self.inbox = inbox
+            self._receiver.accept(now_ns, inbox)
+            self.motion = self._receiver.latest(TruthMotion)
+            if self.motion is not None:
+                if self._start_ns is None and self.motion.manoeuvre is not ManoeuvreState.HOLDING:
+                    self._start_ns = now_ns
+                if self._start_ns is not None:
+                    self.time_s = (now_ns - self._start_ns) * 1e-9
+            extra, self._extra = self._extra, []
+            return self._transmitter.frames(now_ns, self._outgoing()) + extra
 
     def _outgoing(self) -> list[Message]:
         out: list[Message] = []

@@ -38,7 +38,7 @@ def listed() -> list[dict[str, Any]]:
 
     rows = []
     for scenario in map(load_scenario, scenario_names()):
-        expects = [e.name for e in (*scenario.expectations, *scenario.signal_expectations)]
+        expects = [e.name for e in scenario.expectations] + [e.name for e in scenario.signal_expectations]
         rows.append(
             {
                 "name": scenario.name,
