@@ -8,7 +8,21 @@ from importlib.metadata import version
 
 from hil.errors import BrakebenchError
 
-COMMANDS = ("run", "scenarios", "ecu", "plant", "record", "replay", "decode", "convert", "identify", "verify", "doctor", "perf")
+COMMANDS = (
+    "run",
+    "compare",
+    "scenarios",
+    "ecu",
+    "plant",
+    "record",
+    "replay",
+    "decode",
+    "convert",
+    "identify",
+    "verify",
+    "doctor",
+    "perf",
+)
 """Subcommands in the order of the help; each is a module of this package."""
 
 
