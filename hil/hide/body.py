@@ -14,6 +14,7 @@ from hil.hide.strengths import LAW_STEER_DRAG, LAW_STEP_DRAG, LAW_WAVE_ROLLING, 
 Vector = NDArray[np.float64]
 GRAVITY_MPS2, NOMINAL_LOAD_N = 9.81, 4000.0
 SHAPE_X, SHAPE_Y, SIDE_FRICTION = 1.6, 1.35, 1.0
+FILM_S2_M3 = 0.33
 LINKS = 0.4  # share of the load transfer that the links pass at once, past the springs
 HUB_HZ, HUB_DAMPING = 15.0, 0.1
 TYRE_HEAT_J_K, TYRE_COOLING_W_K = 9000.0, 30.0
@@ -41,13 +42,13 @@ def wheel_load(x: Vector, i: int, mass: float, car: Car, e: Vector) -> float:
     share = (rear_m if front else car.cog_to_front_axle_m) / car.wheelbase_m
     side = 1.0 - 2.0 * (i % 2)
     height = car.cog_height_m + e[E.cog_height, 0]
-    sprung = -x[S.pitch_rad] / (car.dive_rad_s2_m + e[E.pitch_dive, 0])
+    sprung = -x[S.pitch_rad] / (car.dive_rad_s2_m * (1.0 + e[E.pitch_dive, 0]))
     along = LINKS * x[S.load_ax_mps2] + (1.0 - LINKS) * sprung
     load = 0.5 * mass * GRAVITY_MPS2 * share
     load += (-0.5 if front else 0.5) * mass * height * along / car.wheelbase_m
-    load -= side * share * mass * height * x[S.load_ay_mps2] / (car.track_front_m if front else car.track_rear_m)
-    lift = (car.lift_area_front_m2 if front else car.lift_area_rear_m2) + e[E.aero_lift, i]
-    load -= 0.25 * car.air_density_kg_m3 * lift * x[S.speed_mps] ** 2
+    load -= side * share * mass * height * x[S.load_ay_mps2] / car.track_m
+    lift = (car.lift_front if front else car.lift_rear) + e[E.aero_lift, i]
+    load -= 0.25 * car.air_density_kg_m3 * car.frontal_area_m2 * lift * x[S.speed_mps] ** 2
     if e[E.road_roughness, 0] != 0.0:
         place = x[S.distance_m] - (0.0 if front else car.wheelbase_m)
         load += 60000.0 * e[E.road_roughness, 0] * road_height(place)
@@ -57,9 +58,9 @@ def wheel_load(x: Vector, i: int, mass: float, car: Car, e: Vector) -> float:
 @equation
 def road_friction(x: Vector, i: int, e: Vector) -> float:
     """Friction the road leaves of the dry one: low friction, split, a film of water that lifts with v^2."""
-    film = e[E.aquaplaning, i] * x[S.speed_mps] * x[S.speed_mps] / 400.0
-    warm = 1.0 + e[E.tyre_temperature, i] * (x[S.tyre_k + i] - 313.15)
-    return max((1.0 + e[E.mu_road, i]) * (1.0 - e[E.split_mu, i]) * (1.0 - film) * warm, 0.05)
+    film = FILM_S2_M3 * e[E.aquaplaning, i] * x[S.speed_mps] * x[S.speed_mps]
+    warm = 1.0 + 0.2 * e[E.tyre_temperature, i] * (x[S.tyre_k + i] - 313.15)
+    return max((1.0 + e[E.mu_road, i]) * (1.0 + e[E.split_mu, i]) * (1.0 - film) * warm, 0.05)
 
 
 @equation
@@ -71,7 +72,7 @@ def wheel(x: Vector, i: int, steer: float, mass: float, car: Car, e: Vector, law
     """
     front = i < 2
     side = 1.0 - 2.0 * (i % 2)
-    half_track = 0.5 * (car.track_front_m if front else car.track_rear_m)
+    half_track = 0.5 * car.track_m
     place = car.cog_to_front_axle_m if front else car.cog_to_front_axle_m - car.wheelbase_m
     angle = steer if front else 0.0
     vx = x[S.speed_mps] - side * half_track * x[S.yaw_rate_rad_s]
@@ -88,14 +89,14 @@ def wheel(x: Vector, i: int, steer: float, mass: float, car: Car, e: Vector, law
     mu = car.tyre_friction * (1.0 + (car.tyre_friction_load + e[E.load_sensitivity, i]) * dfz)
     mu *= road_friction(x, i, e)
     carcass = (1.0 + e[E.slip_stiffness, i]) * (1.0 + 0.25 * loss)
-    carcass *= 1.0 + 2.0 * e[E.tyre_temperature, i] * (x[S.tyre_k + i] - 313.15)
+    carcass *= 1.0 + e[E.tyre_temperature, i] * (x[S.tyre_k + i] - 313.15)
     stiff_x = car.slip_stiffness * (1.0 + car.slip_stiffness_load * dfz) * load * carcass
     stiff_y = car.cornering_stiffness * (1.0 - 0.35 * dfz) * load
 
     omega = x[S.omega_rad_s + i]
     sliding = radius * omega - along
     speed = abs(along)
-    length = max(car.relaxation_length_m + e[E.tyre_relaxation, i], 0.03)
+    length = max(car.relaxation_length_m * (1.0 + e[E.tyre_relaxation, i]), 0.03)
     spare = max(1.0 - abs(x[S.slip + i]) * stiff_x / (3.0 * mu * load), 0.15)
     dx[S.slip + i] = (sliding - speed * x[S.slip + i]) / (length * spare)
     dx[S.side_slip + i] = (-across - speed * x[S.side_slip + i]) / (2.0 * length)
@@ -110,7 +111,7 @@ def wheel(x: Vector, i: int, steer: float, mass: float, car: Car, e: Vector, law
     force_x, force_y = force * pull_x / pull, force * pull_y / pull
     y[Y.tyre_n + i], y[Y.load_n + i] = force_x, load
 
-    resistance = car.rolling_resistance * (1.0 + 0.33 * loss) + e[E.rolling_resistance, i]
+    resistance = car.rolling_resistance * (1.0 + 0.33 * loss) * (1.0 + e[E.rolling_resistance, i])
     if law == LAW_WAVE_ROLLING:
         resistance += e[E.unlisted, i] * exp(-(((x[S.speed_mps] - 14.0) / 4.0) ** 2))
     rolling = load * radius * resistance * tanh(omega / 0.5)
@@ -158,7 +159,7 @@ def rates(
         wheel(x, i, steer, mass, car, e, law, dx, y)
 
     air = speed + direction * e[E.headwind, 0]
-    drag = 0.5 * car.air_density_kg_m3 * car.drag_area_m2 * air * abs(air) * tanh(speed / 0.2)
+    drag = 0.5 * car.air_density_kg_m3 * car.drag_coefficient * car.frontal_area_m2 * air * abs(air) * tanh(speed / 0.2)
     if law == LAW_STEP_DRAG:
         drag += e[E.unlisted, 0] * (0.5 + 0.5 * tanh((speed - 17.0) / 0.5))
     elif law == LAW_STEER_DRAG:
@@ -174,7 +175,7 @@ def rates(
     dx[S.yaw_rate_rad_s] = dx[S.yaw_rate_rad_s] / car.yaw_inertia_kg_m2 * moving - (1.0 - moving) * 5.0 * yaw
     dx[S.distance_m] = speed
 
-    dive = car.dive_rad_s2_m + e[E.pitch_dive, 0]
+    dive = car.dive_rad_s2_m * (1.0 + e[E.pitch_dive, 0])
     w = 6.283185307 * car.pitch_frequency_hz
     dx[S.pitch_rad] = x[S.pitch_rate_rad_s]
     dx[S.pitch_rate_rad_s] = (

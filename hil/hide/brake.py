@@ -10,10 +10,10 @@ from hil.hide.compiled import equation
 from hil.hide.strengths import LAW_APPLY_TIME, LAW_BUMP_PRESSURE, LAW_CUBIC_MU, E, S, Y
 
 Vector = NDArray[np.float64]
-FADE_K, COLD_K, GROWTH_K = 523.15, 373.15, 423.15
-STRIBECK_MPS, PRESSURE_REFERENCE_PA = 8.0, 2.0e6
-BEDDING_J, DRYING_J = 4.0e5, 4.0e4
-HOT_SPOT_K, HOT_SPOTS = 573.15, 10.0
+FADE_K, COLD_K, GROWTH_K = 573.15, 423.15, 423.15
+PRESSURE_REFERENCE_PA, DROOP_PA = 3.0e6, 2.4e7
+BEDDING_J, DRYING_J = 1.0e6, 3.0e4
+HOT_SPOT_K, HOT_SPOTS = 523.15, 10.0
 STICK_RAD_S = 1.0
 LINE_STIFFNESS_M3_PA, ATMOSPHERE_PA = 1.0e-12, 1.0e5
 
@@ -31,7 +31,7 @@ def brake_pressure_rates(x: Vector, i: int, demand_pa: float, car: Car, e: Vecto
     limit = 1.0 + e[E.ehb_rate_limit, i]
     build, release = car.ehb_build_rate_pa_s * limit, car.ehb_release_rate_pa_s * limit
     ceiling = car.ehb_max_pressure_pa
-    target = min(max(demand_pa, 0.0), ceiling) * (1.0 - e[E.accumulator, i] * min(x[S.applied_pa_s + i] / 2.0e7, 1.0))
+    target = min(max(demand_pa, 0.0), ceiling) * (1.0 - e[E.accumulator, i] * min(x[S.applied_pa_s + i] / DROOP_PA, 1.0))
     error = target - p
     if abs(error) < e[E.ehb_deadband, i]:
         error = 0.0
@@ -52,25 +52,25 @@ def brake_pressure_rates(x: Vector, i: int, demand_pa: float, car: Car, e: Vecto
 def friction_factor(x: Vector, i: int, pressure_pa: float, car: Car, e: Vector, law: int, since_s: float) -> float:
     """What multiplies the pads' friction coefficient, each row of the effect catalogue, section C.
 
-    Fade: 1 - k (T - Tf)+.  Cold: less below 373 K.  Stribeck: 1 + e exp(-(v/vs)^2).  Pressure: (p/p0)^-n.
-    Bedding: 1 + e (1 - exp(-E/E0)).  Water: 1 - e exp(-E/E1).  Judder: 1 + A sin(n th).
+    Fade: 1 - k (T - Tf)+.  Cold: less below 423 K.  Speed: 1 + k v, v at the rim.  Pressure: (p/p0)^-n.
+    Bedding: 1 - d exp(-E/E0).  Glazing: 1 - d E.  Water: 1 - w exp(-E/E1).  Judder: 1 + A sin(n th).
     """
     disc, rim = x[S.disc_k + i], abs(x[S.omega_rad_s + i]) * car.rolling_radius_m
-    factor = (1.0 + e[E.pad_mu_gain, i]) * (1.0 + e[E.stuck_corner, i])
+    factor = (1.0 + e[E.pad_mu_gain, i]) * (1.0 - e[E.stuck_corner, i])
     factor *= max(1.0 - e[E.pad_temp_fade, i] * max(disc - FADE_K, 0.0), 0.1)
-    factor *= 1.0 - e[E.mu_warmup, i] * min(max((COLD_K - disc) / 80.0, 0.0), 1.0)
-    if e[E.mu_speed, i] != 0.0:
-        factor *= 1.0 + e[E.mu_speed, i] * exp(-((rim / STRIBECK_MPS) ** 2))
+    factor *= 1.0 - e[E.mu_warmup, i] * min(max((COLD_K - disc) / 100.0, 0.0), 1.0)
+    factor *= 1.0 + e[E.mu_speed, i] * rim
     if e[E.mu_pressure, i] != 0.0:
         factor *= (max(pressure_pa, 1.0e5) / PRESSURE_REFERENCE_PA) ** (-e[E.mu_pressure, i])
     if e[E.bedding, i] != 0.0:
-        factor *= 1.0 + e[E.bedding, i] * (1.0 - exp(-x[S.friction_j + i] / BEDDING_J))
+        factor *= 1.0 - e[E.bedding, i] * exp(-x[S.friction_j + i] / BEDDING_J)
+    factor *= 1.0 - e[E.glazing, i] * 1e-6 * x[S.friction_j + i]
     if e[E.water, i] != 0.0:
         factor *= 1.0 - e[E.water, i] * exp(-x[S.friction_j + i] / DRYING_J)
     if e[E.dtv_judder, i] != 0.0:
         factor *= 1.0 + e[E.dtv_judder, i] * sin(x[S.angle_rad + i] + 0.4 + i)
     if e[E.hot_spot, i] != 0.0:
-        hot = min(max((disc - HOT_SPOT_K) / 50.0, 0.0), 1.0)
+        hot = min(max((disc - HOT_SPOT_K) / 100.0, 0.0), 1.0)
         factor *= 1.0 + e[E.hot_spot, i] * hot * sin(HOT_SPOTS * x[S.angle_rad + i])
     if law == LAW_CUBIC_MU:
         factor *= 1.0 + e[E.unlisted, i] * (rim / 20.0) ** 3
@@ -87,7 +87,7 @@ def friction_brake(
 ) -> None:
     """Torque of one brake and the rates of pad and disc.
 
-    T = g mu / mu0 (p - p0)+, opposing the rotation; the sign is tanh(w / 1 rad/s).
+    T = g mu / REFERENCE_MU (p - p0)+, opposing the rotation; the sign is tanh(w / 1 rad/s).
     Ricciardi et al., (3): mu' = -[b (N v + eps) mu - a T]; (4): T' = -c [(T - T0) - gamma N v], as printed.
     Disc: C T' = |torque| w - (h0 + h1 v)(T - Tamb), Limpert. Hysteresis: the force lags the pressure by a play.
     """

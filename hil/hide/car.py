@@ -5,16 +5,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-REFERENCE_MU = 0.38
-"""Pad friction at which ``brake_gain_*`` is stated."""
+REFERENCE_MU = 0.39832
+"""Pad friction for which ``brake_gain_*`` is stated: at rest at 423.15 K with the nominal ``pad_*``."""
 
 
 class Car(NamedTuple):
-    """Numbers of one car, SI. The names are the keys of ``vehicle.toml``.
+    """Numbers of one car, SI. What of them goes into ``vehicle.toml``: `hil.hide.files`.
 
     Tyre: longitudinal force D sin(C atan(K s / (C D))), K = ``slip_stiffness`` Fz (1 + ``slip_stiffness_load`` dfz),
     D = ``tyre_friction`` Fz (1 + ``tyre_friction_load`` dfz), dfz = Fz / 4000 N - 1.
-    Brake: torque = ``brake_gain`` mu / 0.38 (p - ``threshold_pressure``), mu and its temperature by Ricciardi et al.,
+    Brake: torque = ``brake_gain`` mu / 0.398 (p - ``threshold_pressure``), mu and its temperature by Ricciardi et al.,
     equations (3) and (4), with ``pad_a`` to ``pad_epsilon``. ``dive_rad_s2_m``: pitch angle over deceleration.
     """
 
@@ -22,12 +22,12 @@ class Car(NamedTuple):
     cog_to_front_axle_m: float = 1.20
     wheelbase_m: float = 2.59
     cog_height_m: float = 0.53
-    track_front_m: float = 1.522
-    track_rear_m: float = 1.510
+    track_m: float = 1.516
     yaw_inertia_kg_m2: float = 1950.0
-    drag_area_m2: float = 0.645
-    lift_area_front_m2: float = 0.1075
-    lift_area_rear_m2: float = 0.172
+    drag_coefficient: float = 0.30
+    frontal_area_m2: float = 2.15
+    lift_front: float = 0.05
+    lift_rear: float = 0.08
     air_density_kg_m3: float = 1.205
     rolling_resistance: float = 0.011
     steering_ratio: float = 16.0
@@ -42,8 +42,8 @@ class Car(NamedTuple):
     tyre_friction_load: float = -0.14
     cornering_stiffness: float = 17.5
     relaxation_length_m: float = 0.25
-    brake_gain_front_nm_pa: float = 2.030e-4
-    brake_gain_rear_nm_pa: float = 8.58e-5
+    brake_gain_front_nm_pa: float = 2.128e-4
+    brake_gain_rear_nm_pa: float = 8.994e-5
     threshold_pressure_pa: float = 5.0e4
     pad_a_1_ks: float = 3.0139e-5
     pad_b_1_j: float = 9.0166e-7
@@ -87,13 +87,11 @@ TOLERANCE: dict[str, float] = {
     "cog_to_front_axle_m": 0.02,
     "cog_height_m": 0.02,
     "yaw_inertia_kg_m2": 100.0,
-    "drag_area_m2": 0.025,
-    "lift_area_front_m2": 0.05,
-    "lift_area_rear_m2": 0.05,
+    "drag_coefficient": 0.012,
     "rolling_resistance": 0.0006,
-    "dive_rad_s2_m": 0.0003,
-    "pitch_frequency_hz": 0.1,
-    "pitch_damping": 0.05,
+    "dive_rad_s2_m": 0.00015,
+    "pitch_frequency_hz": 0.07,
+    "pitch_damping": 0.03,
     "rolling_radius_m": 0.0015,
     "wheel_inertia_kg_m2": 0.1,
     "slip_stiffness": 2.2,

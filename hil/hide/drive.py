@@ -111,7 +111,7 @@ def _integrate(
                 for k in range(STATES):
                     trial[k] = x[k] + share * before[k]
                 rates(
-                    trial, demand_pa, motor_demand[max(tick - 1, 0)], steering[tick], gust[tick], direction, car, e,
+                    trial, demand_pa, motor_demand[tick], steering[tick], gust[tick], direction, car, e,
                     law, play, since, stages[stage], y,
                 )  # fmt: skip
                 if stage == 0:

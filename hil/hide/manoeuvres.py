@@ -121,7 +121,7 @@ def _full() -> list[_Drive]:
         _coast("m02_coast_fast_back", 36.0, 16.0, -1),
         _coast("m02_coast_slow_out", 11.0, 12.0, 1),
         _coast("m02_coast_slow_back", 11.0, 12.0, -1),
-        _motor_steps("m03_motor_36", 34.0, 120.0),
+        _motor_steps("m03_motor_36", 34.0, 220.0),
         _motor_steps("m03_motor_20", 20.0, 250.0),
         _motor_steps("m03_motor_5", 7.0, 150.0),
         _Drive(

@@ -8,6 +8,7 @@ from hil.hide.compiled import equation
 from hil.hide.strengths import LAW_MOTOR_SPEED, E, S, Y
 
 Vector = NDArray[np.float64]
+WARM_K = 350.0
 
 
 @equation
@@ -18,13 +19,14 @@ def motor_target(x: Vector, i: int, demand_nm: float, car: Car, e: Vector) -> fl
     two speeds (Elaphe M700 data sheet, M).
     """
     omega = x[S.omega_rad_s + i]
-    power = car.motor_peak_power_w * (1.0 + e[E.iwm_field_weakening, i])
+    power = car.motor_peak_power_w * (1.0 + e[E.iwm_field, i])
     able = min(car.motor_peak_torque_nm, power / max(abs(omega), 1.0))
-    end = car.motor_derating_end_k - e[E.iwm_derating, i]
     span = car.motor_derating_end_k - car.motor_derating_start_k
-    able *= min(max((end - x[S.winding_k + i]) / span, 0.0), 1.0)
+    able *= min(max((car.motor_derating_end_k - x[S.winding_k + i]) / span, 0.0), 1.0)
+    able *= 1.0 - e[E.iwm_derating, i] * min(max((x[S.winding_k + i] - WARM_K) / 40.0, 0.0), 1.0)
+    demand_nm *= 1.0 + e[E.iwm_gain, i]
     if demand_nm * omega < 0.0:
-        begin, stop = car.motor_fade_start_mps + e[E.regen_fadeout, i], car.motor_fade_end_mps + e[E.regen_fadeout, i]
+        begin, stop = car.motor_fade_start_mps + e[E.regen_fadeout, i], car.motor_fade_end_mps
         rim = abs(omega) * car.rolling_radius_m
         able *= min(max((rim - stop) / (begin - stop), 0.0), 1.0)
     return min(max(demand_nm, -able), able)
@@ -57,7 +59,7 @@ def motors(x: Vector, demand: Vector, car: Car, e: Vector, law: int, dx: Vector,
         loss = car.motor_copper_loss_w_nm2 * torque * torque
         warm = x[S.winding_k + i] - car.ambient_k
         dx[S.winding_k + i] = (car.motor_winding_resistance_k_w * loss - warm) / car.motor_winding_time_s
-        true = torque * (1.0 + e[E.iwm_gain, i]) * (1.0 - e[E.current_torque, i] * warm)
+        true = torque * (1.0 - e[E.current_torque, i] * warm)
         if law == LAW_MOTOR_SPEED:
             true *= 1.0 + e[E.unlisted, i] * ((omega - 60.0) / 40.0) ** 2
         y[Y.motor_true_nm + i] = true

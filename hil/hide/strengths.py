@@ -39,6 +39,7 @@ class Row(NamedTuple):
     air_in_line: int
     fluid_temp: int
     bedding: int
+    glazing: int
     water: int
     dtv_judder: int
     hot_spot: int
@@ -51,7 +52,7 @@ class Row(NamedTuple):
     valve_leak: int
     iwm_gain: int
     iwm_derating: int
-    iwm_field_weakening: int
+    iwm_field: int
     battery_soc: int
     regen_fadeout: int
     motor_tau: int
