@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import multiprocessing
 import os
 import select
 import signal
@@ -9,6 +10,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from hil.rt.clock import WallClock
@@ -152,3 +154,8 @@ def wait_for_end(children: Sequence[Child], timeout_ns: int = STOP_TIMEOUT_NS) -
     deadline_ns = clock.now_ns() + timeout_ns
     while clock.now_ns() < deadline_ns and not all(child.ended for child in children):
         clock.sleep_until(clock.now_ns() + 5_000_000)
+
+
+def worker_pool(workers: int) -> ProcessPoolExecutor:
+    """Processes that share independent work; each starts afresh and ends when we do."""
+    return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=end_with_parent)

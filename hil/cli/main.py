@@ -20,6 +20,7 @@ COMMANDS = (
     "convert",
     "identify",
     "verify",
+    "reproduce",
     "doctor",
     "perf",
 )

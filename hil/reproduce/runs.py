@@ -12,6 +12,7 @@ from dbc.bench_messages import (
     PhysicalFault,
     StimulusEcu,
     TruthFrictionTorque,
+    TruthLongitudinalForce,
     TruthMotion,
     TruthPadFriction,
     TruthWheelTorque,
@@ -19,7 +20,7 @@ from dbc.bench_messages import (
 from dbc.contract import spec_of
 from dbc.exchange import Transmitter
 from dbc.frame import Frame, Received
-from dbc.messages import BrakeMode, EhbPressureFront, EhbPressureRear
+from dbc.messages import EhbPressureFront, EhbPressureRear
 from ecu.node import EcuNode
 from ecu.parameters.ecu import EcuParameters
 from hil.parameters import load_set
@@ -30,7 +31,15 @@ from plant.parameters.plant import PlantParameters
 
 Vector = NDArray[np.float64]
 TICK_NS = 10_000_000
-_RECORDED = (TruthMotion, TruthWheelTorque, TruthFrictionTorque, TruthPadFriction, EhbPressureFront, EhbPressureRear)
+_RECORDED = (
+    TruthMotion,
+    TruthWheelTorque,
+    TruthFrictionTorque,
+    TruthPadFriction,
+    EhbPressureFront,
+    EhbPressureRear,
+    TruthLongitudinalForce,
+)
 
 
 @dataclass(frozen=True)
@@ -56,6 +65,7 @@ class Run:
     friction_torque_nm: Vector
     pad_friction: Vector
     pressure_pa: Vector
+    force_n: Vector
     demanded_mps2: Vector
     motor_demand_nm: Vector
     pressure_demand_pa: Vector
@@ -165,6 +175,7 @@ def drive(
         friction_torque_nm=t[:, 8:12],
         pad_friction=t[:, 12:16],
         pressure_pa=t[:, [16, 17, 19, 20]],
+        force_n=t[:, 22:26],
         demanded_mps2=b[:, 0],
         motor_demand_nm=b[:, 1:5],
         pressure_demand_pa=b[:, 5:9],
@@ -176,8 +187,3 @@ def drive(
         observer=np.array(observer[:n]),
         mode=b[:, 26],
     )
-
-
-def normal(run: Run) -> bool:
-    """Whether the controller was in full function throughout."""
-    return bool(np.all(run.mode == BrakeMode.NORMAL))

@@ -1,0 +1,75 @@
+"""``brakebench reproduce``: the paper's numbers and figures, by its method and by ours."""
+
+import argparse
+import json
+import os
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hil.cli.options import add_json
+from hil.errors import BrakebenchError
+
+if TYPE_CHECKING:
+    from hil.reproduce.study import Row
+
+
+def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "reproduce",
+        help="regenerate the paper's numbers and figures",
+        description="Drive the paper's manoeuvres in virtual time with the paper's observer and with ours, under the "
+        "nominal and nine other conditions, and print every number beside the paper's and its goal.",
+        epilog="Conditions other than the nominal one take a fifth of the seeds. --json prints {rows: [{figure, claim, "
+        "unit, paper, paper_method, median, p95, goal, statistic, met, conditions, seeds, degradation}]}.",
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="write the report and the figures")
+    parser.add_argument("--seeds", type=int, default=20, metavar="N", help="seeds of the noise (default: 20)")
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Drive, print, draw."""
+    if args.seeds < 1:
+        raise BrakebenchError(f"--seeds: expected at least 1, got {args.seeds}")
+    from hil.reproduce.identification import identification_rows, shipped_study
+    from hil.reproduce.study import measure
+
+    def say(line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+    say("identifying the pad friction (Figures 3 to 5) ...")
+    rows = identification_rows(shipped_study()) + measure(args.seeds, len(os.sched_getaffinity(0)), say)
+    if args.out is not None:
+        _write(args.out, rows)
+    if args.json:
+        print(json.dumps({"rows": [asdict(row) for row in rows]}, indent=2, allow_nan=False))
+    else:
+        from hil.report.text import print_text
+        from hil.reproduce.summary import build_report
+
+        print_text(build_report(rows, {}), sys.stdout)
+    return 0
+
+
+def _write(out: Path, rows: "list[Row]") -> None:
+    from hil.report.figure import write_figure
+    from hil.report.html import write_html
+    from hil.reproduce.figures import figures
+    from hil.reproduce.summary import build_report
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        drawn = figures()
+        write_html(build_report(rows, drawn), out / "report.html")
+        for name, figure in drawn.items():
+            write_figure(figure, out / name)
+        (out / "result.json").write_text(
+            json.dumps({"rows": [asdict(row) for row in rows]}, indent=2, allow_nan=False), encoding="utf-8"
+        )
+    except OSError as error:
+        raise BrakebenchError(f"{out}: cannot be written ({error.strerror}); give another directory") from error
+    print(f"report, figures and result.json written to {out}", file=sys.stderr)
