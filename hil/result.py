@@ -110,9 +110,9 @@ def measure(signals: Signals) -> RunResult:
     if braking is not None:
         start_s, end_s = braking
         time = end_s - start_s
-        distance = _at(signals, "TRUTH_MOTION.DISTANCE", end_s) - _at(signals, "TRUTH_MOTION.DISTANCE", start_s)
-        mean = _at(signals, "TRUTH_MOTION.SPEED", start_s) / time
-        energy = _at(signals, "TRUTH_ENERGY.RECUPERATED", end_s) - _at(signals, "TRUTH_ENERGY.RECUPERATED", start_s)
+        distance = _rise(signals, "TRUTH_MOTION.DISTANCE", start_s, end_s)
+        mean = float(np.interp(start_s, *signals.get("TRUTH_MOTION.SPEED"))) / time
+        energy = _rise(signals, "TRUTH_ENERGY.RECUPERATED", start_s, end_s)
         t_s, values = signals.get("BRAKE_STATUS.DEMANDED_DECELERATION")
         inside = values[(t_s >= start_s) & (t_s <= end_s)]
         demanded = float(inside.mean()) if len(inside) else None
@@ -144,8 +144,10 @@ def _braking_window(signals: Signals) -> tuple[float, float] | None:
     return (float(pressed[0]), float(still[0])) if len(still) else None
 
 
-def _at(signals: Signals, name: str, t_s: float) -> float:
-    return float(np.interp(t_s, *signals.get(name)))
+def _rise(signals: Signals, name: str, start_s: float, end_s: float) -> float | None:
+    """By how much a signal grew; None where a plant of somebody's own does not send it."""
+    t_s, values = signals.get(name)
+    return float(np.interp(end_s, t_s, values) - np.interp(start_s, t_s, values)) if len(t_s) else None
 
 
 def _last(signals: Signals, name: str) -> int:

@@ -1,0 +1,51 @@
+"""The examples, run as their documentation says."""
+
+import json
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from processes import result_of
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
+PYTHON = [sys.executable]
+
+
+def stopped_within(start, *arguments):
+    process = start(*arguments, program=PYTHON)
+    out, err = process.communicate(timeout=150)
+    assert process.returncode == 0, err
+    return float(re.fullmatch(r"stopped within ([\d.]+) m\n", out)[1])
+
+
+@pytest.mark.parametrize("name", ["own_ecu.py", "own_plant.py"])
+def test_objects_in_virtual_time(start, name):
+    assert 40.0 < stopped_within(start, str(EXAMPLES / name)) < 90.0
+
+
+@pytest.mark.parametrize(
+    ("role", "script"),
+    [
+        ("ecu", ["own_ecu.py", "{spec}"]),
+        ("ecu", ["plain_ecu.py", "brakebench", "{name}"]),
+        ("plant", ["own_plant.py", "{spec}"]),
+    ],
+)
+def test_processes_of_ones_own(start, channel, role, script):
+    words = {"spec": channel, "name": channel.removeprefix("loopback:")}
+    bench = start("run", "--without", role, "--bus", channel, "--json", "--out", "out")
+    own = start(str(EXAMPLES / script[0]), *(word.format(**words) for word in script[1:]), program=PYTHON)
+    result = result_of(bench)
+    assert own.poll() is None, own.communicate()
+    print(script[0], json.dumps({k: result[k] for k in ("stop_distance_m", "frames_lost", "frames_corrupt")}))
+    assert 40.0 < result["stop_distance_m"] < 90.0
+    assert (result["processes"], result["frames_corrupt"]) == (1, 0)
+
+
+def test_the_plain_script_stays_plain():
+    text = (EXAMPLES / "plain_ecu.py").read_text()
+    code = text.split('"""', 2)[2]
+    assert sum(bool(line.strip()) for line in code.splitlines()) <= 41
+    assert not re.search(r"^(from|import) (hil|dbc|ecu|plant)", text, re.MULTILINE)
