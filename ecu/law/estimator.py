@@ -167,7 +167,7 @@ def estimate(state: Vector, z: Vector, parameters: EcuParameters, dt_s: float) -
 def paper_parameters(parameters: EcuParameters) -> Vector:
     """Parameter vector of the paper's observer."""
     v, b, o = parameters.vehicle, parameters.friction_brake, parameters.paper_observer
-    t, s = parameters.tyre, parameters.signal
+    t = parameters.tyre
     brake = friction.gains(b)
     return np.array(
         (
@@ -198,7 +198,7 @@ def paper_parameters(parameters: EcuParameters) -> Vector:
             o.friction_window,
             o.pressure_delay_s,
             o.pressure_min_pa,
-            s.friction_speed_min_mps,
+            o.speed_min_mps,
             float(parameters.compensation.road_correction),
             v.dive_gradient_rad_s2_m,
         ),

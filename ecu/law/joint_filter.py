@@ -203,6 +203,9 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
             moving = True
     if not moving and s[SPEED] < 1.0:
         s[SPEED] = 0.0
+        for i in range(4):  # a standing brake gives what holds the car, and no more than it can
+            most = abs(s[TORQUE + i])
+            s[TORQUE + i] = min(max(0.25 * p[P_MASS] * s[MASS] * G0 * s[GRADE] * arm, -most), most)
         return s
 
     # body acceleration, pitch taken out (the sensor pitches with the body)
@@ -288,7 +291,10 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
                 s[LOCKED + i] += dt
                 if s[LOCKED + i] > TOOTH_WAIT_S and (not slow or step > SPIN_UP_RAD_S):
                     s[LOCKED + i] = 0.0
-            elif slow and (s[SPIN + i] + 0.5 * s[SPIN_RATE + i] * dt <= 0.0 or omega < STANDING_RAD_S):
+                    s[SPIN + i], s[SPIN_RATE + i] = TOOTH_RAD_S, 0.0
+            elif (s[SPIN + i] + 0.5 * s[SPIN_RATE + i] * dt <= 0.0 and slip < -0.5) or (
+                slow and omega < STANDING_RAD_S
+            ):
                 s[LOCKED + i] = dt
             if s[LOCKED + i] > 0.0:
                 locked_load += loads[i]

@@ -223,7 +223,8 @@ def paper_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     sensed_y = p[P_MASS] * ay
     sensed = sqrt(sensed_x * sensed_x + sensed_y * sensed_y)
     modelled = sqrt(body_x * body_x + body_y * body_y)
-    if braking and modelled > p[P_FORCE_MIN] and sensed > p[P_FORCE_MIN] and sensed_x * body_x > 0.0:
+    fast = speed > p[P_SPEED_MIN]
+    if braking and fast and modelled > p[P_FORCE_MIN] and sensed > p[P_FORCE_MIN] and sensed_x * body_x > 0.0:
         window = int(p[P_K_WINDOW])
         at = int(s[K_NEXT])
         s[K_MODEL + at] = modelled
@@ -261,7 +262,7 @@ def paper_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
         s[MOTOR_LAG + i] += share * (motor - s[MOTOR_LAG + i])
         s[WHEEL_TORQUE + i] = s[FILTER + 4 * i + TORQUE]
     least = min(min(s[PRESSURE_LAG], s[PRESSURE_LAG + 1]), min(s[PRESSURE_LAG + 2], s[PRESSURE_LAG + 3]))
-    if braking and least > p[P_PRESSURE_MIN] and speed > p[P_SPEED_MIN]:
+    if braking and least > p[P_PRESSURE_MIN] and fast:
         window = int(p[P_MU_WINDOW])
         at = int(s[MU_NEXT])
         s[MU_NEXT] = (at + 1) % window

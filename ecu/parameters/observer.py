@@ -67,6 +67,7 @@ class PaperObserverParameters:
     force_min_n: Annotated[float, "N", 0.0, 1e4]
     friction_window: Annotated[int, "1", 1, 100]
     pressure_delay_s: Annotated[float, "s", 0.0, 0.2]
+    speed_min_mps: Annotated[float, "m/s", 0.5, 10.0]
     pressure_min_pa: Annotated[float, "Pa", 0.0, 1e6]
 
 

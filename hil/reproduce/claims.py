@@ -61,8 +61,8 @@ _BELOW = "time more than {} m/s2 below demand"
 
 CLAIMS: tuple[Claim, ...] = (
     Claim("9", "wheel-torque RMSE, base braking", "%", 6.0, "estimation", "joint torque 0", "paper torque 0", 3.0),
-    Claim("9", "wheel-torque RMSE, base braking, absolute", "Nm", 19.0, "estimation", "joint torque Nm 0", "paper torque Nm 0",
-          15.0),
+    Claim("9", "wheel-torque RMSE, base braking, absolute", "Nm", 19.0, "estimation", "joint torque Nm 0",
+          "paper torque Nm 0", 15.0),
     Claim("10", "RMSE cut by the road correction", "%", 50.0, "patch", "joint cut", "paper cut", 85.0, "median", True),
     Claim("10", "wheel-torque RMSE over a mu 0.2 patch", "Nm", None, "patch", "joint patch", "paper patch", 25.0),
     Claim("10", "the same, road correction off", "Nm", None, "patch", "joint patch off", "paper patch off", 25.0),
