@@ -1,7 +1,7 @@
 """What is driven: demands in the controller's place, one log a manoeuvre."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,6 +138,7 @@ def _full() -> list[_Drive]:
             pressure={ALL: _steps((0.5, 18 * BAR), (2.0, 5 * BAR), (3.5, 0.0), (5.0, 18 * BAR), (6.5, 9 * BAR))},
             motor={ALL: _steps((2.0, -170.0), (3.5, -250.0), (5.0, 0.0), (6.5, -125.0))},
         ),
+        _Drive("m06_regen_stop", 5.0, 8.0, 350.0, motor={ALL: _steps((0.5, -260.0))}),
         _Drive("m07_slalom_stop", 13.0, 18.0, 350.0, steer=_slalom, hold=lambda t: np.where(t < 7.9, 18.0, np.nan),
                pressure={ALL: _ramps((8.0, 0.0), (8.3, 25 * BAR))}),
         _Drive("m08_motor_hard", 5.0, 18.0, 350.0, motor={ALL: _steps((0.5, -600.0), (1.6, 0.0), (2.2, 600.0), (3.2, -300.0), (4.2, 0.0))}),
@@ -179,6 +180,20 @@ SETS: dict[str, Callable[[], list[_Drive]]] = {"full": _full, "stops": _stops, "
 """Manoeuvre sets by name."""
 
 
-def manoeuvre_set(name: str) -> tuple[Manoeuvre, ...]:
-    """All manoeuvres of a set, in order."""
-    return tuple(drive.made() for drive in SETS[name]())
+def manoeuvre_set(name: str, variant: int = 0) -> tuple[Manoeuvre, ...]:
+    """All manoeuvres of a set, in order; a variant has other speeds, pressures and torques (0: as written)."""
+    drives = [drive.made() for drive in SETS[name]()]
+    if variant == 0:
+        return tuple(drives)
+    rng = np.random.default_rng(variant)
+    return tuple(_varied(drive, rng) for drive in drives)
+
+
+def _varied(drive: Manoeuvre, rng: np.random.Generator) -> Manoeuvre:
+    speed, pressure, torque, steer = (float(rng.uniform(low, 1.06)) for low in (0.9, 0.8, 0.8, 0.8))
+    return replace(
+        drive, speed_mps=drive.speed_mps * speed, hold_mps=drive.hold_mps * speed,
+        pressure_pa=drive.pressure_pa * pressure, motor_nm=drive.motor_nm * torque,
+        steering_wheel_rad=drive.steering_wheel_rad * steer,
+        disc_temperature_k=drive.disc_temperature_k + float(rng.uniform(-10.0, 10.0)),
+    )  # fmt: skip
