@@ -7,6 +7,7 @@ submodel or a changed layout would leave a stale entry point behind; `entry` sta
 """
 
 import hashlib
+import os
 from collections.abc import Callable
 from functools import cache
 from importlib import resources
@@ -15,6 +16,8 @@ from typing import Any, TypeVar, cast
 from numba import njit
 
 F = TypeVar("F", bound=Callable[..., Any])
+EFFECTS = os.environ.get("BRAKEBENCH_EFFECTS", "1") != "0"
+"""False compiles the effects out: the build that the neutral one is compared with."""
 
 
 def equation(function: F) -> F:
@@ -44,8 +47,8 @@ def entry(function: F) -> F:
 @cache
 def _source_stamp() -> str:
     """Digest of every source file of the plant."""
-    digest = hashlib.sha256()
-    for folder in ("plant", "plant.parameters"):
+    digest = hashlib.sha256(b"effects" if EFFECTS else b"")
+    for folder in ("plant", "plant.parameters", "plant.effects"):
         for file in sorted(resources.files(folder).iterdir(), key=lambda f: f.name):
             if file.name.endswith(".py"):
                 digest.update(file.read_bytes())

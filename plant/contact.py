@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from plant.brakes import per_axle
 from plant.compiled import equation
+from plant.effects.joints import J, at_wheel
 from plant.fastmath import atan, sin
 from plant.suspension import link_force, spring_force
 from plant.tyre import (
-    combined,
+    combined_at,
     cornering_stiffness,
     load_offset,
     peak_lateral,
@@ -41,7 +42,7 @@ def static_load(i: int, cos_grade: float, p: Vector) -> float:
 
 
 @equation
-def wheel_load(i: int, torque: float, cos_grade: float, x: Vector, p: Vector) -> float:
+def wheel_load(i: int, torque: float, cos_grade: float, x: Vector, p: Vector, y: Vector) -> float:
     """Vertical load of one wheel, N: static share, unsprung weight, spring and links."""
     front = 1.0 if i < 2 else -1.0
     half = 0.5 - (i % 2)
@@ -61,7 +62,13 @@ def wheel_load(i: int, torque: float, cos_grade: float, x: Vector, p: Vector) ->
         front, wheel_y, per_axle(i, p, P.suspension_brake_support_tangent),
         per_axle(i, p, P.suspension_roll_centre_height_m),
     )  # fmt: skip
-    return max(static_load(i, cos_grade, p) + spring + links, 0.0)
+    return max(at_wheel(static_load(i, cos_grade, p) + spring + links, y, J.wheel_load, i), 0.0)
+
+
+@equation
+def rolling_radius(i: int, p: Vector, y: Vector) -> float:
+    """Rolling radius of one wheel, m."""
+    return at_wheel(p[P.wheel_rolling_radius_m], y, J.wheel_radius, i)
 
 
 @equation
@@ -94,12 +101,12 @@ def contacts(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, cos_grade:
 
     Reads ``y.friction_torque_nm``, ``motor_torque_nm``, ``along_mps``, ``across_mps`` and ``road_friction``.
     """
-    radius = p[P.wheel_rolling_radius_m]
     for i in range(wheels):
+        radius = rolling_radius(i, p, y)
         given, made = u[U.wheel_torque_nm + i], y[Y.friction_torque_nm + i] + y[Y.motor_torque_nm + i]
         torque = given if cut[C.wheel_torque + i] > 0.5 else made
         y[Y.wheel_torque_nm + i] = torque
-        load = wheel_load(i, torque, cos_grade, x, p)
+        load = wheel_load(i, torque, cos_grade, x, p, y)
         y[Y.wheel_load_n + i] = load
 
         omega, slip, side_slip = x[X.wheel_speed_rad_s + i], x[X.slip + i], x[X.side_slip + i]
@@ -111,7 +118,8 @@ def contacts(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, cos_grade:
         loaded = max(load, LOAD_FLOOR_N)
         grip = max(y[Y.road_friction + i], FRICTION_FLOOR)
         dfz = load_offset(loaded, p)
-        stiffness_x, stiffness_y = slip_stiffness(loaded, dfz, p), -cornering_stiffness(loaded, p)
+        stiffness_x = at_wheel(slip_stiffness(loaded, dfz, p), y, J.tyre_stiffness, i)
+        stiffness_y = -cornering_stiffness(loaded, p)
         least = p[P.tyre_relaxation_least_m]
         limit_x = 3.0 * peak_longitudinal(loaded, dfz, grip, p) / stiffness_x
         limit_y = 3.0 * peak_lateral(loaded, dfz, grip, p) / stiffness_y
@@ -125,19 +133,20 @@ def contacts(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, cos_grade:
 
         damping = low_speed_damping(transport, p[P.tyre_low_speed_mps], p[P.tyre_low_speed_damping_ns_m])
         side = 1.0 - 2.0 * (i % 2)
-        force, cross = combined(
+        force, cross = combined_at(
             slip + damping * sliding / stiffness_x, atan(side_slip + damping * across / stiffness_y), loaded, grip,
-            side, p,
+            stiffness_x, side, p,
         )  # fmt: skip
         carried = load / loaded
         given = u[U.longitudinal_force_n + i]
-        force = given if cut[C.force + i] > 0.5 else force * carried
+        force = given if cut[C.force + i] > 0.5 else at_wheel(force * carried, y, J.tyre_force, i)
         y[Y.longitudinal_force_n + i] = force
-        y[Y.lateral_force_n + i] = cross * carried
+        y[Y.lateral_force_n + i] = at_wheel(cross * carried, y, J.tyre_side_force, i)
 
-        rolling = load * radius * rolling_resistance(
+        coefficient = rolling_resistance(
             omega * radius, p[P.vehicle_rolling_resistance], p[P.vehicle_rolling_resistance_speed_s2_m2]
         )  # fmt: skip
+        rolling = at_wheel(load * radius * coefficient, y, J.wheel_rolling_torque, i)
         y[Y.rolling_torque_nm + i] = rolling
         y[Y.rate + X.wheel_speed_rad_s + i] = (torque - radius * force - rolling) / p[P.wheel_inertia_kg_m2]
         y[Y.rate + X.wheel_angle_rad + i] = omega

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from plant.brakes import brakes
 from plant.compiled import block, equation
 from plant.contact import contacts, static_load
+from plant.effects.apply import after, before
+from plant.effects.joints import J, at_car, at_wheel
 from plant.motors import motors
 from plant.road import segment_at
 from plant.vectors import P, U, X, Y
@@ -21,10 +23,16 @@ Vector = NDArray[np.float64]
 
 
 @equation
+def road_wheel_angle(u: Vector, p: Vector, y: Vector) -> float:
+    """Steering angle of the front wheels, rad."""
+    return at_car(u[U.steering_wheel_rad] / p[P.vehicle_steering_ratio], y, J.steering_angle)
+
+
+@equation
 def over_the_road(x: Vector, u: Vector, p: Vector, road: Vector, y: Vector) -> None:
     """Velocity of each contact in its wheel's axes and the road's friction under it."""
     cos_yaw, sin_yaw = cos(x[X.yaw_rad]), sin(x[X.yaw_rad])
-    steer = u[U.steering_wheel_rad] / p[P.vehicle_steering_ratio]
+    steer = road_wheel_angle(u, p, y)
     cos_steer, sin_steer = cos(steer), sin(steer)
     for i in range(4):
         axle = 0 if i < 2 else 1
@@ -33,11 +41,11 @@ def over_the_road(x: Vector, u: Vector, p: Vector, road: Vector, y: Vector) -> N
         ground_x = x[X.speed_mps] - x[X.yaw_rate_rad_s] * wheel_y
         ground_y = x[X.lateral_speed_mps] + x[X.yaw_rate_rad_s] * wheel_x
         c, s = (cos_steer, sin_steer) if i < 2 else (1.0, 0.0)
-        y[Y.along_mps + i] = ground_x * c + ground_y * s
+        y[Y.along_mps + i] = at_wheel(ground_x * c + ground_y * s, y, J.contact_speed, i)
         y[Y.across_mps + i] = ground_y * c - ground_x * s
         row = segment_at(road, x[X.x_m] + wheel_x * cos_yaw - wheel_y * sin_yaw)
         left = x[X.y_m] + wheel_x * sin_yaw + wheel_y * cos_yaw > 0.0
-        y[Y.road_friction + i] = road[row, 1] if left else road[row, 2]
+        y[Y.road_friction + i] = at_wheel(road[row, 1] if left else road[row, 2], y, J.road_friction, i)
 
 
 @equation
@@ -47,9 +55,10 @@ def body(x: Vector, u: Vector, p: Vector, y: Vector, cos_grade: float, sin_grade
     height = p[P.vehicle_cog_height_m]
     speed, lateral, yaw_rate = x[X.speed_mps], x[X.lateral_speed_mps], x[X.yaw_rate_rad_s]
     pitch, roll = x[X.pitch_rad], x[X.roll_rad]
-    steer = u[U.steering_wheel_rad] / p[P.vehicle_steering_ratio]
+    steer = road_wheel_angle(u, p, y)
+    against_air = at_car(speed, y, J.air_speed)
     cos_steer, sin_steer = cos(steer), sin(steer)
-    aero = dynamic_pressure_area(speed, p[P.vehicle_air_density_kg_m3], p[P.vehicle_frontal_area_m2])
+    aero = dynamic_pressure_area(against_air, p[P.vehicle_air_density_kg_m3], p[P.vehicle_frontal_area_m2])
     drag = p[P.vehicle_drag_coefficient] * aero
     sum_x, sum_y, sum_yaw, sum_up, sum_pitch, sum_roll = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(4):
@@ -69,7 +78,7 @@ def body(x: Vector, u: Vector, p: Vector, y: Vector, cos_grade: float, sin_grade
         sum_roll += wheel_y * up + height * body_y
 
     rate = Y.rate
-    specific_x, specific_y = (sum_x - drag) / mass, sum_y / mass
+    specific_x, specific_y = at_car(sum_x - drag, y, J.body_force) / mass, sum_y / mass
     sprung = mass - p[P.vehicle_unsprung_mass_kg] - p[P.vehicle_unsprung_mass_kg + 1]
     cos_yaw, sin_yaw = cos(x[X.yaw_rad]), sin(x[X.yaw_rad])
     y[rate + X.x_m] = speed * cos_yaw - lateral * sin_yaw
@@ -87,12 +96,12 @@ def body(x: Vector, u: Vector, p: Vector, y: Vector, cos_grade: float, sin_grade
     y[rate + X.distance_m] = sqrt(speed * speed + lateral * lateral)
 
     up_body = GRAVITY_MPS2 * cos_grade + y[rate + X.heave_rate_mps]
-    measured_x = specific_x * cos(pitch) - up_body * sin(pitch)
-    measured_y = specific_y * cos(roll) + up_body * sin(roll)
+    measured_x = at_car(specific_x * cos(pitch) - up_body * sin(pitch), y, J.imu_ax)
+    measured_y = at_car(specific_y * cos(roll) + up_body * sin(roll), y, J.imu_ay)
     imu = 2.0 * pi * p[P.sensor_imu_cutoff_hz]
     y[rate + X.imu_longitudinal_mps2] = imu * (measured_x - x[X.imu_longitudinal_mps2])
     y[rate + X.imu_lateral_mps2] = imu * (measured_y - x[X.imu_lateral_mps2])
-    y[rate + X.imu_yaw_rate_rad_s] = imu * (yaw_rate - x[X.imu_yaw_rate_rad_s])
+    y[rate + X.imu_yaw_rate_rad_s] = imu * (at_car(yaw_rate, y, J.imu_yaw_rate) - x[X.imu_yaw_rate_rad_s])
     y[Y.decay_1_s + X.imu_longitudinal_mps2] = imu
     y[Y.decay_1_s + X.imu_lateral_mps2] = imu
     y[Y.decay_1_s + X.imu_yaw_rate_rad_s] = imu
@@ -124,10 +133,11 @@ def derivative(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, roa
     ----------
     x : state (``STATE``).  u : inputs (``INPUT``), pressure demand already delayed.
     cut : ``CUT``, above 0.5 where a measured value in ``u`` replaces the simulated one.  switch : ``SWITCH``.
-    p : ``PARAMETER``.  road : rows of `plant.road.road_table`.  y : ``OUTPUT``, written.
+    p : as of `plant.effects.apply.Q`.  road : rows of `plant.road.road_table`.  y : ``OUTPUT``, written.
     """
     wheels = cut.size // 4  # 4, but unknown to the compiler: it keeps the loops and puts four wheels in one register
-    slope = road[segment_at(road, x[X.x_m]), 3]
+    before(x, u, cut, p, y)
+    slope = at_car(road[segment_at(road, x[X.x_m]), 3], y, J.road_grade)
     cos_grade = 1.0 / sqrt(1.0 + slope * slope)
     y[Y.grade] = slope
     over_the_road(x, u, p, road, y)
@@ -136,3 +146,4 @@ def derivative(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, roa
     contacts(x, u, cut, p, y, cos_grade, wheels)
     body(x, u, p, y, cos_grade, slope * cos_grade)
     energy(x, p, y)
+    after(x, u, p, y)

@@ -33,9 +33,9 @@ def pad_force(pressure_pa: float, area_m2: float, threshold_pa: float, efficienc
 
 
 @equation
-def windup_limit(mu: float, pad_force_n: float, radius_m: float, stiffness_nm_rad: float) -> float:
-    """Wind-up at which the pads slide, rad: 2 mu N r / K (two faces)."""
-    return 2.0 * mu * pad_force_n * radius_m / stiffness_nm_rad
+def sliding_torque(mu: float, pad_force_n: float, radius_m: float) -> float:
+    """Torque of the sliding brake, N m, a magnitude: 2 mu N r (two faces)."""
+    return 2.0 * mu * pad_force_n * radius_m
 
 
 @equation

@@ -6,11 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.compiled import section
+from plant.contact import rolling_radius
+from plant.effects.apply import extra_states_move
 from plant.equations import derivative
-from plant.vectors import OUTPUT, RATES, STATE, P, X, Y
+from plant.vectors import BASE_RATES, OUTPUT, RATES, STATE, X, Y
 
 Vector = NDArray[np.float64]
-N = RATES.size
+N = BASE_RATES.size
+N_ALL = RATES.size  # with the extra states of effects
 SEMI_IMPLICIT = 0
 RUNGE_KUTTA_4 = 1
 WORK_SHAPE = (3, max(STATE.size, OUTPUT.size))
@@ -38,13 +41,16 @@ def semi_implicit_step(
     for i in range(3):
         y[d + X.heave_m + i] += step_s * y[d + X.heave_rate_mps + i]
     for i in range(4):
-        swing = p[P.wheel_rolling_radius_m] * y[d + X.wheel_speed_rad_s + i] - speed
+        swing = rolling_radius(i, p, y) * y[d + X.wheel_speed_rad_s + i] - speed
         damped = 1.0 + step_s * y[Y.decay_1_s + X.slip + i]
         y[d + X.slip + i] += step_s * swing * y[Y.slip_gain_1_m + i] / damped
         y[d + X.pressure_pa + i] += step_s * y[d + X.pressure_rate_pa_s + i]
         y[d + X.wheel_angle_rad + i] += step_s * y[d + X.wheel_speed_rad_s + i]
     for i in range(N):
         x[i] += y[d + i]
+    if extra_states_move(p):
+        for i in range(N, N_ALL):
+            x[i] += step_s * y[d + i] / (1.0 + step_s * y[Y.decay_1_s + i])
 
 
 @section
@@ -53,15 +59,16 @@ def runge_kutta_step(
 ) -> None:
     """One classical fourth-order step; ``y`` holds the outputs at its start, ``work`` has shape `WORK_SHAPE`."""
     trial, total, stage = work[0], work[1], work[2]
+    last = N_ALL if extra_states_move(p) else N
     derivative(x, u, cut, switch, p, road, y)
-    for i in range(N):
+    for i in range(last):
         total[i] = y[Y.rate + i]
         trial[i] = x[i] + 0.5 * step_s * y[Y.rate + i]
     for half in (0.5, 1.0):
         derivative(trial, u, cut, switch, p, road, stage)
-        for i in range(N):
+        for i in range(last):
             total[i] += 2.0 * stage[Y.rate + i]
             trial[i] = x[i] + half * step_s * stage[Y.rate + i]
     derivative(trial, u, cut, switch, p, road, stage)
-    for i in range(N):
+    for i in range(last):
         x[i] += step_s / 6.0 * (total[i] + stage[Y.rate + i])

@@ -8,6 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.compiled import entry, section
+from plant.effects import apply
+from plant.effects.bank import NO_TERMS
+from plant.effects.plugin import NO_PLUGINS
+from plant.effects.theta import THETA
 from plant.equations import derivative
 from plant.friction import mu_equilibrium
 from plant.integrate import SEMI_IMPLICIT, WORK_SHAPE, runge_kutta_step, semi_implicit_step
@@ -20,6 +24,7 @@ Vector = NDArray[np.float64]
 STEP_S = 1e-3
 _NOTHING = np.empty(0, dtype=np.int64)
 _NO_ROWS = np.empty((1, 0))
+NEUTRAL = THETA.neutral()
 
 
 def pack(parameters: PlantParameters) -> Vector:
@@ -88,7 +93,7 @@ def count_teeth(x: Vector, before: Vector, step_s: float, pitch_rad: float) -> N
 @entry
 def simulate(
     x: Vector, inputs: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, step_s: float, steps: int,
-    method: int, columns: NDArray[np.int64], table: Vector, y: Vector,
+    method: int, columns: NDArray[np.int64], table: Vector, y: Vector, theta: Vector, terms: Vector, plugins: Vector,
 ) -> None:  # fmt: skip
     """Run the car through rows of inputs; the only compiled entry point.
 
@@ -100,44 +105,53 @@ def simulate(
     step_s : s.  method : `plant.integrate.SEMI_IMPLICIT` or `RUNGE_KUTTA_4`.
     columns : what to note at the start of each row, as indices into the state followed by the outputs.
     table : the notes, shape (rows, columns), written.  y : outputs (``OUTPUT``) at the end, written.
+    theta : numbers of all effects (`plant.effects.theta`); onsets act from row to row.
+    terms, plugins : tables of `plant.effects.bank` and `plant.effects.plugin`, a row each.
     """
     work = np.empty(WORK_SHAPE)
     now = np.empty(inputs.shape[1])
     angles = np.empty(4)
     rows = inputs.shape[0]
+    q = np.empty(apply.SIZE)
+    apply.begin(p, theta, terms, plugins, q, y, work[2])
     for row in range(rows):
+        now_s = x[X.time_s]
+        apply.row(x, now, p, theta, now_s, now_s + max(steps, 1) * step_s, q, y, work[2])
         following = min(row + 1, rows - 1)
         for i in range(now.size):
             now[i] = inputs[row, i]
         if columns.size > 0:
-            derivative(x, now, cut, switch, p, road, y)
+            derivative(x, now, cut, switch, q, road, y)
             for k in range(columns.size):
                 table[row, k] = x[columns[k]] if columns[k] < x.size else y[columns[k] - x.size]
         for step in range(steps):
             share = (step + 0.5) / steps
             for i in range(U.steering_wheel_rad, now.size):
                 now[i] = inputs[row, i] + share * (inputs[following, i] - inputs[row, i])
-            delay_demand(x, inputs[row], p[P.ehb_dead_time_s], step_s, now)
+            delay_demand(x, inputs[row], q[P.ehb_dead_time_s], step_s, now)
             for i in range(4):
                 angles[i] = x[X.wheel_angle_rad + i]
             if method == SEMI_IMPLICIT:
-                semi_implicit_step(x, now, cut, switch, p, road, step_s, y)
+                semi_implicit_step(x, now, cut, switch, q, road, step_s, y)
             else:
-                runge_kutta_step(x, now, cut, switch, p, road, step_s, work, y)
+                runge_kutta_step(x, now, cut, switch, q, road, step_s, work, y)
             x[X.time_s] += step_s
             count_teeth(x, angles, step_s, 2.0 * pi / p[P.sensor_teeth])
-    derivative(x, now, cut, switch, p, road, y)
+    derivative(x, now, cut, switch, q, road, y)
 
 
 def advance(
     x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, y: Vector, steps: int,
-    step_s: float = STEP_S, method: int = SEMI_IMPLICIT,
+    step_s: float = STEP_S, method: int = SEMI_IMPLICIT, theta: Vector = NEUTRAL, terms: Vector = NO_TERMS,
+    plugins: Vector = NO_PLUGINS,
 ) -> None:  # fmt: skip
     """Advance the state ``x`` in place under constant inputs; ``y`` holds the outputs at its end.
 
     ``steps`` 0 only evaluates the outputs. The vectors are those of `simulate`, ``u`` one ``INPUT``.
     """
-    simulate(x, u.reshape(1, -1), cut, switch, p, road, step_s, steps, method, _NOTHING, _NO_ROWS, y)
+    simulate(
+        x, u.reshape(1, -1), cut, switch, p, road, step_s, steps, method, _NOTHING, _NO_ROWS, y, theta, terms, plugins
+    )
 
 
 def column_indices(names: Sequence[str]) -> NDArray[np.int64]:
@@ -163,7 +177,8 @@ def column_indices(names: Sequence[str]) -> NDArray[np.int64]:
 def replay(
     start: Vector, inputs: Vector, parameters: Vector, columns: Sequence[str], *, cut: Vector | None = None,
     switch: Vector | None = None, road: Vector | None = None, steps: int = 10, step_s: float = STEP_S,
-    method: int = SEMI_IMPLICIT, workers: int = 1,
+    method: int = SEMI_IMPLICIT, workers: int = 1, theta: Vector = NEUTRAL, terms: Vector = NO_TERMS,
+    plugins: Vector = NO_PLUGINS,
 ) -> Vector:  # fmt: skip
     """Run cars through the same rows of inputs, each with its own parameters and start.
 
@@ -174,13 +189,17 @@ def replay(
     parameters : shape (PARAMETER.size,) or (cars, PARAMETER.size).
     columns : names as for `column_indices`.  cut, switch, road : none, healthy and dry by default.
     workers : threads; the cars are shared out among them.
+    theta : effects, shape (THETA.size,) or (cars, THETA.size); as many cars as parameters or theta have rows.
+    terms, plugins : basis terms and effects from outside, the same for all.
 
     Returns
     -------
     Values at the start of each row, shape (cars, rows, columns).
     """
-    cars = parameters.reshape(-1, PARAMETER.size)
-    starts = np.broadcast_to(start, (len(cars), STATE.size))
+    number = max(parameters.size // PARAMETER.size, theta.size // THETA.size)
+    cars = np.broadcast_to(parameters, (number, PARAMETER.size))
+    thetas = np.broadcast_to(theta, (number, THETA.size))
+    starts = np.broadcast_to(start, (number, STATE.size))
     rows = np.ascontiguousarray(inputs, dtype=np.float64)
     cut = CUT.zeros() if cut is None else cut
     switch = healthy() if switch is None else switch
@@ -191,7 +210,7 @@ def replay(
     def one(k: int) -> None:
         simulate(
             starts[k].copy(), rows, cut, switch, np.ascontiguousarray(cars[k]), road, step_s, steps, method, indices,
-            table[k], OUTPUT.zeros(),
+            table[k], OUTPUT.zeros(), np.ascontiguousarray(thetas[k]), terms, plugins,
         )  # fmt: skip
 
     if workers == 1:

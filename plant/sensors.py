@@ -101,7 +101,7 @@ class Sensors:
     def current_a(self, y: Vector) -> list[float]:
         """Torque-producing motor currents, signed like the torque."""
         noise, sigma = self._noise.normal("current", 4), self._p.current_noise_a
-        true: list[float] = y[Y.motor_torque_nm : Y.motor_torque_nm + 4].tolist()
+        true: list[float] = y[Y.motor_current_nm : Y.motor_current_nm + 4].tolist()
         return [torque / self._torque_constant + sigma * n for torque, n in zip(true, noise, strict=True)]
 
     def pedal(self, travel: float) -> tuple[float, float]:

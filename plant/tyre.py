@@ -128,11 +128,19 @@ def combined(slip: float, angle: float, load_n: float, friction: float, side: fl
     slip : kappa.  angle : slip angle alpha, rad.  load_n : Fz, above 0.  friction : scale of the road, above 0.
     side : 1 left, -1 right.  p : parameter vector.
     """
+    return combined_at(slip, angle, load_n, friction, slip_stiffness(load_n, load_offset(load_n, p), p), side, p)
+
+
+@equation
+def combined_at(
+    slip: float, angle: float, load_n: float, friction: float, stiffness_n: float, side: float, p: Vector
+) -> tuple[float, float]:
+    """As `combined`, with the longitudinal slip stiffness given, N."""
     dfz = load_offset(load_n, p)
     peak_x = peak_longitudinal(load_n, dfz, friction, p)
     peak_y = peak_lateral(load_n, dfz, friction, p)
     a = side * angle
-    fx = pure_longitudinal(slip, load_n, dfz, peak_x, slip_stiffness(load_n, dfz, p), p)
+    fx = pure_longitudinal(slip, load_n, dfz, peak_x, stiffness_n, p)
     fy = pure_lateral(a, load_n, dfz, peak_y, cornering_stiffness(load_n, p), p)
     fx *= longitudinal_weight(slip, a, dfz, p)
     fy = fy * lateral_weight(slip, a, dfz, p) + ply_steer(slip, a, dfz, peak_y, p)

@@ -4,6 +4,9 @@ Wheels are in the order fl, fr, rl, rr; axes are ISO 8855 (x forward, y left, z 
 negative. Compiled code reads ``x[X.speed_mps]``; Python reads ``x[STATE.slice("speed_mps")]``.
 """
 
+from plant.compiled import EFFECTS
+from plant.effects.places import FIELDS
+from plant.effects.states import EXTRA_STATES
 from plant.layout import Layout, dataclass_sizes
 from plant.parameters.plant import PlantParameters
 
@@ -60,7 +63,8 @@ INPUTS = {
 }
 CUTS = {"pressure": 4, "motor_torque": 4, "wheel_torque": 4, "force": 4}
 SWITCHES = {"motor_alive": 4, "battery_accepts": 1}
-RATES = Layout("Rates", CONTINUOUS)
+BASE_RATES = Layout("BaseRates", CONTINUOUS)
+RATES = Layout("Rates", CONTINUOUS | EXTRA_STATES)
 OUTPUTS = {
     "rate": RATES.size,  # of the continuous states, in their order
     "decay_1_s": RATES.size,  # own decay rate of each state, for the semi-implicit step
@@ -71,6 +75,7 @@ OUTPUTS = {
     "friction_torque_nm": 4,
     "motor_target_nm": 4,
     "motor_torque_nm": 4,
+    "motor_current_nm": 4,  # torque that the current stands for
     "pressure_pa": 4,
     "longitudinal_force_n": 4,  # in the wheel's axes
     "lateral_force_n": 4,
@@ -89,11 +94,11 @@ OUTPUTS = {
     "grade": 1,
 }
 
-STATE = Layout("State", CONTINUOUS | MEMORY)
+STATE = Layout("State", CONTINUOUS | EXTRA_STATES | MEMORY)
 INPUT = Layout("Input", INPUTS)
 CUT = Layout("Cut", CUTS)
 SWITCH = Layout("Switch", SWITCHES)
-OUTPUT = Layout("Output", OUTPUTS)
+OUTPUT = Layout("Output", OUTPUTS | ({"joints": sum(FIELDS.values())} if EFFECTS else {}))
 PARAMETER = Layout("Parameter", dataclass_sizes(PlantParameters))
 
 X, U, C, S, Y, P = STATE.at, INPUT.at, CUT.at, SWITCH.at, OUTPUT.at, PARAMETER.at

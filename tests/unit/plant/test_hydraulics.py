@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from plant.hydraulics import pad_force, pedal_map_pa, pressure_jerk, windup_held, windup_limit
+from plant.hydraulics import pad_force, pedal_map_pa, pressure_jerk, sliding_torque, windup_held
 
 LOOP = {"frequency_hz": 6.0, "damping": 0.9, "build_pa_s": 2.5e7, "release_pa_s": 4e7}
 MAP = {"free_travel": 0.05, "linear_pa": 7.6e5, "square_pa": 4.08e6, "cubic_pa": 2.59e6}
@@ -28,7 +28,7 @@ def test_clamping_force(plain, pressure_pa, force_n):
 
 
 def test_sliding_torque_is_two_faces(plain):
-    assert plain(windup_limit)(0.38, 1000.0, 0.108, 6e4) * 6e4 == pytest.approx(2 * 0.38 * 1000.0 * 0.108)
+    assert plain(sliding_torque)(0.38, 1000.0, 0.108) == pytest.approx(2 * 0.38 * 1000.0 * 0.108)
 
 
 @given(st.floats(-1.0, 1.0), st.floats(-200.0, 200.0), st.floats(0.0, 0.1))

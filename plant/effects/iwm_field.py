@@ -1,0 +1,31 @@
+"""Power of the motors off."""
+
+from plant.compiled import equation
+from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.layout import Vector
+from plant.vectors import P
+
+PARAMETERS = (Parameter("power", "", -0.9, 0.5, -0.6),)
+L = slots(Scope.CAR, PARAMETERS)
+
+
+@equation
+def static(q: Vector, k: int, y: Vector) -> None:
+    """P' = P (1+e)."""
+    q[P.motor_peak_power_w] *= 1.0 + q[k + L.power]
+
+
+EFFECT = Effect(
+    name="iwm_field",
+    row=49,
+    title="Power of the motors off",
+    equation="P' = P (1+e)",
+    joints=("motor_peak_power_w",),
+    scope=Scope.CAR,
+    parameters=PARAMETERS,
+    source="M: field weakening begins at another speed with voltage and temperature",
+    signature="torque is a hyperbola over the speed",
+    manoeuvre="full_regeneration",
+    confounded_with=("iwm_derating", "battery_soc"),
+    static=static,
+)

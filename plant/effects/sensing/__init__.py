@@ -1,0 +1,1 @@
+"""Sensor and clock effects as pure functions of arrays."""
