@@ -167,7 +167,7 @@ class VirtualBench(Rig):
 
     def _pass_period(self) -> int:
         for step in self._steps:
-            self._tap.heard += step.frames
+            self._tap.heard += step.stamped()
             if step.member == _DIRECTOR:
                 break
         self._ticks += 1

@@ -7,7 +7,7 @@ from dataclasses import asdict
 
 from hil.cli.options import add_json
 
-MEASUREMENTS = ("rt", "plant", "ecu")
+MEASUREMENTS = ("rt", "plant", "ecu", "codec", "loop")
 """Each is a module of hil.perf with ``measure() -> list[Row]``."""
 
 

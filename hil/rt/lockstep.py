@@ -16,11 +16,15 @@ class Member(NamedTuple):
 
 
 class Step(NamedTuple):
-    """One tick of one node: what it sent, stamped with the tick's time."""
+    """One tick of one node: when, which, and what it sent."""
 
     now_ns: int
     member: int
     frames: list[Frame]
+
+    def stamped(self) -> list[Frame]:
+        """Its frames with the tick's time, as a recorder wants them; nodes do without."""
+        return [Frame(frame.bus, frame.can_id, frame.data, self.now_ns, frame.extended) for frame in self.frames]
 
 
 def lockstep(members: Sequence[Member]) -> Iterator[Step]:
@@ -39,8 +43,7 @@ def lockstep(members: Sequence[Member]) -> Iterator[Step]:
         while due and due[0][0] == now_ns:
             _, index = heapq.heappop(due)
             inbox, inboxes[index] = inboxes[index], []
-            frames = [frame._replace(time_ns=now_ns) for frame in members[index].node.step(now_ns, inbox)]
-            sent.append(Step(now_ns, index, frames))
+            sent.append(Step(now_ns, index, members[index].node.step(now_ns, inbox)))
             heapq.heappush(due, (now_ns + members[index].period_ns, index))
         for step in sent:
             for index, inbox in enumerate(inboxes):

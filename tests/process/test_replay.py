@@ -30,7 +30,7 @@ def recorded():
     ecu = EcuNode(scenario.ecu, NODE_PERIOD_NS)
     members = [Member(plant, NODE_PERIOD_NS, PLANT.phase_ns), Member(ecu, NODE_PERIOD_NS, ECU.phase_ns)]
     steps = takewhile(lambda step: step.now_ns <= LOG_NS, lockstep(members))
-    return [frame for step in steps for frame in step.frames]
+    return [frame for step in steps for frame in step.stamped()]
 
 
 @pytest.fixture

@@ -37,5 +37,5 @@ def test_different_rates_and_stamps():
     assert [(s.now_ns, s.member) for s in steps] == [
         (0, 0), (1, 0), (2, 0), (2, 1), (3, 0), (4, 0), (5, 0), (6, 0), (6, 1), (7, 0), (8, 0), (9, 0),
     ]  # fmt: skip
-    assert all(frame.time_ns == step.now_ns for step in steps for frame in step.frames)
+    assert all(frame.time_ns == step.now_ns for step in steps for frame in step.stamped())
     assert slow.heard[1] == (6, ["f2", "f3", "f4", "f5"])

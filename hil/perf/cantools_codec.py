@@ -1,0 +1,78 @@
+"""The contract's codec by cantools, as the other side of comparisons: same messages, same values, same bytes."""
+
+import contextlib
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import cantools
+from cantools.database import Database
+from cantools.database.can import Message as DbcMessage
+from cantools.database.namedsignalvalue import NamedSignalValue
+
+from dbc import exchange
+from dbc.codec import SNA
+from dbc.contract import Message, MessageSpec, database_text, spec_of
+from dbc.frame import BusName
+
+
+@cache
+def database(bus: BusName) -> Database:
+    """Our database as cantools loads it."""
+    loaded = cantools.database.load_string(database_text(bus), database_format="dbc")
+    assert isinstance(loaded, Database)
+    return loaded
+
+
+def dbc_values(spec: MessageSpec, message: Message) -> dict[str, float | str]:
+    """A typed message as cantools wants it: by signal name, in the DBC's units, clamped, SNA by name."""
+    values: dict[str, float | str] = {"CRC": 0, "ALIVE_COUNTER": 0} if spec.data_id is not None else {}
+    for field, value in zip(spec.fields, message, strict=True):
+        if value is None or not math.isfinite(value):
+            values[field.signal] = SNA
+        else:
+            values[field.signal] = min(max(value / field.si_per_unit, field.minimum), field.maximum)
+    return values
+
+
+def encoder(spec: MessageSpec, message: DbcMessage) -> Callable[[Message], bytearray]:
+    """`MessageSpec.encode` by cantools."""
+    return lambda values: bytearray(message.encode(dbc_values(spec, values)))
+
+
+def decoder(spec: MessageSpec, message: DbcMessage) -> Callable[[bytes], Any]:
+    """`MessageSpec.decode` by cantools."""
+
+    def decode(data: bytes) -> Any:
+        found: Any = message.decode(data)
+        values: list[Any] = []
+        for field in spec.fields:
+            value = found[field.signal]
+            if isinstance(value, NamedSignalValue):
+                raw = int(value.value)
+                values.append(None if value.name == SNA else field.enum(raw) if field.enum else raw)
+            else:
+                values.append(value * field.si_per_unit)
+        return spec.type(*values)
+
+    return decode
+
+
+@cache
+def cantools_spec(message_type: type[Message]) -> MessageSpec:
+    """Contract entry whose codec is cantools."""
+    spec = spec_of(message_type)
+    message = database(spec.bus).get_message_by_name(spec.name)
+    return replace(spec, encode=encoder(spec, message), decode=decoder(spec, message))
+
+
+@contextlib.contextmanager
+def cantools_inside() -> Iterator[None]:
+    """Receivers and transmitters use cantools in here."""
+    vars(exchange)["spec_of"] = cantools_spec
+    try:
+        yield
+    finally:
+        vars(exchange)["spec_of"] = spec_of

@@ -1,0 +1,63 @@
+"""The compiled codec beside cantools, over all messages of brake.dbc."""
+
+from collections.abc import Callable
+from typing import Any
+
+from dbc.contract import Message, contract
+from dbc.frame import BusName
+from hil.perf.cantools_codec import database, dbc_values
+from hil.perf.row import Row, paired, time_per_call_ns
+from hil.scenario import load_scenario
+from hil.virtual import simulate
+
+CALLS = 300
+
+
+def payloads() -> dict[int, list[bytes]]:
+    """Frames of a stop by identifier: the values that really travel."""
+    scenario = load_scenario("stop72_blend70")
+    frames = simulate(scenario).decoded.recording.frames
+    own = frames.channel == frames.channels.index(BusName.VEHICLE.value)
+    found: dict[int, list[bytes]] = {}
+    for can_id in contract(BusName.VEHICLE).by_id:
+        rows = (own & (frames.can_id == can_id)).nonzero()[0]
+        chosen = rows[len(rows) // 8 : len(rows) * 3 // 4 : max(1, len(rows) // 12)]
+        found[can_id] = [frames.data[row, : frames.length[row]].tobytes() for row in chosen]
+    return found
+
+
+def measure() -> list[Row]:
+    """Time of one frame, encoded and decoded, microseconds; the values are those of a blended stop."""
+    specs = contract(BusName.VEHICLE).by_id
+    cases: list[tuple[Any, Any, Message, dict[str, Any], bytes]] = []
+    for can_id, frames in payloads().items():
+        theirs = database(BusName.VEHICLE).get_message_by_frame_id(can_id)
+        for data in frames:
+            message = specs[can_id].decode(data)
+            cases.append((specs[can_id], theirs, message, dbc_values(specs[can_id], message), data))
+
+    def each(one: Callable[[Any, Any, Message, dict[str, Any], bytes], object]) -> Callable[[], float]:
+        def timed() -> float:
+            def all_cases() -> None:
+                for case in cases:
+                    one(*case)
+
+            return time_per_call_ns(all_cases, CALLS // 10) / len(cases) * 1e-3
+
+        return timed
+
+    encode = paired(
+        "encode a frame",
+        each(lambda spec, _theirs, message, _values, _data: spec.encode(message)),
+        each(lambda _spec, theirs, _message, values, _data: theirs.encode(values)),
+        "cantools",
+        "us",
+    )
+    decode = paired(
+        "decode a frame",
+        each(lambda spec, _theirs, _message, _values, data: spec.decode(data)),
+        each(lambda _spec, theirs, _message, _values, data: theirs.decode(data, decode_choices=False)),
+        "cantools, choices left as numbers",
+        "us",
+    )
+    return [encode, decode]
