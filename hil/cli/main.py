@@ -23,6 +23,7 @@ COMMANDS = (
     "reproduce",
     "doctor",
     "perf",
+    "hide",
 )
 """Subcommands in the order of the help; each is a module of this package."""
 

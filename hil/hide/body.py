@@ -1,3 +1,5 @@
+# mypy: disable-error-code=no-any-return
+# (elements of a vector are Any to the type checker)
 """Motion of the hidden car: two tracks, load transfer with pitch, relaxed tyres, drag, road."""
 
 from math import atan, atan2, cos, exp, sin, sqrt, tanh
@@ -139,13 +141,13 @@ def wheel(x: Vector, i: int, steer: float, mass: float, car: Car, e: Vector, law
 
 @equation
 def rates(
-    x: Vector, demand_pa: Vector, demand_nm: Vector, steering_wheel: float, gust_mps2: float, direction: float,
-    car: Car, e: Vector, law: int, play_pa: Vector, since_s: Vector, dx: Vector, y: Vector,
+    x: Vector, demand_pa: Vector, demand_nm: Vector, steering_wheel: float, gust_mps2: float, slope_mps2: float,
+    direction: float, car: Car, e: Vector, law: int, play_pa: Vector, since_s: Vector, dx: Vector, y: Vector,
 ) -> None:  # fmt: skip
     """Rates of all states.
 
-    m (v' - vy r) = sum Fx - 1/2 rho CdA (v + wind)^2 - m g sin(grade) + m gust; what the accelerometer feels has no
-    g sin(grade) of the road, but turns with the body: a cos(pitch) - g sin(pitch), nose down positive.
+    m (v' - vy r) = sum Fx - 1/2 rho CdA (v + wind)^2 - m g sin(grade) + m (gust - slope). What the accelerometer feels
+    has no g sin(grade) of the road, but turns with the body: a cos(pitch) - g sin(pitch), nose down positive.
     """
     dx[:] = 0.0
     y[:] = 0.0
@@ -169,7 +171,7 @@ def rates(
     specific_x = (dx[S.speed_mps] - drag) / mass + gust_mps2 * moving
     specific_y = dx[S.lateral_mps] / mass
     grade = direction * e[E.road_grade, 0]
-    along = GRAVITY_MPS2 * sin(atan2(grade, 1.0)) * moving  # a standing car is held
+    along = (GRAVITY_MPS2 * sin(atan2(grade, 1.0)) + slope_mps2) * moving  # a standing car is held
     dx[S.speed_mps] = specific_x + x[S.lateral_mps] * yaw - along
     dx[S.lateral_mps] = (specific_y - speed * yaw) * moving - (1.0 - moving) * 5.0 * x[S.lateral_mps]
     dx[S.yaw_rate_rad_s] = dx[S.yaw_rate_rad_s] / car.yaw_inertia_kg_m2 * moving - (1.0 - moving) * 5.0 * yaw

@@ -1,3 +1,5 @@
+# mypy: disable-error-code=no-any-return
+# (elements of a vector are Any to the type checker)
 """Friction brakes of the hidden car: pressure, clamping, pad friction, disc; with what may be hidden in them."""
 
 from math import exp, sin, tanh
@@ -31,7 +33,9 @@ def brake_pressure_rates(x: Vector, i: int, demand_pa: float, car: Car, e: Vecto
     limit = 1.0 + e[E.ehb_rate_limit, i]
     build, release = car.ehb_build_rate_pa_s * limit, car.ehb_release_rate_pa_s * limit
     ceiling = car.ehb_max_pressure_pa
-    target = min(max(demand_pa, 0.0), ceiling) * (1.0 - e[E.accumulator, i] * min(x[S.applied_pa_s + i] / DROOP_PA, 1.0))
+    target = min(max(demand_pa, 0.0), ceiling) * (
+        1.0 - e[E.accumulator, i] * min(x[S.applied_pa_s + i] / DROOP_PA, 1.0)
+    )
     error = target - p
     if abs(error) < e[E.ehb_deadband, i]:
         error = 0.0

@@ -3,13 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hil.errors import BrakebenchError
 from hil.hide.car import NOMINAL, TOLERANCE, Car, true_car
-from hil.hide.catalogue import Hideable, find
+from hil.hide.catalogue import find
 from hil.hide.drive import drive
 from hil.hide.manoeuvres import SETS, TICK_S, Manoeuvre, manoeuvre_set
 from hil.hide.noise import LEVELS, Noise, draw_noise, gusts
@@ -19,7 +20,7 @@ from hil.hide.strengths import ROWS, E
 
 Vector = NDArray[np.float64]
 Table = Mapping[str, Vector]
-CALIBRATION_ROUNDS, CALIBRATED = 8, 0.03
+CALIBRATION_ROUNDS, CALIBRATED, REACHED = 8, 0.03, 0.15
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,7 @@ def _observed(
 
 
 def expected_snr(case: Case) -> tuple[float, float]:
-    """SNR of what is hidden: beside imitations by tolerances, and alone. Pairs of runs with the same gusts and clocks."""
+    """SNR of what is hidden: beside imitations by tolerances, and alone. Both runs of the pair have the same gusts."""
     base = logs(replace(case, hidden=()), clean=True)
     return _snr(case, base, _imitations(case))
 
@@ -191,21 +192,24 @@ def scaled_case(case: Case, target: float) -> Case:
     base = logs(replace(case, hidden=()), clean=True)
     imitations = _imitations(case)
     low, high, factor = 0.0, _largest_factor(case), min(1.0, _largest_factor(case))
-    best: Case | None = None
+    best = case
     for _ in range(CALIBRATION_ROUNDS):
         trial = _times(case, factor)
         beside, alone = _snr(trial, base, imitations)
         trial = replace(trial, snr=beside, snr_alone=alone, target_snr=target)
-        error = abs(np.log(max(beside, 1e-9) / target))
-        if best is None or best.snr is None or error < abs(np.log(max(best.snr, 1e-9) / target)):
+        error = _off(beside, target)
+        if best.snr is None or error < _off(best.snr, target):
             best = trial
         if error < CALIBRATED or (factor >= high and beside < target):
             break
         low, high = (factor, high) if beside < target else (low, factor)
         wanted = factor * target / max(beside, 1e-9)
         factor = wanted if low < wanted < high else (high if wanted >= high and low == factor else 0.5 * (low + high))
-    assert best is not None and best.snr is not None  # noqa: S101
-    return replace(best, reached=abs(float(np.log(max(best.snr, 1e-9) / target))) < 0.15)
+    return replace(best, reached=best.snr is not None and _off(best.snr, target) < REACHED)
+
+
+def _off(snr: float, target: float) -> float:
+    return abs(log(max(snr, 1e-9) / target))
 
 
 def _largest_factor(case: Case) -> float:
@@ -219,8 +223,3 @@ def _largest_factor(case: Case) -> float:
 
 def _times(case: Case, factor: float) -> Case:
     return replace(case, hidden=tuple(replace(one, magnitude=one.magnitude * factor) for one in case.hidden))
-
-
-def separation(case: Case, kind: Hideable) -> float:
-    """Expected SNR of a case, for tables of what a manoeuvre set shows."""
-    return expected_snr(replace(case, hidden=(Hidden(kind.name, kind.where[0], kind.typical),)))[0]

@@ -118,7 +118,7 @@ LISTED: tuple[Hideable, ...] = (
     Hideable("imu_position", "distance_m", "m", 0.5, -2.0, 2.0),
     Hideable("imu_filter", "lag_s", "s", 0.01, 0.0, 0.1),
     Hideable("wheel_tooth_error", "amplitude", "", 0.003, -0.03, 0.03, WHEEL),
-    Hideable("wheel_speed_lowv", "speed_mps", "m/s", 2.5, 0.0, 4.0),
+    Hideable("wheel_speed_lowv", "speed_mps", "m/s", 2.5, 0.0, 4.0, scales=False),
     Hideable("pressure_offset", "offset_pa", "Pa", 1.0e5, -5.0e5, 5.0e5, (*CAR, *WHEEL)),
     Hideable("pressure_gain", "gain", "", 0.03, -0.2, 0.2, (*CAR, *WHEEL)),
     Hideable("quantisation", "step_mps2", "m/s2", 0.1, 0.0, 0.5, scales=False),
@@ -131,18 +131,20 @@ LISTED: tuple[Hideable, ...] = (
 """Effects with a row in the catalogue."""
 
 UNLISTED: tuple[Hideable, ...] = (
-    Hideable("unlisted_cubic_mu", "strength", "", 0.1, -0.8, 0.8, WHEEL, strengths.LAW_CUBIC_MU, "friction.mu", ("speed",)),
-    Hideable("unlisted_step_drag", "force_n", "N", 120.0, -400.0, 800.0, CAR, strengths.LAW_STEP_DRAG, "body.force", ("speed",)),
-    Hideable("unlisted_bump_pressure", "strength", "", 0.15, -0.7, 1.0, (*AXLE, *WHEEL), strengths.LAW_BUMP_PRESSURE,
-             "friction.mu", ("pressure",)),
-    Hideable("unlisted_wave_rolling", "strength", "", 0.01, -0.01, 0.05, CAR, strengths.LAW_WAVE_ROLLING,
-             "wheel.rolling_torque", ("speed",)),
-    Hideable("unlisted_motor_speed", "strength", "", 0.05, -0.3, 0.4, (*CAR, *AXLE), strengths.LAW_MOTOR_SPEED,
-             "motor.torque", ("speed",)),
-    Hideable("unlisted_apply_time", "strength", "", 0.1, -0.7, 1.0, (*CAR, *AXLE), strengths.LAW_APPLY_TIME,
-             "friction.mu", ("time_since_on",)),
-    Hideable("unlisted_steer_drag", "force_n", "N", 800.0, -3000.0, 6000.0, CAR, strengths.LAW_STEER_DRAG, "body.force",
-             ("steer",)),
+    Hideable("unlisted_cubic_mu", "strength", "", 0.1, -0.8, 0.8, WHEEL,
+             strengths.LAW_CUBIC_MU, "friction.mu", ("speed",)),
+    Hideable("unlisted_step_drag", "force_n", "N", 120.0, -400.0, 800.0, CAR,
+             strengths.LAW_STEP_DRAG, "body.force", ("speed",)),
+    Hideable("unlisted_bump_pressure", "strength", "", 0.15, -0.7, 1.0, (*AXLE, *WHEEL),
+             strengths.LAW_BUMP_PRESSURE, "friction.mu", ("pressure",)),
+    Hideable("unlisted_wave_rolling", "strength", "", 0.01, -0.01, 0.05, CAR,
+             strengths.LAW_WAVE_ROLLING, "wheel.rolling_torque", ("speed",)),
+    Hideable("unlisted_motor_speed", "strength", "", 0.05, -0.3, 0.4, (*CAR, *AXLE),
+             strengths.LAW_MOTOR_SPEED, "motor.torque", ("speed",)),
+    Hideable("unlisted_apply_time", "strength", "", 0.1, -0.7, 1.0, (*CAR, *AXLE),
+             strengths.LAW_APPLY_TIME, "friction.mu", ("time_since_on",)),
+    Hideable("unlisted_steer_drag", "force_n", "N", 800.0, -3000.0, 6000.0, CAR,
+             strengths.LAW_STEER_DRAG, "body.force", ("steer",)),
 )  # fmt: skip
 """Laws that are in no list."""
 
@@ -166,5 +168,7 @@ def find(name: str) -> Hideable:
         Nothing is called so.
     """
     if name not in HIDEABLE:
-        raise BrakebenchError(f"--effect {name}: nothing of that name can be hidden; expected none or {', '.join(HIDEABLE)}")
+        raise BrakebenchError(
+            f"--effect {name}: nothing of that name can be hidden; expected none or {', '.join(HIDEABLE)}"
+        )
     return HIDEABLE[name]

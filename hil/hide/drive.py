@@ -1,3 +1,5 @@
+# mypy: disable-error-code=no-any-return
+# (elements of a vector are Any to the type checker)
 """Drive the hidden car through one manoeuvre: fourth-order Runge-Kutta, 2.5 ms."""
 
 from dataclasses import dataclass
@@ -32,7 +34,7 @@ class Driven:
     @property
     def t_s(self) -> Vector:
         """Time of each row of states."""
-        return np.arange(len(self.states)) * STEP_S
+        return np.arange(len(self.states), dtype=np.float64) * STEP_S
 
 
 def start_state(manoeuvre: Manoeuvre, car: Car) -> Vector:
@@ -53,20 +55,21 @@ def start_state(manoeuvre: Manoeuvre, car: Car) -> Vector:
     return x
 
 
-def drive(manoeuvre: Manoeuvre, car: Car, strength: Vector, onset_s: Vector, law: int, gust_mps2: Vector) -> Driven:
+def drive(manoeuvre: Manoeuvre, car: Car, strength: Vector, onset_s: Vector, law: int, gusts: Vector) -> Driven:
     """Drive to the end of the demands, or until the car has stood for a while.
 
     Parameters
     ----------
-    strength : the hidden effects, (rows, 4).  onset_s : when each row begins in this log, (rows,).
-    law : number of a law that is in no list, 0 for none.  gust_mps2 : force over mass on the body, one a tick.
+    strength : the hidden effects, (rows, 4).  onset_s : begin of each row in this log.
+    law : number of a law that is in no list, 0 for none.
+    gusts : force over mass on the body, and g times the slope of the road, (ticks, 2), m/s2.
     """
     ticks = manoeuvre.ticks
     states, outputs = np.zeros((ticks * PER_TICK, STATES)), np.zeros((ticks * PER_TICK, OUTPUTS))
     demand = manoeuvre.motor_nm.copy()
     rows = _integrate(
         start_state(manoeuvre, car), car, strength, onset_s, law, manoeuvre.pressure_pa, demand,
-        manoeuvre.steering_wheel_rad, manoeuvre.hold_mps, gust_mps2, float(manoeuvre.direction), states, outputs,
+        manoeuvre.steering_wheel_rad, manoeuvre.hold_mps, gusts, float(manoeuvre.direction), states, outputs,
     )  # fmt: skip
     return Driven(manoeuvre, states[:rows], outputs[:rows], demand[: rows // PER_TICK])
 
@@ -111,8 +114,8 @@ def _integrate(
                 for k in range(STATES):
                     trial[k] = x[k] + share * before[k]
                 rates(
-                    trial, demand_pa, motor_demand[tick], steering[tick], gust[tick], direction, car, e,
-                    law, play, since, stages[stage], y,
+                    trial, demand_pa, motor_demand[tick], steering[tick], gust[tick, 0], gust[tick, 1],
+                    direction, car, e, law, play, since, stages[stage], y,
                 )  # fmt: skip
                 if stage == 0:
                     states[row] = x

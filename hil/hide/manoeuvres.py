@@ -53,7 +53,7 @@ class _Drive:
     hold: Callable[[FloatArray], FloatArray] | None = None
 
     def made(self) -> Manoeuvre:
-        t = np.arange(round(self.duration_s / TICK_S)) * TICK_S
+        t = np.arange(round(self.duration_s / TICK_S), dtype=np.float64) * TICK_S
         pressure, motor = np.zeros((t.size, 4)), np.zeros((t.size, 4))
         for wheels, function in self.pressure.items():
             pressure[:, wheels] += function(t)[:, None]
@@ -61,9 +61,7 @@ class _Drive:
             motor[:, wheels] += function(t)[:, None]
         steer = self.steer(t) if self.steer else np.zeros(t.size)
         hold = self.hold(t) if self.hold else np.full(t.size, np.nan)
-        return Manoeuvre(
-            self.name, self.speed_mps, self.disc_k, self.direction, pressure, motor, steer, hold
-        )
+        return Manoeuvre(self.name, self.speed_mps, self.disc_k, self.direction, pressure, motor, steer, hold)
 
 
 ALL, FRONT, REAR, LEFT, RIGHT = (0, 1, 2, 3), (0, 1), (2, 3), (0, 2), (1, 3)
@@ -92,9 +90,7 @@ def _constant(value: float) -> Callable[[FloatArray], FloatArray]:
 
 
 def _stop(name: str, speed: float, bar: float, duration: float, disc: float = 350.0, direction: int = 1) -> _Drive:
-    return _Drive(
-        name, duration, speed, disc, direction, pressure={ALL: _ramps((0.8, 0.0), (1.0, bar * BAR))}
-    )
+    return _Drive(name, duration, speed, disc, direction, pressure={ALL: _ramps((0.8, 0.0), (1.0, bar * BAR))})
 
 
 def _coast(name: str, speed: float, duration: float, direction: int) -> _Drive:
@@ -105,7 +101,8 @@ def _motor_steps(name: str, speed: float, nm: float) -> _Drive:
     common = _steps((0.5, -nm), (1.5, nm), (2.5, 0.0), (5.0, -0.5 * nm), (5.5, 0.5 * nm), (6.0, 0.0))
     return _Drive(
         name, 7.0, speed,
-        motor={ALL: common, FRONT: _steps((3.0, -nm), (3.6, nm), (4.2, 0.0)), REAR: _steps((4.2, -nm), (4.6, nm), (5.0, 0.0))},
+        motor={ALL: common, FRONT: _steps((3.0, -nm), (3.6, nm), (4.2, 0.0)),
+               REAR: _steps((4.2, -nm), (4.6, nm), (5.0, 0.0))},
     )  # fmt: skip
 
 
@@ -141,8 +138,10 @@ def _full() -> list[_Drive]:
         _Drive("m06_regen_stop", 5.0, 8.0, 350.0, motor={ALL: _steps((0.5, -260.0))}),
         _Drive("m07_slalom_stop", 13.0, 18.0, 350.0, steer=_slalom, hold=lambda t: np.where(t < 7.9, 18.0, np.nan),
                pressure={ALL: _ramps((8.0, 0.0), (8.3, 25 * BAR))}),
-        _Drive("m08_motor_hard", 5.0, 18.0, 350.0, motor={ALL: _steps((0.5, -600.0), (1.6, 0.0), (2.2, 600.0), (3.2, -300.0), (4.2, 0.0))}),
-        _Drive("m10_hold_pressure", 12.0, 0.0, 320.0, pressure={ALL: _steps((0.5, 10 * BAR), (4.5, 40 * BAR), (8.5, 5 * BAR))}),
+        _Drive("m08_motor_hard", 5.0, 18.0, 350.0,
+               motor={ALL: _steps((0.5, -600.0), (1.6, 0.0), (2.2, 600.0), (3.2, -300.0), (4.2, 0.0))}),
+        _Drive("m10_hold_pressure", 12.0, 0.0, 320.0,
+               pressure={ALL: _steps((0.5, 10 * BAR), (4.5, 40 * BAR), (8.5, 5 * BAR))}),
     ]  # fmt: skip
 
 

@@ -1,3 +1,5 @@
+# mypy: disable-error-code=no-any-return
+# (elements of a vector are Any to the type checker)
 """In-wheel motors and battery of the hidden car."""
 
 import numpy as np

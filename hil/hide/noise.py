@@ -20,7 +20,10 @@ class Noise:
 
     Attributes
     ----------
-    gust_mps2, gust_tau_s : force over mass on the body, coloured (AR(1)).
+    gust_mps2, slope_mps2, drift_mps2 : coloured (AR(1)): force over mass on the body, g times the slope of the road
+        (the accelerometer does not feel it), error of the accelerometer.
+    wheel_drift : coloured share of each wheel's speed.  ay_drift_mps2, yaw_drift_rad_s, pressure_drift_pa,
+        torque_drift_nm : coloured errors of these channels.  ..._tau_s : time constants.
     order_share : once-per-revolution error of the wheel speed with an amplitude and phase that wander.
     wheel_rad_s ... torque_nm : white noise of the sensors.
     latency_s : of the frames of wheel, imu, pressure and motor node against the wheel node's.
@@ -29,7 +32,17 @@ class Noise:
 
     level: str
     gust_mps2: float
+    slope_mps2: float
+    drift_mps2: float
+    wheel_drift: float
+    ay_drift_mps2: float
+    yaw_drift_rad_s: float
+    pressure_drift_pa: float
+    torque_drift_nm: float
     gust_tau_s: float
+    slope_tau_s: float
+    drift_tau_s: float
+    sensor_tau_s: float
     order_share: float
     wheel_rad_s: float
     wheel_share: float
@@ -54,11 +67,18 @@ def draw_noise(level: str, rng: np.random.Generator) -> Noise:
     def around(value: float) -> float:
         return value * size * float(rng.uniform(0.8, 1.25))
 
+    def late() -> float:
+        return float(rng.uniform(-0.0008, 0.0008))
+
     return Noise(
-        level=level, gust_mps2=around(0.02), gust_tau_s=float(rng.uniform(0.5, 2.0)), order_share=around(0.0002),
+        level=level, gust_mps2=around(0.02), slope_mps2=around(0.02), drift_mps2=around(0.008),
+        wheel_drift=around(0.0004),
+        ay_drift_mps2=around(0.03), yaw_drift_rad_s=around(0.002), pressure_drift_pa=around(4.0e3),
+        torque_drift_nm=around(0.6), gust_tau_s=float(rng.uniform(0.5, 2.0)), slope_tau_s=float(rng.uniform(1.0, 4.0)),
+        drift_tau_s=float(rng.uniform(2.0, 6.0)), sensor_tau_s=float(rng.uniform(0.5, 2.0)), order_share=around(0.0002),
         wheel_rad_s=around(0.01), wheel_share=around(0.0008), ax_mps2=around(0.02), ay_mps2=around(0.02),
         yaw_rad_s=around(0.001), pressure_pa=around(1.0e4), torque_nm=around(0.8), speed_mps=around(0.03),
-        latency_s=(0.0, *(float(rng.uniform(-0.0008, 0.0008)) for _ in range(3))), queue_s=0.0003,
+        latency_s=(0.0, late(), late(), late()), queue_s=0.0003,
     )  # fmt: skip
 
 
@@ -71,5 +91,7 @@ def coloured(count: int, deviation: float, tau_s: float, step_s: float, rng: np.
 
 
 def gusts(ticks: int, noise: Noise, rng: np.random.Generator) -> Vector:
-    """Coloured force over mass on the body, one a tick of 10 ms, m/s2."""
-    return coloured(ticks, noise.gust_mps2, noise.gust_tau_s, TICK_S, rng)
+    """Coloured force over mass on the body, and g times the slope, every 10 ms, (ticks, 2), m/s2."""
+    force = coloured(ticks, noise.gust_mps2, noise.gust_tau_s, TICK_S, rng)
+    slope = coloured(ticks, noise.slope_mps2, noise.slope_tau_s, TICK_S, rng)
+    return np.stack((force, slope), axis=1)

@@ -31,7 +31,9 @@ class SensorFault:
 Faults = Mapping[str, SensorFault]
 
 
-def observe(driven: Driven, noise: Noise, faults: Faults, seed: tuple[int, ...], clean: bool = False) -> dict[str, Vector]:
+def observe(
+    driven: Driven, noise: Noise, faults: Faults, seed: tuple[int, ...], clean: bool = False
+) -> dict[str, Vector]:
     """Canonical columns of one log.
 
     Parameters
@@ -40,7 +42,7 @@ def observe(driven: Driven, noise: Noise, faults: Faults, seed: tuple[int, ...],
     """
     rng = np.random.default_rng(seed)
     rows = len(driven.states) // round(TICK_S / STEP_S) - 1
-    true_t, cycle = driven.t_s, np.arange(rows) * TICK_S
+    true_t, cycle = driven.t_s, np.arange(rows, dtype=np.float64) * TICK_S
     times = [cycle + late + rng.exponential(noise.queue_s, rows) for late in noise.latency_s]
     stamp = np.maximum.accumulate(times[0] + np.arange(rows) * 1e-9)
     sampled = [_sampled(node, times[k], faults, rng) for k, node in enumerate(NODES)]
@@ -64,6 +66,7 @@ def observe(driven: Driven, noise: Noise, faults: Faults, seed: tuple[int, ...],
     angle = state(S.angle_rad, sampled[0], 4)
     speed = omega if clean else _from_teeth(driven, sampled[0])
     once = np.stack([_wandering(angle[:, i], noise.order_share, rng) for i in range(4)], axis=1)
+    once += _drifts(rows, 4, noise.wheel_drift, noise.sensor_tau_s, rng)
     white = rng.standard_normal((rows, 4)) * (noise.wheel_rad_s + noise.wheel_share * np.abs(omega))
     turning = speed > 0.05
     speed = speed * (1.0 + fault("wheel_tooth_error") * np.cos(angle)) + add * turning * (white + once * omega)
@@ -75,6 +78,9 @@ def observe(driven: Driven, noise: Noise, faults: Faults, seed: tuple[int, ...],
     if lag > 0.0:
         felt = _low_pass(felt, lag)
     felt = felt + add * rng.standard_normal((rows, 3)) * (noise.ax_mps2, noise.ay_mps2, noise.yaw_rad_s)
+    felt[:, :1] += add * _drifts(rows, 1, noise.drift_mps2, noise.drift_tau_s, rng)
+    felt[:, 1:2] += add * _drifts(rows, 1, noise.ay_drift_mps2, noise.sensor_tau_s, rng)
+    felt[:, 2:] += add * _drifts(rows, 1, noise.yaw_drift_rad_s, noise.sensor_tau_s, rng)
     felt[:, 0] = felt[:, 0] * (1.0 + fault("imu_gain", 1)[:, 0]) + fault("imu_bias", 1)[:, 0]
     felt = felt * scale[:, 1:2]
     step = fault("quantisation", 1)[-1, 0]
@@ -83,12 +89,14 @@ def observe(driven: Driven, noise: Noise, faults: Faults, seed: tuple[int, ...],
     table["yaw_rate_rad_s"] = _whole(felt[:, 2], QUANTUM["yaw"], clean)
 
     pressure = state(S.pressure_pa, sampled[2], 4) + add * noise.pressure_pa * rng.standard_normal((rows, 4))
+    pressure += add * _drifts(rows, 4, noise.pressure_drift_pa, noise.sensor_tau_s, rng)
     pressure = pressure * (1.0 + fault("pressure_gain")) + fault("pressure_offset")
     _put(table, "pressure", "pa", _whole(pressure * scale[:, 2:3], QUANTUM["pressure"], clean))
     demand = driven.manoeuvre.pressure_pa[:rows]
     _put(table, "pressure_demand", "pa", _whole(demand, QUANTUM["pressure"], clean))
 
     torque = state(S.motor_nm, sampled[3], 4) + add * noise.torque_nm * rng.standard_normal((rows, 4))
+    torque += add * _drifts(rows, 4, noise.torque_drift_nm, noise.sensor_tau_s, rng)
     _put(table, "motor_torque", "nm", _whole(torque * scale[:, 3:4], QUANTUM["motor"], clean))
     _put(table, "motor_torque_demand", "nm", _whole(driven.motor_demand_nm[:rows], QUANTUM["motor"], clean))
 
@@ -156,6 +164,10 @@ def _wandering(angle: Vector, share: float, rng: np.random.Generator) -> Vector:
     return cosine * np.cos(angle) + sine * np.sin(angle)
 
 
+def _drifts(rows: int, columns: int, deviation: float, tau_s: float, rng: np.random.Generator) -> Vector:
+    return np.stack([coloured(rows, deviation, tau_s, TICK_S, rng) for _ in range(columns)], axis=1)
+
+
 def _low_pass(values: Vector, tau_s: float) -> Vector:
     keep = float(np.exp(-TICK_S / tau_s))
     start = values[:1] * keep
@@ -174,7 +186,12 @@ def _put(table: dict[str, Vector], stem: str, unit: str, values: Vector) -> None
 
 def _hold(table: dict[str, Vector], node: str, lost: NDArray[np.bool_]) -> None:
     """Repeat the last frame that came."""
-    stems = {"wheel": ("wheel_speed_",), "imu": ("ax_", "ay_", "yaw_"), "pressure": ("pressure_",), "motor": ("motor_torque_",)}
+    stems = {
+        "wheel": ("wheel_speed_",),
+        "imu": ("ax_", "ay_", "yaw_"),
+        "pressure": ("pressure_",),
+        "motor": ("motor_torque_",),
+    }
     lost = lost.copy()
     lost[0] = False
     source = np.maximum.accumulate(np.where(lost, 0, np.arange(len(lost))))

@@ -1,4 +1,4 @@
-"""How visible a hidden thing is: distance of two runs, whitened by the true noise, beside what tolerances can imitate."""
+"""How visible a hidden thing is: distance of two runs, whitened by the noise, beside what tolerances imitate."""
 
 from collections.abc import Mapping, Sequence
 from math import exp
@@ -22,34 +22,35 @@ MOTION = ("wheel_speed_", "ax_", "ay_", "yaw_", "speed_")
 def whitened(differences: Sequence[Table], base: Sequence[Table], noise: Noise) -> Vector:
     """Innovations of difference tables under the noise of the case; independent, standard deviation 1.
 
-    Wheel speeds, accelerometer and satellite speed share the coloured force on the body: a Kalman filter with speed and
-    force as states whitens them together. All other channels have white noise.
+    Wheel speeds, accelerometer and satellite speed share force, slope and speed of the body: one Kalman filter whitens
+    them together. All other channels have white and coloured noise of their own.
     """
     parts = []
-    for difference, table in zip(differences, base, strict=True):
+    for apart, table in zip(differences, base, strict=True):
         omega = np.stack([table[f"wheel_speed_{w}_rad_s"] for w in WHEELS], axis=1)
-        rows = len(difference["t_s"])
-        omega = omega[:rows]
-        order = noise.order_share * omega
-        wheel_sd = np.hypot(noise.wheel_rad_s + noise.wheel_share * np.abs(omega), order)
+        wheel_sd = np.hypot(noise.wheel_rad_s + noise.wheel_share * np.abs(omega), noise.order_share * omega)
         wheel_sd = np.hypot(wheel_sd, QUANTUM["wheel"] / 12**0.5)
-        motion = np.empty((rows, 6))
-        for i, w in enumerate(WHEELS):
-            motion[:, i] = difference[f"wheel_speed_{w}_rad_s"]
-        motion[:, 4], motion[:, 5] = difference["ax_mps2"], difference["speed_mps"]
+        names = [f"wheel_speed_{w}_rad_s" for w in WHEELS] + ["ax_mps2", "speed_mps"]
+        motion = np.stack([apart[name] for name in names], axis=1)
         moving = (omega.mean(axis=1) > 0.3).astype(np.float64)
+        coloured = np.array([noise.gust_mps2, noise.slope_mps2, noise.drift_mps2, *[noise.wheel_drift] * 4])
+        times = np.array([noise.gust_tau_s, noise.slope_tau_s, noise.drift_tau_s, *[noise.sensor_tau_s] * 4])
         parts.append(
-            _innovations(
-                motion, wheel_sd, _deviation(noise.ax_mps2, "ax"), _deviation(noise.speed_mps, "speed"), moving,
-                noise.gust_mps2, exp(-TICK_S / noise.gust_tau_s),
+            _motion_innovations(
+                motion, omega, wheel_sd, _deviation(noise.ax_mps2, "ax"), _deviation(noise.speed_mps, "speed"), moving,
+                coloured, np.exp(-TICK_S / times),
             ).ravel()
         )  # fmt: skip
-        parts.append(difference["ay_mps2"] / np.hypot(_deviation(noise.ay_mps2, "ay"), noise.gust_mps2))
-        parts.append(difference["yaw_rate_rad_s"] / _deviation(noise.yaw_rad_s, "yaw"))
-        for w in WHEELS:
-            parts.append(difference[f"pressure_{w}_pa"] / _deviation(noise.pressure_pa, "pressure"))
-            parts.append(difference[f"motor_torque_{w}_nm"] / _deviation(noise.torque_nm, "motor"))
-    return np.nan_to_num(np.concatenate(parts))
+        keep = exp(-TICK_S / noise.sensor_tau_s)
+        own = [
+            ("ay_mps2", noise.ay_mps2, noise.ay_drift_mps2),
+            ("yaw_rate_rad_s", noise.yaw_rad_s, noise.yaw_drift_rad_s),
+        ]
+        own += [(f"pressure_{w}_pa", noise.pressure_pa, noise.pressure_drift_pa) for w in WHEELS]
+        own += [(f"motor_torque_{w}_nm", noise.torque_nm, noise.torque_drift_nm) for w in WHEELS]
+        for name, white, drift in own:
+            parts.append(_innovations(apart[name], _deviation(white, name.split("_")[0]), drift, keep))
+    return np.concatenate(parts)
 
 
 def difference(one: Sequence[Table], other: Sequence[Table]) -> list[dict[str, Vector]]:
@@ -98,40 +99,72 @@ def _deviation(white: float, channel: str) -> float:
 
 
 @entry
-def _innovations(
-    motion: Vector, wheel_sd: Vector, ax_sd: float, speed_sd: float, moving: Vector, gust: float, keep: float
-) -> Vector:
-    """Normalised innovations, (n, 6): wheels, accelerometer, satellite; states are speed and coloured force.
+def _innovations(z: Vector, white: float, drift: float, keep: float) -> Vector:
+    """Normalised innovations of one channel with white and AR(1) noise; 0 where nothing is measured."""
+    out = np.zeros(z.size)
+    state, variance = 0.0, drift * drift
+    for k in range(z.size):
+        if z[k] == z[k]:
+            s = variance + white * white
+            out[k] = (z[k] - state) / s**0.5
+            gain = variance / s
+            state += gain * (z[k] - state)
+            variance -= gain * variance
+        state *= keep
+        variance = keep * keep * variance + (1.0 - keep * keep) * drift * drift
+    return out
 
-    Kalman filter with scalar updates; NaN is no measurement.
+
+@entry
+def _motion_innovations(
+    motion: Vector, omega: Vector, wheel_sd: Vector, ax_sd: float, speed_sd: float, moving: Vector, coloured: Vector,
+    keep: Vector,
+) -> Vector:  # fmt: skip
+    """Normalised innovations, (n, 6): wheels, accelerometer, satellite; NaN is no measurement and gives 0.
+
+    States: speed; force, slope, accelerometer (AR(1)); share of each wheel (AR(1)). Kalman filter, scalar updates.
     """
-    n = motion.shape[0]
-    out = np.zeros((n, 6))
-    v, w = 0.0, 0.0
-    pvv, pvw, pww = START_MPS**2, 0.0, gust * gust
+    n, m = motion.shape[0], 8
+    out, x, h, g = np.zeros((n, 6)), np.zeros(m), np.zeros(m), np.zeros(m)
+    p = np.zeros((m, m))
+    p[0, 0] = START_MPS**2
+    for i in range(7):
+        p[1 + i, 1 + i] = coloured[i] ** 2
     for k in range(n):
         for j in range(6):
-            hv, hw, sd = 0.0, 0.0, 1.0
-            if j < 4:
-                hv, sd = 1.0 / RADIUS_M, wheel_sd[k, j]
-            elif j == 4:
-                hw, sd = moving[k], ax_sd
-            else:
-                hv, sd = 1.0, speed_sd
             z = motion[k, j]
             if z != z:
                 continue
-            s = hv * hv * pvv + 2.0 * hv * hw * pvw + hw * hw * pww + sd * sd
-            gv, gw = (pvv * hv + pvw * hw) / s, (pvw * hv + pww * hw) / s
-            residual = z - hv * v - hw * w
-            out[k, j] = residual / s**0.5
-            v += gv * residual
-            w += gw * residual
-            pvv, pvw, pww = pvv - gv * gv * s, pvw - gv * gw * s, pww - gw * gw * s
+            h[:] = 0.0
+            if j < 4:
+                h[0], h[4 + j], sd = 1.0 / RADIUS_M, omega[k, j], wheel_sd[k, j]
+            elif j == 4:
+                h[1], h[3], sd = moving[k], 1.0, ax_sd
+            else:
+                h[0], sd = 1.0, speed_sd
+            s = sd * sd
+            for a in range(m):
+                g[a] = 0.0
+                for b in range(m):
+                    g[a] += p[a, b] * h[b]
+                s += h[a] * g[a]
+                z -= h[a] * x[a]
+            out[k, j] = z / s**0.5
+            for a in range(m):
+                x[a] += g[a] * z / s
+                for b in range(m):
+                    p[a, b] -= g[a] * g[b] / s
         step = TICK_S * moving[k]
-        v += step * w
-        w *= keep
-        pvv, pvw = pvv + 2.0 * step * pvw + step * step * pww, keep * (pvw + step * pww)
-        pww = keep * keep * pww + (1.0 - keep * keep) * gust * gust
-        pvv += 1e-14
+        x[0] += step * (x[1] - x[2])
+        for b in range(m):
+            p[0, b] += step * (p[1, b] - p[2, b])
+        for a in range(m):
+            p[a, 0] += step * (p[a, 1] - p[a, 2])
+        for i in range(7):
+            x[1 + i] *= keep[i]
+            for b in range(m):
+                p[1 + i, b] *= keep[i]
+                p[b, 1 + i] *= keep[i]
+            p[1 + i, 1 + i] += (1.0 - keep[i] ** 2) * coloured[i] ** 2
+        p[0, 0] += 1e-14
     return out

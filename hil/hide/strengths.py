@@ -65,8 +65,8 @@ class Row(NamedTuple):
 E = Row(*range(len(Row._fields)))
 ROWS = len(Row._fields)
 
-LAW_CUBIC_MU, LAW_STEP_DRAG, LAW_BUMP_PRESSURE, LAW_WAVE_ROLLING, LAW_MOTOR_SPEED, LAW_APPLY_TIME, LAW_STEER_DRAG = range(
-    1, 8
+LAW_CUBIC_MU, LAW_STEP_DRAG, LAW_BUMP_PRESSURE, LAW_WAVE_ROLLING, LAW_MOTOR_SPEED, LAW_APPLY_TIME, LAW_STEER_DRAG = (
+    range(1, 8)
 )
 """Laws that are in no list, by number; ``E.unlisted`` is their strength."""
 
