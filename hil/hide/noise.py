@@ -56,7 +56,16 @@ class Noise:
     queue_s: float
 
 
-QUANTUM = {"wheel": 0.009, "ax": 0.01, "ay": 0.01, "yaw": 0.0009, "pressure": 1.0e4, "motor": 0.5, "speed": 0.01}
+QUANTUM = {
+    "wheel": 0.009,
+    "ax": 0.01,
+    "ay": 0.01,
+    "yaw": 0.0009,
+    "pressure": 1.0e4,
+    "motor": 0.5,
+    "speed": 0.01,
+    "soc": 0.001,
+}
 """Last bit of each channel on the bus, SI."""
 
 

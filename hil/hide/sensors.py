@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from hil.hide.car import NOMINAL
 from hil.hide.drive import STEP_S, Driven
 from hil.hide.manoeuvres import TICK_S
 from hil.hide.noise import QUANTUM, Noise, coloured
@@ -17,6 +18,7 @@ Vector = NDArray[np.float64]
 WHEELS = ("fl", "fr", "rl", "rr")
 NODES = ("wheel", "imu", "pressure", "motor")
 TEETH, TIMEOUT_S = 48, 0.5
+ORDER_TAU_S, STEERING_RAD = 0.3, 0.0005
 SATELLITE_TICKS = 10
 
 
@@ -31,6 +33,63 @@ class SensorFault:
 Faults = Mapping[str, SensorFault]
 
 
+class _Sampling:
+    """One log in the making: when each node samples, what is hidden in it, and its noise.
+
+    Noise is drawn for the whole drive, so that both runs of a pair see the same whichever ends first.
+    """
+
+    def __init__(self, driven: Driven, noise: Noise, faults: Faults, seed: tuple[int, ...], clean: bool) -> None:
+        self.driven, self.noise, self.clean = driven, noise, clean
+        self._faults, self._rng, self._draws = faults, np.random.default_rng(seed), driven.manoeuvre.ticks
+        self.rows = len(driven.states) // round(TICK_S / STEP_S) - 1
+        self.cycle_s = np.arange(self.rows, dtype=np.float64) * TICK_S
+        sent = [self.cycle_s + late + noise.queue_s * self.waiting() for late in noise.latency_s]
+        self.stamp_s = np.maximum.accumulate(sent[0] + np.arange(self.rows) * 1e-9)
+        self.taken_s = {
+            node: _sampled(k, sent[k], faults, self.waiting()) for k, node in enumerate(NODES)
+        }  # when the value on each row was taken
+
+    def state(self, first: int, t: Vector, columns: int = 1) -> Vector:
+        """States at times, (rows, columns)."""
+        true_t = self.driven.t_s
+        return np.stack([np.interp(t, true_t, self.driven.states[:, first + i]) for i in range(columns)], axis=1)
+
+    def waiting(self) -> Vector:
+        """Waiting times of frames, mean 1."""
+        return self._rng.exponential(1.0, self._draws)[: self.rows]
+
+    def white(self, columns: int) -> Vector:
+        """White noise, standard deviation 1; nothing in a clean log."""
+        drawn = self._rng.standard_normal((self._draws, columns))[: self.rows]
+        return drawn * (0.0 if self.clean else 1.0)
+
+    def drift(self, columns: int, deviation: float, tau_s: float) -> Vector:
+        """Coloured noise; nothing in a clean log."""
+        drawn = [coloured(self._draws, deviation, tau_s, TICK_S, self._rng)[: self.rows] for _ in range(columns)]
+        return np.stack(drawn, axis=1) * (0.0 if self.clean else 1.0)
+
+    def fault(self, name: str, columns: int = 4) -> Vector:
+        """Strength of a hidden sensor effect over the rows, zero before its onset, (rows, columns)."""
+        found = self._faults.get(name)
+        if found is None:
+            return np.zeros((self.rows, columns))
+        return np.where(self.cycle_s[:, None] >= found.onset_s, found.strength[None, :columns], 0.0)
+
+    def scale(self, node: str) -> Vector:
+        """Factor of a wrong scale, (rows, 1)."""
+        k = NODES.index(node)
+        return 1.0 + self.fault("wrong_scale")[:, k : k + 1]
+
+    def whole(self, values: Vector, channel: str) -> Vector:
+        """Quantised; not in a clean log."""
+        return values if self.clean else np.round(values / QUANTUM[channel]) * QUANTUM[channel]
+
+    def lost(self, node: str) -> NDArray[np.bool_]:
+        """Rows whose frame is lost."""
+        return self._rng.random(self._draws)[: self.rows] < self.fault("frame_drop")[:, NODES.index(node)]
+
+
 def observe(
     driven: Driven, noise: Noise, faults: Faults, seed: tuple[int, ...], clean: bool = False
 ) -> dict[str, Vector]:
@@ -40,83 +99,69 @@ def observe(
     ----------
     clean : leaves out noise, teeth and quantisation, but not the clocks: for pairs of runs.
     """
-    rng = np.random.default_rng(seed)
-    rows = len(driven.states) // round(TICK_S / STEP_S) - 1
-    true_t, cycle = driven.t_s, np.arange(rows, dtype=np.float64) * TICK_S
-    times = [cycle + late + rng.exponential(noise.queue_s, rows) for late in noise.latency_s]
-    stamp = np.maximum.accumulate(times[0] + np.arange(rows) * 1e-9)
-    sampled = [_sampled(node, times[k], faults, rng) for k, node in enumerate(NODES)]
-    add = 0.0 if clean else 1.0
-
-    def state(first: int, t: Vector, columns: int = 1) -> Vector:
-        values = [np.interp(t, true_t, driven.states[:, first + i]) for i in range(columns)]
-        return np.stack(values, axis=1)
-
-    def fault(name: str, columns: int = 4) -> Vector:
-        """Strength over the rows, zero before the onset, (rows, columns)."""
-        found = faults.get(name)
-        if found is None:
-            return np.zeros((rows, columns))
-        return np.where(cycle[:, None] >= found.onset_s, found.strength[None, :columns], 0.0)
-
-    scale = 1.0 + fault("wrong_scale")
-    table: dict[str, Vector] = {"t_s": stamp}
-
-    omega = state(S.omega_rad_s, sampled[0], 4)
-    angle = state(S.angle_rad, sampled[0], 4)
-    speed = omega if clean else _from_teeth(driven, sampled[0])
-    once = np.stack([_wandering(angle[:, i], noise.order_share, rng) for i in range(4)], axis=1)
-    once += _drifts(rows, 4, noise.wheel_drift, noise.sensor_tau_s, rng)
-    white = rng.standard_normal((rows, 4)) * (noise.wheel_rad_s + noise.wheel_share * np.abs(omega))
-    turning = speed > 0.05
-    speed = speed * (1.0 + fault("wheel_tooth_error") * np.cos(angle)) + add * turning * (white + once * omega)
-    speed = np.where(np.abs(speed) * 0.308 < fault("wheel_speed_lowv", 1), 0.0, speed)
-    _put(table, "wheel_speed", "rad_s", _whole(speed * scale[:, :1], QUANTUM["wheel"], clean))
-
-    felt = state(S.imu_ax_mps2, sampled[1], 3)
-    lag = fault("imu_filter", 1)[-1, 0]
-    if lag > 0.0:
-        felt = _low_pass(felt, lag)
-    felt = felt + add * rng.standard_normal((rows, 3)) * (noise.ax_mps2, noise.ay_mps2, noise.yaw_rad_s)
-    felt[:, :1] += add * _drifts(rows, 1, noise.drift_mps2, noise.drift_tau_s, rng)
-    felt[:, 1:2] += add * _drifts(rows, 1, noise.ay_drift_mps2, noise.sensor_tau_s, rng)
-    felt[:, 2:] += add * _drifts(rows, 1, noise.yaw_drift_rad_s, noise.sensor_tau_s, rng)
-    felt[:, 0] = felt[:, 0] * (1.0 + fault("imu_gain", 1)[:, 0]) + fault("imu_bias", 1)[:, 0]
-    felt = felt * scale[:, 1:2]
-    step = fault("quantisation", 1)[-1, 0]
-    table["ax_mps2"] = _whole(felt[:, 0], max(QUANTUM["ax"], step), clean and step == 0.0)
-    table["ay_mps2"] = _whole(felt[:, 1], max(QUANTUM["ay"], step), clean and step == 0.0)
-    table["yaw_rate_rad_s"] = _whole(felt[:, 2], QUANTUM["yaw"], clean)
-
-    pressure = state(S.pressure_pa, sampled[2], 4) + add * noise.pressure_pa * rng.standard_normal((rows, 4))
-    pressure += add * _drifts(rows, 4, noise.pressure_drift_pa, noise.sensor_tau_s, rng)
-    pressure = pressure * (1.0 + fault("pressure_gain")) + fault("pressure_offset")
-    _put(table, "pressure", "pa", _whole(pressure * scale[:, 2:3], QUANTUM["pressure"], clean))
-    demand = driven.manoeuvre.pressure_pa[:rows]
-    _put(table, "pressure_demand", "pa", _whole(demand, QUANTUM["pressure"], clean))
-
-    torque = state(S.motor_nm, sampled[3], 4) + add * noise.torque_nm * rng.standard_normal((rows, 4))
-    torque += add * _drifts(rows, 4, noise.torque_drift_nm, noise.sensor_tau_s, rng)
-    _put(table, "motor_torque", "nm", _whole(torque * scale[:, 3:4], QUANTUM["motor"], clean))
-    _put(table, "motor_torque_demand", "nm", _whole(driven.motor_demand_nm[:rows], QUANTUM["motor"], clean))
-
-    table["steer_rad"] = driven.manoeuvre.steering_wheel_rad[:rows] + add * 0.0005 * rng.standard_normal(rows)
-    table["soc"] = _whole(state(S.state_of_charge, cycle)[:, 0], 0.001, clean)
-    ground = state(S.speed_mps, cycle)[:, 0] + add * noise.speed_mps * rng.standard_normal(rows)
-    ground = _whole(ground * (1.0 + fault("speed_scale", 1)[:, 0]), QUANTUM["speed"], clean)
-    table["speed_mps"] = np.where(np.arange(rows) % SATELLITE_TICKS == 0, ground, np.nan)
-
-    for k, node in enumerate(NODES):
-        share = fault("frame_drop")[:, k]
-        lost = rng.random(rows) < share
-        if lost.any():
-            _hold(table, node, lost)
+    log = _Sampling(driven, noise, faults, seed, clean)
+    table = {"t_s": log.stamp_s, **_wheels(log), **_imu(log), **_pressures(log), **_motors(log)}
+    table["steer_rad"] = driven.manoeuvre.steering_wheel_rad[: log.rows] + STEERING_RAD * log.white(1)[:, 0]
+    table["soc"] = log.whole(log.state(S.state_of_charge, log.cycle_s)[:, 0], "soc")
+    ground = log.state(S.speed_mps, log.cycle_s)[:, 0] + noise.speed_mps * log.white(1)[:, 0]
+    ground = log.whole(ground * (1.0 + log.fault("speed_scale", 1)[:, 0]), "speed")
+    table["speed_mps"] = np.where(np.arange(log.rows) % SATELLITE_TICKS == 0, ground, np.nan)
+    for node in NODES:
+        _hold(table, node, log.lost(node))
     return table
 
 
-def _sampled(node: str, t: Vector, faults: Faults, rng: np.random.Generator) -> Vector:
+def _wheels(log: _Sampling) -> dict[str, Vector]:
+    """Toothed wheels: white noise, an error once per turn that wanders, a share that drifts."""
+    noise, taken = log.noise, log.taken_s["wheel"]
+    omega, angle = log.state(S.omega_rad_s, taken, 4), log.state(S.angle_rad, taken, 4)
+    speed = omega if log.clean else _from_teeth(log.driven, taken)
+    cosine, sine = (log.drift(4, noise.order_share, ORDER_TAU_S) for _ in range(2))
+    share = cosine * np.cos(angle) + sine * np.sin(angle) + log.drift(4, noise.wheel_drift, noise.sensor_tau_s)
+    error = log.white(4) * (noise.wheel_rad_s + noise.wheel_share * np.abs(omega)) + share * omega
+    speed = speed * (1.0 + log.fault("wheel_tooth_error") * np.cos(angle)) + (speed > 0.05) * error
+    speed = np.where(np.abs(speed) * NOMINAL.rolling_radius_m < log.fault("wheel_speed_lowv", 1), 0.0, speed)
+    return _named("wheel_speed", "rad_s", log.whole(speed * log.scale("wheel"), "wheel"))
+
+
+def _imu(log: _Sampling) -> dict[str, Vector]:
+    noise = log.noise
+    felt = log.state(S.imu_ax_mps2, log.taken_s["imu"], 3)
+    lag = log.fault("imu_filter", 1)
+    if lag.any():
+        felt = np.where(lag > 0.0, _low_pass(felt, float(lag.max())), felt)
+    felt = felt + log.white(3) * (noise.ax_mps2, noise.ay_mps2, noise.yaw_rad_s)
+    felt[:, :1] += log.drift(1, noise.drift_mps2, noise.drift_tau_s)
+    felt[:, 1:2] += log.drift(1, noise.ay_drift_mps2, noise.sensor_tau_s)
+    felt[:, 2:] += log.drift(1, noise.yaw_drift_rad_s, noise.sensor_tau_s)
+    felt[:, :1] = felt[:, :1] * (1.0 + log.fault("imu_gain", 1)) + log.fault("imu_bias", 1)
+    felt = felt * log.scale("imu")
+    step = log.fault("quantisation", 1)
+    coarse = np.round(felt / np.where(step > 0.0, step, 1.0)) * step
+    felt[:, :2] = np.where(step > 0.0, coarse, felt)[:, :2]
+    names = (("ax_mps2", "ax"), ("ay_mps2", "ay"), ("yaw_rate_rad_s", "yaw"))
+    return {name: log.whole(felt[:, k], channel) for k, (name, channel) in enumerate(names)}
+
+
+def _pressures(log: _Sampling) -> dict[str, Vector]:
+    pressure = log.state(S.pressure_pa, log.taken_s["pressure"], 4) + log.noise.pressure_pa * log.white(4)
+    pressure += log.drift(4, log.noise.pressure_drift_pa, log.noise.sensor_tau_s)
+    pressure = pressure * (1.0 + log.fault("pressure_gain")) + log.fault("pressure_offset")
+    demand = log.whole(log.driven.manoeuvre.pressure_pa[: log.rows], "pressure")
+    measured = log.whole(pressure * log.scale("pressure"), "pressure")
+    return _named("pressure", "pa", measured) | _named("pressure_demand", "pa", demand)
+
+
+def _motors(log: _Sampling) -> dict[str, Vector]:
+    torque = log.state(S.motor_nm, log.taken_s["motor"], 4) + log.noise.torque_nm * log.white(4)
+    torque += log.drift(4, log.noise.torque_drift_nm, log.noise.sensor_tau_s)
+    demand = log.whole(log.driven.motor_demand_nm[: log.rows], "motor")
+    measured = log.whole(torque * log.scale("motor"), "motor")
+    return _named("motor_torque", "nm", measured) | _named("motor_torque_demand", "nm", demand)
+
+
+def _sampled(k: int, t: Vector, faults: Faults, waiting: Vector) -> Vector:
     """When the value on a row was taken: s(t - d), a clock that drifts, a bus that makes frames wait."""
-    k = NODES.index(node)
     result = t
     for name in ("timestamp_offset", "clock_drift", "jitter"):
         found = faults.get(name)
@@ -126,7 +171,7 @@ def _sampled(node: str, t: Vector, faults: Faults, rng: np.random.Generator) -> 
         if name == "clock_drift":
             size = size * (t - t[0])
         elif name == "jitter":
-            size = size * rng.exponential(1.0, len(t))
+            size = size * waiting
         result = result - size
     return result
 
@@ -158,16 +203,6 @@ def _from_teeth(driven: Driven, t: Vector) -> Vector:
     return speeds
 
 
-def _wandering(angle: Vector, share: float, rng: np.random.Generator) -> Vector:
-    """Once-per-revolution error whose amplitude and phase wander over some revolutions."""
-    cosine, sine = (coloured(len(angle), share, 0.3, TICK_S, rng) for _ in range(2))
-    return cosine * np.cos(angle) + sine * np.sin(angle)
-
-
-def _drifts(rows: int, columns: int, deviation: float, tau_s: float, rng: np.random.Generator) -> Vector:
-    return np.stack([coloured(rows, deviation, tau_s, TICK_S, rng) for _ in range(columns)], axis=1)
-
-
 def _low_pass(values: Vector, tau_s: float) -> Vector:
     keep = float(np.exp(-TICK_S / tau_s))
     start = values[:1] * keep
@@ -175,13 +210,8 @@ def _low_pass(values: Vector, tau_s: float) -> Vector:
     return np.asarray(filtered, dtype=np.float64)
 
 
-def _whole(values: Vector, quantum: float, clean: bool) -> Vector:
-    return values if clean else np.round(values / quantum) * quantum
-
-
-def _put(table: dict[str, Vector], stem: str, unit: str, values: Vector) -> None:
-    for i, wheel in enumerate(WHEELS):
-        table[f"{stem}_{wheel}_{unit}"] = values[:, i]
+def _named(stem: str, unit: str, values: Vector) -> dict[str, Vector]:
+    return {f"{stem}_{wheel}_{unit}": values[:, i] for i, wheel in enumerate(WHEELS)}
 
 
 def _hold(table: dict[str, Vector], node: str, lost: NDArray[np.bool_]) -> None:
@@ -192,8 +222,9 @@ def _hold(table: dict[str, Vector], node: str, lost: NDArray[np.bool_]) -> None:
         "pressure": ("pressure_",),
         "motor": ("motor_torque_",),
     }
-    lost = lost.copy()
-    lost[0] = False
+    if not lost.any():
+        return
+    lost = lost & (np.arange(len(lost)) > 0)
     source = np.maximum.accumulate(np.where(lost, 0, np.arange(len(lost))))
     for name in table:
         if name.startswith(stems[node]) and "demand" not in name:
