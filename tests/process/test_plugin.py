@@ -12,19 +12,8 @@ from processes import RUN_LIMIT_S, alive, children_of, wait_until
 
 from hil.result import Signals
 
-MOTOR_LOSS = """
-import pytest
-from hil.pytest_plugin import stopped
-
-@pytest.mark.requirement("BRK-7", "BRK-8")
-def test_motor_loss(bench):
-    bench.blend(0.7)
-    bench.drive("72 km/h")
-    bench.pedal(0.6)
-    bench.inject("motor_dead", wheel="fl", after=1.0)
-    bench.run_until(stopped)
-    assert bench.deceleration_dip(after=0.15) < 0.3
-"""
+DOCUMENTED = Path(__file__).parents[2].joinpath("docs/testing.md").read_text()
+MOTOR_LOSS = DOCUMENTED.split("```python\n")[1].split("```")[0]
 NO_TAKEOVER = """
 import ecu.law.step  # every motor is taken for able, whatever it reports
 ecu.law.step._usable_torque = lambda inputs, lost, mode: (700.0, 700.0, 700.0, 700.0)

@@ -4,6 +4,8 @@ import contextlib
 import itertools
 import json
 import math
+import re
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -15,7 +17,7 @@ from hil.errors import BrakebenchError
 from hil.generators import GENERATORS
 from hil.result import measure
 from hil.run import expected
-from hil.scenario import FAULT_NAMES, FaultEvent, load_scenario, scenario_names
+from hil.scenario import EXPECTABLE, FAULT_NAMES, FaultEvent, load_scenario, scenario_names
 from hil.scenario_table import ScenarioError
 from hil.virtual import simulate
 from plant.manoeuvre import value_at
@@ -128,6 +130,16 @@ def test_every_field_arrives(write):
     assert s.faults == (FaultEvent(1.0, dead, 0b1001), FaultEvent(2.0, dead, 0b1001, active=False))
     assert s.signal_expectations[0].name == "TRUTH_MOTION.SPEED from 1 s to 2 s"
     assert load_scenario(write(FULL, "b.toml")).sha256 == s.sha256
+
+
+def test_the_documented_file_is_one(write):
+    text = Path(__file__).parents[3].joinpath("docs/scenarios.md").read_text()
+    scenario = load_scenario(write(text.split("```toml\n")[1].split("```")[0]))
+    assert scenario.plant.vehicle.mass_kg == 1600.0
+    assert len(scenario.faults) == 2
+    fields = set(re.findall(r"^\[*(\w+)|^(\w+) =", text, re.MULTILINE))
+    assert {"blending", "faults", "expect_signal"} <= {name for pair in fields for name in pair}
+    assert all(name in text for name in (*GENERATORS, *FAULT_NAMES, *EXPECTABLE))
 
 
 def test_the_hash_covers_the_csv(write, tmp_path):
