@@ -51,7 +51,7 @@ def measure() -> list[Row]:
 
 def _against_filterpy() -> list[Row]:
     try:
-        from filterpy.kalman import KalmanFilter  # type: ignore[import-untyped]
+        from filterpy.kalman import KalmanFilter
     except ImportError:
         print("perf ecu: filterpy is not installed; its rows are left out", file=sys.stderr)
         return []

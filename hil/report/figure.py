@@ -119,7 +119,9 @@ def _number(figure: "Figure", number: Number, left: float, top: float) -> None:
     text = f"{value} {unit}".strip()
     limit = f"  ({clean(number.limit)})" if number.limit else ""
     _write(figure, left, top - 0.14, _cut(clean(number.label), 24), size=7.5, colour=_SOFT)
-    _write(figure, left, top - 0.34, _cut(text, 20) + limit, size=10.5 if len(text + limit) < 18 else 8, colour=colour)
+    shown = _cut(_cut(text, 20) + limit, 32)
+    size = 10.5 if len(shown) < 18 else 8.0 if len(shown) < 24 else 6.3
+    _write(figure, left, top - 0.34, shown, size=size, colour=colour)
 
 
 def _write(
