@@ -10,7 +10,7 @@ from hil.cli.options import add_json
 from hil.errors import BrakebenchError
 
 if TYPE_CHECKING:
-    from hil.hide.cases import Hidden
+    from hil.hide.case import Hidden
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
         return _list(args.json)
     if args.out is None:
         raise BrakebenchError("--out is missing: give a folder for the logs, e.g. --out hidden/one")
-    from hil.hide.cases import make_case, measured_case, scaled_case
+    from hil.hide.case import make_case, measured_case, scaled_case
     from hil.hide.files import write
 
     hidden = _hidden(args)
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _hidden(args: argparse.Namespace) -> list["Hidden"]:
-    from hil.hide.cases import Hidden
+    from hil.hide.case import Hidden
     from hil.hide.catalogue import find
 
     if args.effect == ["none"]:

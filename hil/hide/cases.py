@@ -1,225 +1,118 @@
-"""Cases: what is hidden where, how large, under how much noise; the logs they give, and the sealed answer."""
+"""Blind trials: which case of a family comes when (`draw`), writing it (`write`), opening it (`read_answer`)."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
-from math import log
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hil.errors import BrakebenchError
-from hil.hide.car import NOMINAL, TOLERANCE, Car, true_car
-from hil.hide.catalogue import find
-from hil.hide.drive import drive
-from hil.hide.manoeuvres import SETS, TICK_S, Manoeuvre, manoeuvre_set
-from hil.hide.noise import LEVELS, Noise, draw_noise, gusts
-from hil.hide.sensors import SensorFault, observe
-from hil.hide.snr import difference, signal_to_noise, whitened
-from hil.hide.strengths import ROWS, E
+from hil.hide.case import Case, Hidden, make_case, measured_case, scaled_case
+from hil.hide.catalogue import LISTED, TWINS, UNLISTED, Hideable, find
+from hil.hide.files import answer, read_answer, write
+from hil.hide.noise import LEVELS
 
-Vector = NDArray[np.float64]
-Table = Mapping[str, Vector]
-CALIBRATION_ROUNDS, CALIBRATED, REACHED = 8, 0.03, 0.15
+__all__ = ["FAMILIES", "Case", "answer", "draw", "followed_by", "read_answer", "write"]
 
-
-@dataclass(frozen=True)
-class Hidden:
-    """One hidden thing: where, how large, since when (s in the session, logs in order; None: always)."""
-
-    effect: str
-    wheel: str
-    magnitude: float
-    onset_s: float | None = None
+SNRS = (3.0, 5.0, 8.0, 15.0)
+CONFOUNDED = ("mass_offset", "pad_mu_gain", "headwind", "rolling_resistance")
+OUTSIDE = ("pad_temp_fade", "iwm_gain", "motor_tau", "mu_road", "hot_spot", "battery_soc", "regen_fadeout")
+SEPARABLE = tuple(kind for kind in LISTED if kind.shows and kind.scales)
+"""Effects of the single family: those the full manoeuvre set excites and that have a signature in time."""
+Rng = np.random.Generator
 
 
-@dataclass(frozen=True)
-class Case:
-    """Everything a set of logs follows from.
+def draw(family: str, index: int, seed: int, snr: float | None = None) -> Case:
+    """Case ``index`` of a family; the same arguments give the same case.
 
-    Attributes
+    Parameters
     ----------
-    family, index, seed : how it was drawn.  manoeuvres, variant : what is driven.
-    snr : expected, beside what tolerances can imitate; ``snr_alone`` without that. None: not computed.
-    target_snr : what the magnitude was scaled for; ``reached`` False where a physical bound came first.
-    """
-
-    family: str
-    index: int
-    seed: int
-    manoeuvres: str
-    variant: int
-    noise_level: str
-    hidden: tuple[Hidden, ...] = ()
-    snr: float | None = None
-    snr_alone: float | None = None
-    target_snr: float | None = None
-    reached: bool = True
-
-    @property
-    def car(self) -> Car:
-        """The true car."""
-        return true_car(np.random.default_rng([self.seed, 1]))
-
-    @property
-    def noise(self) -> Noise:
-        """The true noise."""
-        return draw_noise(self.noise_level, np.random.default_rng([self.seed, 2]))
-
-    @property
-    def drives(self) -> tuple[Manoeuvre, ...]:
-        """What is driven."""
-        return manoeuvre_set(self.manoeuvres, self.variant)
-
-    def starts_s(self) -> list[float]:
-        """Start of each log in the session, s."""
-        lengths = [drive.ticks * TICK_S for drive in self.drives]
-        return [float(sum(lengths[:k])) for k in range(len(lengths))]
-
-
-def make_case(
-    hidden: Sequence[Hidden], seed: int, noise_level: str = "medium", manoeuvres: str = "full", variant: int = 0,
-    family: str = "own", index: int = 0,
-) -> Case:  # fmt: skip
-    """A case after all checks.
+    snr : what the magnitude is scaled for; None takes the family's own (single: 3, 5, 8, 15 in turn).
 
     Raises
     ------
     BrakebenchError
-        An effect, wheel, noise level or manoeuvre set that does not exist, a magnitude beyond its bounds, two laws.
+        There is no such family.
     """
-    if noise_level not in LEVELS:
-        raise BrakebenchError(f"--noise {noise_level}: expected one of {', '.join(LEVELS)}")
-    if manoeuvres not in SETS:
-        raise BrakebenchError(f"--manoeuvres {manoeuvres}: expected one of {', '.join(SETS)}")
-    for one in hidden:
-        kind = find(one.effect)
-        if one.wheel not in kind.where:
-            raise BrakebenchError(f"--wheel {one.wheel}: {one.effect} acts on {', '.join(kind.where)}")
-        if not kind.low <= one.magnitude <= kind.high:
-            raise BrakebenchError(
-                f"--magnitude {one.magnitude:g}: {one.effect}.{kind.parameter} lies between {kind.low:g} and "
-                f"{kind.high:g} {kind.unit}"
-            )
-    if sum(find(one.effect).law > 0 for one in hidden) > 1:
-        raise BrakebenchError("two laws in no list cannot be hidden at once; hide one, beside listed effects")
-    return Case(family, index, seed, manoeuvres, variant, noise_level, tuple(hidden))
+    if family not in FAMILIES:
+        raise BrakebenchError(f"family {family!r}: expected one of {', '.join(FAMILIES)}")
+    own = int(np.random.default_rng([seed, index, sum(family.encode())]).integers(2**31))
+    case = FAMILIES[family](index, own, np.random.default_rng([own, 9]), snr)
+    return replace(case, family=family, index=index)
 
 
-def logs(case: Case, clean: bool = False) -> list[dict[str, Vector]]:
-    """Tables of all logs, in order of `Case.drives`; ``clean`` leaves out sensor noise and quantisation."""
-    return _observed(case.drives, case.car, case.noise, case.hidden, case.seed, clean)
+def followed_by(case: Case) -> Case:
+    """The same car with the same thing hidden on the manoeuvres that decide, where straight stops leave it tied."""
+    return replace(case, manoeuvres="decide", variant=0, snr=None, snr_alone=None)
 
 
-def _observed(
-    drives: Sequence[Manoeuvre], car: Car, noise: Noise, hidden: Sequence[Hidden], seed: int, clean: bool
-) -> list[dict[str, Vector]]:
-    begin, tables = 0.0, []
-    for k, manoeuvre in enumerate(drives):
-        strength, onset, law, faults = np.zeros((ROWS, 4)), np.zeros(ROWS), 0, {}
-        for one in hidden:
-            kind = find(one.effect)
-            row = kind.strength(one.magnitude, one.wheel)
-            since = 0.0 if one.onset_s is None else max(one.onset_s - begin, 0.0)
-            if kind.senses:
-                faults[one.effect] = SensorFault(row, since)
-                continue
-            at = E.unlisted if kind.law else getattr(E, one.effect)
-            strength[at] += row
-            onset[at] = since
-            law = kind.law or law
-        gust = gusts(manoeuvre.ticks, noise, np.random.default_rng([seed, 3, k]))
-        driven = drive(manoeuvre, car, strength, onset, law, gust)
-        tables.append(observe(driven, noise, faults, (seed, 4, k), clean))
-        begin += manoeuvre.ticks * TICK_S
-    return tables
+def _level(index: int) -> str:
+    return list(LEVELS)[index % len(LEVELS)]
 
 
-def expected_snr(case: Case) -> tuple[float, float]:
-    """SNR of what is hidden: beside imitations by tolerances, and alone. Both runs of the pair have the same gusts."""
-    base = logs(replace(case, hidden=()), clean=True)
-    return _snr(case, base, _imitations(case))
-
-
-def _snr(case: Case, base: Sequence[Table], imitations: Vector) -> tuple[float, float]:
-    apart = difference(logs(case, clean=True), base)
-    return signal_to_noise(whitened(apart, base, case.noise), imitations)
-
-
-def _imitations(case: Case) -> Vector:
-    """Whitened signatures of all parameters with a tolerance, one standard deviation each, (samples, parameters)."""
-    own = logs(replace(case, hidden=()), clean=True)
-    columns = []
-    for signature in _signatures(case.manoeuvres, case.variant):
-        fitted = [_fitted(one, len(mine["t_s"])) for one, mine in zip(signature, own, strict=True)]
-        columns.append(whitened(fitted, own, case.noise))
-    return np.stack(columns, axis=1)
-
-
-def _fitted(table: Table, rows: int) -> dict[str, Vector]:
-    """A signature over as many rows as another log has; nothing beyond its own end."""
-    return {name: np.concatenate([v[:rows], np.full(max(rows - len(v), 0), np.nan)]) for name, v in table.items()}
-
-
-@lru_cache(maxsize=4)
-def _signatures(manoeuvres: str, variant: int) -> list[list[dict[str, Vector]]]:
-    """What half a tolerance of each parameter changes in the clean logs of the nominal car."""
-    noise = replace(
-        draw_noise("medium", np.random.default_rng(0)), gust_mps2=0.0, latency_s=(0.0, 0.0, 0.0, 0.0), queue_s=0.0
+def _one(kind: Hideable, rng: Rng, onset_s: float | None = None) -> Hidden:
+    """Something hidden in its usual size and sense, somewhere it may act."""
+    wheel = kind.where[int(rng.integers(len(kind.where)))]
+    sign = (
+        -1.0
+        if kind.low < 0.0 < kind.high and min(-kind.low, kind.high) > abs(kind.typical) and rng.random() < 0.3
+        else 1.0
     )
-    drives = manoeuvre_set(manoeuvres, variant)
-    base = _observed(drives, NOMINAL, noise, (), 0, True)
-    found = []
-    for name, tolerance in TOLERANCE.items():
-        car = NOMINAL._replace(**{name: getattr(NOMINAL, name) + 0.5 * tolerance})
-        found.append(difference(_observed(drives, car, noise, (), 0, True), base))
-    return found
+    return Hidden(kind.name, wheel, sign * kind.typical, onset_s)
 
 
-def measured_case(case: Case) -> Case:
-    """The case with its expected SNR filled in."""
-    beside, alone = expected_snr(case)
-    return replace(case, snr=beside, snr_alone=alone)
+def _null(index: int, seed: int, rng: Rng, snr: float | None) -> Case:
+    return make_case((), seed, _level(index), variant=1000 + int(rng.integers(100000)))
 
 
-def scaled_case(case: Case, target: float) -> Case:
-    """The case with the magnitudes of all it hides scaled by one factor, so that the expected SNR is ``target``.
-
-    What has no signature in time keeps its magnitude. A bound that comes first ends the search: ``reached`` is False.
-    """
-    if not case.hidden or not all(find(one.effect).scales for one in case.hidden):
-        return replace(case, target_snr=target, reached=not case.hidden)
-    base = logs(replace(case, hidden=()), clean=True)
-    imitations = _imitations(case)
-    low, high, factor = 0.0, _largest_factor(case), min(1.0, _largest_factor(case))
-    best = case
-    for _ in range(CALIBRATION_ROUNDS):
-        trial = _times(case, factor)
-        beside, alone = _snr(trial, base, imitations)
-        trial = replace(trial, snr=beside, snr_alone=alone, target_snr=target)
-        error = _off(beside, target)
-        if best.snr is None or error < _off(best.snr, target):
-            best = trial
-        if error < CALIBRATED or (factor >= high and beside < target):
-            break
-        low, high = (factor, high) if beside < target else (low, factor)
-        wanted = factor * target / max(beside, 1e-9)
-        factor = wanted if low < wanted < high else (high if wanted >= high and low == factor else 0.5 * (low + high))
-    return replace(best, reached=best.snr is not None and _off(best.snr, target) < REACHED)
+def _single(index: int, seed: int, rng: Rng, snr: float | None) -> Case:
+    kind = SEPARABLE[index % len(SEPARABLE)] if snr else SEPARABLE[index // len(SNRS) % len(SEPARABLE)]
+    case = make_case((_one(kind, rng),), seed, _level(int(rng.integers(3))))
+    return scaled_case(case, snr or SNRS[index % len(SNRS)])
 
 
-def _off(snr: float, target: float) -> float:
-    return abs(log(max(snr, 1e-9) / target))
+def _onset(index: int, seed: int, rng: Rng, snr: float | None) -> Case:
+    kind = SEPARABLE[int(rng.integers(len(SEPARABLE)))]
+    case = make_case((_one(kind, rng, float(rng.uniform(50.0, 130.0))),), seed, _level(index))
+    return scaled_case(case, snr or 15.0)
 
 
-def _largest_factor(case: Case) -> float:
-    factors = []
-    for one in case.hidden:
-        kind = find(one.effect)
-        bound = kind.high if one.magnitude > 0.0 else kind.low
-        factors.append(bound / one.magnitude)
-    return min(factors)
+def _several(count: int) -> Callable[[int, int, Rng, float | None], Case]:
+    def several(index: int, seed: int, rng: Rng, snr: float | None) -> Case:
+        """Each scaled by itself; then hidden together."""
+        found: list[Hidden] = []
+        for k in rng.choice(len(SEPARABLE), count, replace=False):
+            alone = make_case((_one(SEPARABLE[int(k)], rng),), seed, _level(index))
+            found.extend(scaled_case(alone, snr or 10.0).hidden)
+        return measured_case(make_case(found, seed, _level(index)))
+
+    return several
 
 
-def _times(case: Case, factor: float) -> Case:
-    return replace(case, hidden=tuple(replace(one, magnitude=one.magnitude * factor) for one in case.hidden))
+def _unlisted(index: int, seed: int, rng: Rng, snr: float | None) -> Case:
+    case = make_case((_one(UNLISTED[index % len(UNLISTED)], rng),), seed, _level(int(rng.integers(3))))
+    return scaled_case(case, snr or 20.0)
+
+
+def _confounded(index: int, seed: int, rng: Rng, snr: float | None) -> Case:
+    kind = find(CONFOUNDED[index % len(CONFOUNDED)])
+    return scaled_case(make_case((_one(kind, rng),), seed, "medium", "stops"), snr or 8.0)
+
+
+def _twin(index: int, seed: int, rng: Rng, snr: float | None) -> Case:
+    """Physical effect and sensor effect of a pair in turn; both act alike on car or wheel."""
+    pair = TWINS[index // 2 % len(TWINS)]
+    kind = find(pair[index % 2])
+    case = make_case((_one(kind, rng),), seed, _level(int(rng.integers(3))))
+    return scaled_case(case, snr or 15.0)
+
+
+def _not_testable(index: int, seed: int, rng: Rng, snr: float | None) -> Case:
+    kind = find(OUTSIDE[index % len(OUTSIDE)])
+    return measured_case(make_case((_one(kind, rng),), seed, _level(index), "cold"))
+
+
+FAMILIES: dict[str, Callable[[int, int, Rng, float | None], Case]] = {
+    "null": _null, "single": _single, "onset": _onset, "two": _several(2), "three": _several(3), "unlisted": _unlisted,
+    "confounded": _confounded, "twin": _twin, "not_testable": _not_testable,
+}  # fmt: skip
+"""Family of trials -> how its cases are drawn."""

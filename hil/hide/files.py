@@ -11,7 +11,7 @@ import pyarrow.parquet
 
 from hil.errors import BrakebenchError
 from hil.hide.car import NOMINAL, TOLERANCE
-from hil.hide.cases import Case, Hidden, logs
+from hil.hide.case import Case, Hidden, logs
 from hil.hide.catalogue import find
 from hil.hide.manoeuvres import TICK_S
 
