@@ -281,10 +281,12 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
                 s[SLIDING + i] = SLIDING_HOLD_S
             step = omega - s[LAST_WHEEL + i]
             spin[i] = step / dt
-            if omega > TOOTH_RAD_S:
-                s[SPIN_RATE + i] += 0.3 * (spin[i] - s[SPIN_RATE + i])
-                s[SPIN + i] = omega + s[SPIN_RATE + i] * p[P_WHEEL_LAG]
-            else:  # too few teeth pass to see the wheel stop: go on as it went
+            if omega > TOOTH_RAD_S and (step < SPIN_UP_RAD_S or s[LAST_WHEEL + i] > TOOTH_RAD_S):
+                s[SPIN + i] += s[SPIN_RATE + i] * dt
+                behind = omega + s[SPIN_RATE + i] * p[P_WHEEL_LAG] - s[SPIN + i]
+                s[SPIN + i] += 0.5 * behind
+                s[SPIN_RATE + i] += 0.2 * behind / dt
+            else:  # too few teeth pass to see the wheel stop (and it rocks when it does): go on as it went
                 s[SPIN + i] += s[SPIN_RATE + i] * dt
             slow = slip < LOCKED_SHARE - 1.0
             if s[LOCKED + i] > 0.0:
@@ -292,7 +294,7 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
                 if s[LOCKED + i] > TOOTH_WAIT_S and (not slow or step > SPIN_UP_RAD_S):
                     s[LOCKED + i] = 0.0
                     s[SPIN + i], s[SPIN_RATE + i] = TOOTH_RAD_S, 0.0
-            elif (s[SPIN + i] + 0.5 * s[SPIN_RATE + i] * dt <= 0.0 and slip < -0.5) or (
+            elif (s[SPIN + i] + 0.75 * s[SPIN_RATE + i] * dt <= 0.0 and slip < -0.5) or (
                 slow and omega < STANDING_RAD_S
             ):
                 s[LOCKED + i] = dt
