@@ -143,7 +143,7 @@ class Recorder:
         if self._down:
             bus, event = next(iter(self._down.items()))
             raise RecorderError(
-                f"{self.path}: recording is INCOMPLETE: the {bus} bus {_DOWN[event.state]} ({event.detail}) and did "
-                "not come back; frames recorded after that were heard on this machine only. Check wires, bit rate and "
-                "the other nodes, then take the link down and up"
+                f"{self.path}: recording is INCOMPLETE: the {bus} bus {_DOWN[event.state]} and did not come back; "
+                "frames recorded after that were heard on this machine only. Check wires, bit rate and the other "
+                "nodes, then take the link down and up"
             )

@@ -100,6 +100,18 @@ class SlcanDevice:
         for fd in (self._line_side, self.port_fd, self._stop, self._stopper):
             os.close(fd)
 
+    @contextlib.contextmanager
+    def punctual(self) -> Iterator[None]:
+        """Never wait for a processor meanwhile, as hardware does not; needs root. For the calling thread too."""
+        threads = (threading.get_native_id(), self._thread.native_id or 0)
+        for thread in threads:
+            os.sched_setscheduler(thread, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(1))
+        try:
+            yield
+        finally:
+            for thread in threads:
+                os.sched_setscheduler(thread, os.SCHED_OTHER, os.sched_param(0))
+
     def send(self, frame: SlcanFrame) -> None:
         """Another node on the bus sends a frame."""
         self.send_line(frame.line())

@@ -6,12 +6,13 @@ import errno
 import fcntl
 import json
 import os
+import platform
 import shutil
 import socket
 import struct
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -19,13 +20,41 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
+from candump import Candump
 from slcan_device import SlcanDevice
+from started import COMMAND, Started
 
 TIOCSETD = 0x5423  # asm-generic/ioctls.h
 SIOCGIFNAME, SIOCGIFFLAGS, SIOCSIFFLAGS = 0x8910, 0x8913, 0x8914  # linux/sockios.h
 IFF_UP = 1  # linux/if.h
 N_TTY, N_SLCAN = 0, 17  # linux/tty.h
 LAB = os.environ.get("VCAN_LAB")  # set by .ci/vcan-lab: "kernel" or "uml"
+
+
+FIGURES = pytest.StashKey[list[str]]()
+
+
+def pytest_report_header() -> str | None:
+    """Name the kernel and its CAN drivers where the tests on it are meant to run."""
+    if LAB is None:
+        return None
+    modules = [line.split()[0] for line in Path("/proc/modules").read_text().splitlines()]
+    found = ", ".join(sorted(name for name in modules if name.startswith(("can", "vcan", "slcan"))))
+    return f"SocketCAN: Linux {platform.release()} ({LAB}), modules {found or 'built in'}"
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Print what was measured, whether the tests passed or not."""
+    if figures := config.stash.get(FIGURES, []):
+        terminalreporter.section("measured on the kernel's SocketCAN")
+        for figure in figures:
+            terminalreporter.write_line(figure)
+
+
+@pytest.fixture(scope="session")
+def figure(pytestconfig: pytest.Config) -> Callable[[str], None]:
+    """Take a line for the end of the test run's output."""
+    return pytestconfig.stash.setdefault(FIGURES, []).append
 
 
 def _absent(reason: str, required: bool) -> NoReturn:
@@ -49,6 +78,66 @@ def vcan0() -> str:
     return "vcan0"
 
 
+@pytest.fixture(scope="module")
+def lab_vcan0(request: pytest.FixtureRequest) -> str:
+    """Name of a vcan that nobody else uses, with can-utils beside it: the lab's."""
+    if LAB is None:
+        pytest.skip("needs a vcan0 that nobody else uses; run under .ci/vcan-lab")
+    if not Path("/sys/class/net/vcan0").exists():
+        _absent("no interface vcan0", required=True)
+    request.getfixturevalue("can_utils")
+    return "vcan0"
+
+
+@pytest.fixture(scope="session")
+def can_utils() -> None:
+    """The programs of can-utils are installed."""
+    for program in ("candump", "cansend", "slcand"):
+        if shutil.which(program) is None:
+            _absent(f"no `{program}` command (can-utils)", required=LAB is not None)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Path:
+    """Directory of a module's runs."""
+    return tmp_path_factory.mktemp(request.module.__name__)
+
+
+@pytest.fixture(scope="module")
+def begin(folder: Path) -> Iterator[Callable[..., Started]]:
+    """Start a command and go on; whatever still runs at the end is killed."""
+    started: list[Started] = []
+
+    def begin(*arguments: str) -> Started:
+        words = folder / f"words-{len(started)}.txt"
+        with words.open("w") as errors:
+            process = subprocess.Popen(
+                [*COMMAND, *arguments], cwd=folder, stdout=subprocess.PIPE, stderr=errors, text=True
+            )
+        started.append(Started(process, words))
+        return started[-1]
+
+    yield begin
+    for process, _ in started:
+        if process.poll() is None:
+            process.kill()
+        process.communicate(timeout=30)
+
+
+@pytest.fixture(scope="module")
+def candump(folder: Path, can_utils: None) -> Iterator[Callable[[str], Candump]]:
+    """Start candump on an interface."""
+    started: list[Candump] = []
+
+    def begin(interface: str) -> Candump:
+        started.append(Candump(interface, folder / f"candump-{len(started)}"))
+        return started[-1]
+
+    yield begin
+    for one in started:
+        one.kill()
+
+
 class SlcanInterface:
     """An interface of the kernel's slcan driver with our device at its other end.
 
@@ -67,6 +156,10 @@ class SlcanInterface:
         """Set 500 kbit/s (and more, such as ``"listen-only", "on"``) and bring the interface up."""
         _ip("link", "set", self.name, "up", "type", "can", "bitrate", "500000", *settings)
         self.device.wait_open()
+
+    def set(self, *settings: str) -> None:
+        """Change a setting of the link, such as ``"txqueuelen", "100"``."""
+        _ip("link", "set", self.name, *settings)
 
     def down(self) -> None:
         """Take the interface down, as ``ip link set down`` does (a process less: they are slow in the lab)."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 import sys
 import time
@@ -47,8 +46,7 @@ def test_an_error_frame_written_to_vcan_reaches_those_who_ask(vcan0: str) -> Non
         assert heard is not None
 
 
-@pytest.mark.skipif(shutil.which("candump") is None, reason="no can-utils")
-def test_candump_sees_a_cansend(vcan0: str) -> None:
+def test_candump_sees_a_cansend(vcan0: str, can_utils: None) -> None:
     with subprocess.Popen(
         ["candump", "-L", "-n", "1", f"{vcan0},6A2:7FF"], stdout=subprocess.PIPE, text=True
     ) as candump:

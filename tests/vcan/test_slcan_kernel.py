@@ -7,7 +7,6 @@ identifier holds the error class.
 from __future__ import annotations
 
 import errno
-import shutil
 import subprocess
 import time
 from collections.abc import Iterator
@@ -213,8 +212,9 @@ def test_an_unplugged_adapter_takes_the_interface_away(slcan: SlcanInterface, bu
     assert gone.value.error_code in (errno.ENODEV, errno.ENXIO)
 
 
-@pytest.mark.skipif(shutil.which("slcand") is None, reason="no can-utils")
-def test_slcand_attaches_and_sets_the_bit_rate_behind_the_drivers_back(slcan_device: SlcanDevice) -> None:
+def test_slcand_attaches_and_sets_the_bit_rate_behind_the_drivers_back(
+    slcan_device: SlcanDevice, can_utils: None
+) -> None:
     command = ["slcand", "-F", "-o", "-c", "-s6", slcan_device.port, "slcan7"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as slcand:
         try:
