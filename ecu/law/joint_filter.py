@@ -128,42 +128,13 @@ def correct(
 
 
 @compiled
-def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
-    """Advance the filter by one sample.
-
-    Parameters
-    ----------
-    s : state of the last step (layout of this file); not changed.  z : inputs, NaN where not available; pressures Pa,
-        motor torques Nm negative braking, ``DEMAND`` the demanded deceleration.  p : parameters, `pack`.
-    dt : time since the last sample, s.
-
-    Returns
-    -------
-    new state; ``TORQUE`` holds the wheel torques, Nm, negative braking.
-    """
-    s = s.copy()
-    radius, arm, inertia = p[P_RADIUS], p[P_ARM], p[P_INERTIA]
-    fastest = -1.0
-    for i in range(4):
-        if z[WHEEL + i] > fastest:
-            fastest = z[WHEEL + i]
-    if s[STARTED] == 0.0:
-        if fastest < 0.0 or isnan(z[AX]):
-            return s
-        start(s, p, fastest * radius)
-        for i in range(4):
-            s[MOTOR_LAG + i] = 0.0 if isnan(z[MOTOR + i]) else z[MOTOR + i]
-    body = not isnan(z[AX])
-    yaw_rate = 0.0 if isnan(z[YAW_RATE]) else z[YAW_RATE]
-    ay = 0.0 if isnan(z[AY]) else z[AY]
-    steer = 0.0 if isnan(z[STEER]) else z[STEER] / p[P_STEER_RATIO]
-
-    # pressure zero while the pedal is free
+def track_pressure_zero(s: Vector, z: Vector, p: Vector, dt: float) -> bool:
+    """Follow the offsets of the pressure sensors while the pedal is free; returns whether all pressures are known."""
     settled = z[DEMAND] <= 0.0
-    pressures = True
+    known = True
     for i in range(4):
         if isnan(z[PRESSURE + i]):
-            pressures = False
+            known = False
         elif abs(z[PRESSURE + i]) > RELEASED_PA:
             settled = False
     s[RELEASED_S] = s[RELEASED_S] + dt if settled else 0.0
@@ -173,59 +144,62 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
             if not isnan(z[PRESSURE + i]):
                 zero = s[PRESSURE_ZERO + i] + share * (z[PRESSURE + i] - s[PRESSURE_ZERO + i])
                 s[PRESSURE_ZERO + i] = min(max(zero, -p[P_ZERO_LIMIT]), p[P_ZERO_LIMIT])
+    return known
 
-    # torques, delayed as the sensors and the tyres delay what they do
+
+@compiled
+def lagged_torque(s: Vector, p: Vector, i: int) -> float:
+    """Torque of wheel ``i`` as the sensors see its effect, Nm: T = T_motor - mu G (p - p0), delayed."""
+    gain = p[P_GAIN] if i < 2 else p[P_GAIN + 1]
+    return float(s[MOTOR_LAG + i] - s[FRICTION + i] * gain * s[PRESSURE_LAG + i])
+
+
+@compiled
+def update_torques(s: Vector, z: Vector, p: Vector, dt: float) -> tuple[float, bool]:
+    """Torques now and as the sensors and the tyres delay what they do.
+
+    Returns the force of all wheels together, N, and whether any friction brake is applied.
+    """
     lag = p[P_LAG] + p[P_RELAX] / max(s[SPEED], 2.0)
     share = min(dt / (lag + 0.5 * dt), 1.0)
     applied = False
     force = 0.0
     for i in range(4):
-        axle = 0 if i < 2 else 1
+        gain = p[P_GAIN] if i < 2 else p[P_GAIN + 1]
         clamp = 0.0
         if not isnan(z[PRESSURE + i]):
             clamp = max(z[PRESSURE + i] - s[PRESSURE_ZERO + i] - p[P_THRESHOLD], 0.0)
         motor = 0.0 if isnan(z[MOTOR + i]) else z[MOTOR + i]
-        s[TORQUE + i] = motor - s[FRICTION + i] * p[P_GAIN + axle] * clamp
+        s[TORQUE + i] = motor - s[FRICTION + i] * gain * clamp
         if s[RELEASED_S] > 0.0:
             clamp = 0.0
         s[PRESSURE_LAG + i] += share * (clamp - s[PRESSURE_LAG + i])
         s[MOTOR_LAG + i] += share * (motor - s[MOTOR_LAG + i])
         if s[PRESSURE_LAG + i] > APPLIED_PA:
             applied = True
-        force += (s[MOTOR_LAG + i] - s[FRICTION + i] * p[P_GAIN + axle] * s[PRESSURE_LAG + i]) / arm
-    force_rate = (force - s[FORCE_LAG]) / dt
-    s[FORCE_LAG] = force
+        force += lagged_torque(s, p, i) / p[P_ARM]
+    return force, applied
 
-    # standstill: nothing to learn, the car stands
-    moving = False
-    for i in range(4):
-        if z[WHEEL + i] > 0.0:
-            moving = True
-    if not moving and s[SPEED] < 1.0:
-        s[SPEED] = 0.0
-        for i in range(4):  # a standing brake gives what holds the car, and no more than it can
-            most = abs(s[TORQUE + i])
-            s[TORQUE + i] = min(max(0.25 * p[P_MASS] * s[MASS] * G0 * s[GRADE] * arm, -most), most)
-        return s
 
-    # body acceleration, pitch taken out (the sensor pitches with the body)
-    if body:
-        w, d = p[P_PITCH_W], p[P_PITCH_D]
-        level = (z[AX] - s[BIAS]) / (1.0 + G0 * p[P_DIVE])
-        s[PITCH_RATE] += dt * (w * w * (-p[P_DIVE] * level - s[PITCH]) - 2.0 * d * w * s[PITCH_RATE])
-        s[PITCH] += dt * s[PITCH_RATE]
-        ax = z[AX] + G0 * s[PITCH]
-        s[LOAD_ACCELERATION] += min(dt / 0.05, 1.0) * (ax - s[BIAS] - s[LOAD_ACCELERATION])
-    else:
-        ax = s[LOAD_ACCELERATION] + s[BIAS]
-    base = p[P_BASE]
-    rear_m = base - p[P_FRONT]
-    lateral = rear_m * yaw_rate - s[SPEED] * ay / (G0 * p[P_CORNER])
+@compiled
+def level_acceleration(s: Vector, z: Vector, p: Vector, dt: float) -> float:
+    """Measured longitudinal acceleration with the body's pitch taken out (the sensor pitches with it), m/s2."""
+    if isnan(z[AX]):
+        return float(s[LOAD_ACCELERATION] + s[BIAS])
+    w, d = p[P_PITCH_W], p[P_PITCH_D]
+    level = (z[AX] - s[BIAS]) / (1.0 + G0 * p[P_DIVE])
+    s[PITCH_RATE] += dt * (w * w * (-p[P_DIVE] * level - s[PITCH]) - 2.0 * d * w * s[PITCH_RATE])
+    s[PITCH] += dt * s[PITCH_RATE]
+    ax = z[AX] + G0 * s[PITCH]
+    s[LOAD_ACCELERATION] += min(dt / 0.05, 1.0) * (ax - s[BIAS] - s[LOAD_ACCELERATION])
+    return float(ax)
 
-    # prediction
+
+@compiled
+def predict(s: Vector, p: Vector, acceleration: float, dt: float) -> None:
+    """Speed by the acceleration; every other state drifts. Pads drift fast while pressed, slowly while they cool."""
     c = COVARIANCE
-    acceleration = ax - s[BIAS] - G0 * s[GRADE] + yaw_rate * lateral
-    s[SPEED] += dt * acceleration
+    s[SPEED] = max(s[SPEED] + dt * acceleration, 0.0)
     for j in range(N):
         s[c + SPEED * N + j] -= dt * (s[c + BIAS * N + j] + G0 * s[c + GRADE * N + j])
     for j in range(N):
@@ -242,16 +216,24 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
                 s[at] += dt * (p[Q_COMMON] + same_axle * p[Q_AXLE] + (p[Q_SINGLE] if i == j else 0.0))
             elif s[at] < p[START + 6]:
                 s[at] += dt * p[Q_RELEASED]
-    if s[SPEED] < 0.0:
-        s[SPEED] = 0.0
-    speed = s[SPEED]
 
-    # loads and forces of the wheels
+
+@compiled
+def wheel_force(s: Vector, p: Vector, i: int, load_n: float, acceleration: float) -> float:
+    """Longitudinal tyre force of wheel ``i`` while it rolls, N: F = (T - I a / r) / r - f_r Fz."""
+    rolling = p[P_ROLL] * load_n
+    return float((lagged_torque(s, p, i) - p[P_INERTIA] * acceleration / p[P_RADIUS]) / p[P_ARM] - rolling)
+
+
+@compiled
+def wheel_states(
+    s: Vector, p: Vector, ay: float, yaw_rate: float, steer: float, lateral: float, loads: Vector, along: Vector
+) -> None:
+    """Fill vertical loads, N, and the ground's speed along each wheel, m/s."""
+    base = p[P_BASE]
+    rear_m = base - p[P_FRONT]
     mass = p[P_MASS] * s[MASS]
     shift_x = mass * p[P_HEIGHT] * s[LOAD_ACCELERATION] / (2.0 * base)
-    loads = np.empty(4)
-    along = np.empty(4)
-    forces = np.empty(4)
     for i in range(4):
         axle = 0 if i < 2 else 1
         arm_m = rear_m if axle == 0 else p[P_FRONT]
@@ -259,126 +241,215 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
         share_y = arm_m / base * mass * ay * p[P_HEIGHT] / p[P_TRACK + axle]
         load = 0.5 * mass * G0 * arm_m / base - (shift_x if axle == 0 else -shift_x) - left * share_y
         loads[i] = max(load, 200.0)
-        ground = speed - yaw_rate * left * 0.5 * p[P_TRACK + axle]
+        ground = s[SPEED] - yaw_rate * left * 0.5 * p[P_TRACK + axle]
         if axle == 0:
             ground = ground * np.cos(steer) + (lateral + yaw_rate * p[P_FRONT]) * np.sin(steer)
         along[i] = ground
-        torque = s[MOTOR_LAG + i] - s[FRICTION + i] * p[P_GAIN + axle] * s[PRESSURE_LAG + i]
-        forces[i] = (torque - inertia * acceleration / radius) / arm - p[P_ROLL] * loads[i]
 
-    # which wheels slide or stand
-    road = p[ROAD] > 0.5
-    any_sliding = False
-    locked_load = 0.0
-    spin = np.zeros(4)
-    for i in range(4):
-        s[SLIDING + i] = max(s[SLIDING + i] - dt, 0.0)
-        omega = z[WHEEL + i]
-        if road and not isnan(omega) and speed > 1.0:
-            slip = (omega * radius - along[i]) / max(along[i], 1.0)
-            expected = forces[i] / (loads[i] * p[P_STIFF] * s[STIFFNESS])
-            if abs(slip - expected) > p[P_SLIDE]:
-                s[SLIDING + i] = SLIDING_HOLD_S
-            step = omega - s[LAST_WHEEL + i]
-            spin[i] = step / dt
-            if omega > TOOTH_RAD_S and (step < SPIN_UP_RAD_S or s[LAST_WHEEL + i] > TOOTH_RAD_S):
-                s[SPIN + i] += s[SPIN_RATE + i] * dt
-                behind = omega + s[SPIN_RATE + i] * p[P_WHEEL_LAG] - s[SPIN + i]
-                s[SPIN + i] += 0.5 * behind
-                s[SPIN_RATE + i] += 0.2 * behind / dt
-            else:  # too few teeth pass to see the wheel stop (and it rocks when it does): go on as it went
-                s[SPIN + i] += s[SPIN_RATE + i] * dt
-            slow = slip < LOCKED_SHARE - 1.0
-            if s[LOCKED + i] > 0.0:
-                s[LOCKED + i] += dt
-                if s[LOCKED + i] > TOOTH_WAIT_S and (not slow or step > SPIN_UP_RAD_S):
-                    s[LOCKED + i] = 0.0
-                    s[SPIN + i], s[SPIN_RATE + i] = TOOTH_RAD_S, 0.0
-            elif (s[SPIN + i] + 0.75 * s[SPIN_RATE + i] * dt <= 0.0 and slip < -0.5) or (
-                slow and omega < STANDING_RAD_S
-            ):
-                s[LOCKED + i] = dt
-            if s[LOCKED + i] > 0.0:
-                locked_load += loads[i]
-        else:
+
+@compiled
+def watch_wheel(s: Vector, p: Vector, i: int, omega: float, ground: float, expected_slip: float, dt: float) -> float:
+    """Tell whether wheel ``i`` slides (``SLIDING``) or stands (``LOCKED``); returns its angular acceleration, rad/s2.
+
+    A toothed wheel reports standstill long after it: below about a tooth a sample the spin-down seen before goes on.
+    """
+    slip = (omega * p[P_RADIUS] - ground) / max(ground, 1.0)
+    if abs(slip - expected_slip) > p[P_SLIDE]:
+        s[SLIDING + i] = SLIDING_HOLD_S
+    step = omega - s[LAST_WHEEL + i]
+    s[SPIN + i] += s[SPIN_RATE + i] * dt
+    if omega > TOOTH_RAD_S and (step < SPIN_UP_RAD_S or s[LAST_WHEEL + i] > TOOTH_RAD_S):  # else it rocks as it stops
+        behind = omega + s[SPIN_RATE + i] * p[P_WHEEL_LAG] - s[SPIN + i]
+        s[SPIN + i] += 0.5 * behind
+        s[SPIN_RATE + i] += 0.2 * behind / dt
+    slow = slip < LOCKED_SHARE - 1.0
+    if s[LOCKED + i] > 0.0:
+        s[LOCKED + i] += dt
+        if s[LOCKED + i] > TOOTH_WAIT_S and (not slow or step > SPIN_UP_RAD_S):
             s[LOCKED + i] = 0.0
-        s[LAST_WHEEL + i] = 0.0 if isnan(omega) else omega
-        if s[SLIDING + i] > 0.0:
-            any_sliding = True
+            s[SPIN + i], s[SPIN_RATE + i] = TOOTH_RAD_S, 0.0
+    elif (s[SPIN + i] + 0.75 * s[SPIN_RATE + i] * dt <= 0.0 and slip < -0.5) or (slow and omega < STANDING_RAD_S):
+        s[LOCKED + i] = dt
+    return float(step / dt)
 
-    # force balance: what the body feels against what the wheels give
-    resistance = 0.5 * p[P_DRAG] * speed * speed + mass * G0 * p[P_ROLL]
-    turn = 4.0 * inertia / (radius * arm)
-    fast = speed > p[P_SPEED_MIN]
+
+@compiled
+def balance_forces(
+    s: Vector, p: Vector, ax: float, ay: float, side_n: float, force: float, force_rate: float, applied: bool,
+    dt: float,
+) -> None:  # fmt: skip
+    """Force balance: what the body feels against what the wheels give.
+
+    (m + J) (a - b) = sum(T) / r - F_R + J g theta with J = 4 I / r^2. A sudden change is the road's before it is the
+    pads': it is believed only after `REJECT_S`.
+    """
+    mass = p[P_MASS] * s[MASS]
+    turn = 4.0 * p[P_INERTIA] / (p[P_RADIUS] * p[P_ARM])
+    resistance = 0.5 * p[P_DRAG] * s[SPEED] * s[SPEED] + mass * G0 * p[P_ROLL]
+    predicted = (force - resistance - side_n + turn * G0 * s[GRADE]) / (mass + turn) + s[BIAS]
+    change = abs(p[R_ALIGN] * force_rate / mass)
+    drive = not applied and abs(force) > MASS_FORCE_SHARE * mass and change < p[R_ACC]
     h = np.zeros(N)
-    side = (rear_m / base) * mass * ay * np.sin(steer)
-    if body and pressures and fast and not any_sliding:
-        predicted = (force - resistance - side + turn * G0 * s[GRADE]) / (mass + turn) + s[BIAS]
-        h[BIAS] = 1.0
-        h[GRADE] = turn * G0 / (mass + turn)
+    h[BIAS] = 1.0
+    h[GRADE] = turn * G0 / (mass + turn)
+    if drive:
         h[MASS] = -(predicted - s[BIAS] + G0 * p[P_ROLL]) * p[P_MASS] / (mass + turn)
-        for i in range(4):
-            axle = 0 if i < 2 else 1
-            h[FRICTION + i] = -p[P_GAIN + axle] * s[PRESSURE_LAG + i] / arm / (mass + turn)
-        change = p[R_ALIGN] * force_rate / mass
-        variance = p[R_ACC] ** 2 + change * change + (0.05 * ay) ** 2
-        drive = not applied and abs(force) > MASS_FORCE_SHARE * mass and change < p[R_ACC]
-        if not drive:
-            h[MASS] = 0.0
-        # a sudden change is the road's before it is the pads': wait a little before believing it
-        gate = p[GATE] if road and s[REJECTED_S] < REJECT_S else 1e6
-        if correct(s, h, ax - predicted, variance, gate, not drive, not applied):
-            s[REJECTED_S] = 0.0
-        else:
-            s[REJECTED_S] += dt
-
-    # wheel speeds: v (1 + kappa) / (R delta)
     for i in range(4):
-        omega = z[WHEEL + i]
-        if isnan(omega) or s[SLIDING + i] > 0.0 or along[i] < 1.0:
-            continue
-        axle = 0 if i < 2 else 1
-        end = 1.0 if axle == 0 else -1.0
-        stiffness = loads[i] * (p[P_STIFF] + p[P_STIFF_SLOPE] * (loads[i] - 0.25 * p[P_MASS] * G0))
-        factor = s[STIFFNESS] + end * s[AXLE]
-        torque = s[MOTOR_LAG + i] - s[FRICTION + i] * p[P_GAIN + axle] * s[PRESSURE_LAG + i]
-        wheel_force = (torque - inertia * acceleration / radius) / arm - p[P_ROLL] * loads[i]
-        grip = wheel_force / (p[P_PEAK] * loads[i])
-        per_force = (1.0 + CURVATURE * min(grip * grip, 1.0)) / (stiffness * max(factor, 0.2))
-        slip = wheel_force * per_force
-        ground = along[i] + s[SPEED] - speed
-        ground -= (p[P_WHEEL_LAG] + p[P_TOOTH] / ground) * acceleration
-        rolling = radius * s[RADIUS + i]
-        predicted = ground * (1.0 + slip) / rolling
-        h[:] = 0.0
-        h[SPEED] = (1.0 + slip) / rolling
-        h[STIFFNESS] = -ground * slip / (rolling * factor)
-        h[AXLE] = end * h[STIFFNESS]
-        h[RADIUS + i] = -predicted / s[RADIUS + i]
-        if fast and pressures:
-            h[FRICTION + i] = -ground * per_force * p[P_GAIN + axle] * s[PRESSURE_LAG + i] / (arm * rolling)
-        sigma = (p[R_WHEEL] * along[i] + 0.01 + 0.002 * abs(acceleration) + (0.0 if fast else 0.1)) / rolling
-        sigma += p[R_ALIGN] * abs(force_rate) * 0.25 * per_force * ground / rolling
-        correct(s, h, omega - predicted, sigma * sigma, p[GATE], True, not applied)
+        gain = p[P_GAIN] if i < 2 else p[P_GAIN + 1]
+        h[FRICTION + i] = -gain * s[PRESSURE_LAG + i] / p[P_ARM] / (mass + turn)
+    variance = p[R_ACC] ** 2 + change * change + (0.05 * ay) ** 2
+    gate = p[GATE] if p[ROAD] > 0.5 and s[REJECTED_S] < REJECT_S else 1e6
+    if correct(s, h, ax - predicted, variance, gate, not drive, not applied):
+        s[REJECTED_S] = 0.0
+    else:
+        s[REJECTED_S] += dt
 
-    # bounds
+
+@compiled
+def compare_wheel_speed(
+    s: Vector, p: Vector, i: int, omega: float, ground: float, load: float, acceleration: float, force_rate: float,
+    learn: bool, applied: bool,
+) -> None:  # fmt: skip
+    """Wheel speed and its slip: omega = v (1 + kappa) / (R delta), kappa = F / C (1 + 0.38 (F / D)^2).
+
+    ``ground`` is the speed under the wheel, m/s; the sensor shows it half a sample and half a tooth late.
+    """
+    end = 1.0 if i < 2 else -1.0
+    gain = p[P_GAIN] if i < 2 else p[P_GAIN + 1]
+    stiffness = load * (p[P_STIFF] + p[P_STIFF_SLOPE] * (load - 0.25 * p[P_MASS] * G0))
+    factor = s[STIFFNESS] + end * s[AXLE]
+    force = wheel_force(s, p, i, load, acceleration)
+    grip = force / (p[P_PEAK] * load)
+    per_force = (1.0 + CURVATURE * min(grip * grip, 1.0)) / (stiffness * max(factor, 0.2))
+    slip = force * per_force
+    seen = ground - (p[P_WHEEL_LAG] + p[P_TOOTH] / ground) * acceleration
+    rolling = p[P_RADIUS] * s[RADIUS + i]
+    predicted = seen * (1.0 + slip) / rolling
+    h = np.zeros(N)
+    h[SPEED] = (1.0 + slip) / rolling
+    h[STIFFNESS] = -seen * slip / (rolling * factor)
+    h[AXLE] = end * h[STIFFNESS]
+    h[RADIUS + i] = -predicted / s[RADIUS + i]
+    if learn:
+        h[FRICTION + i] = -seen * per_force * gain * s[PRESSURE_LAG + i] / (p[P_ARM] * rolling)
+    slow = 0.0 if s[SPEED] > p[P_SPEED_MIN] else 0.1
+    sigma = (p[R_WHEEL] * ground + 0.01 + 0.002 * abs(acceleration) + slow) / rolling
+    sigma += p[R_ALIGN] * abs(force_rate) * 0.25 * per_force * seen / rolling
+    correct(s, h, omega - predicted, sigma * sigma, p[GATE], True, not applied)
+
+
+@compiled
+def torque_of_standing_wheels(
+    s: Vector, p: Vector, ax: float, acceleration: float, loads: Vector, spin: Vector
+) -> None:
+    """Torque of locked wheels: what the road gives, the force that the turning wheels leave over, by load."""
+    locked_load = 0.0
+    rest = p[P_MASS] * s[MASS] * (ax - s[BIAS]) + 0.5 * p[P_DRAG] * s[SPEED] * s[SPEED]
+    for i in range(4):
+        if s[LOCKED + i] > 0.0:
+            locked_load += loads[i]
+        else:
+            own = wheel_force(s, p, i, loads[i], acceleration)
+            if s[SLIDING + i] > 0.0:
+                own += p[P_INERTIA] * (acceleration / p[P_RADIUS] - spin[i]) / p[P_ARM]
+            rest -= own
+    for i in range(4):
+        if s[LOCKED + i] > 0.0:
+            s[TORQUE + i] = min(max(rest * p[P_ARM] * loads[i] / locked_load, s[TORQUE + i]), 0.0)
+
+
+@compiled
+def stand(s: Vector, p: Vector) -> None:
+    """The car stands: nothing to learn; a standing brake gives what holds the car, and no more than it can."""
+    s[SPEED] = 0.0
+    holding = 0.25 * p[P_MASS] * s[MASS] * G0 * s[GRADE] * p[P_ARM]
+    for i in range(4):
+        most = abs(s[TORQUE + i])
+        s[TORQUE + i] = min(max(holding, -most), most)
+
+
+@compiled
+def keep_in_bounds(s: Vector) -> None:
+    """Hold every estimate where it can make sense."""
     for i in range(4):
         s[FRICTION + i] = min(max(s[FRICTION + i], 0.05), 1.2)
         s[RADIUS + i] = min(max(s[RADIUS + i], 0.97), 1.03)
     s[MASS] = min(max(s[MASS], 0.7), 1.5)
     s[STIFFNESS] = min(max(s[STIFFNESS], 0.3), 3.0)
     s[AXLE] = min(max(s[AXLE], -0.3), 0.3)
-    # a wheel that stands: its torque is what the road gives, the force the turning wheels leave over
-    if locked_load > 0.0 and body:
-        rest = mass * (ax - s[BIAS]) + 0.5 * p[P_DRAG] * speed * speed
+
+
+@compiled
+def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
+    """Advance the filter by one sample.
+
+    Parameters
+    ----------
+    s : state of the last step (layout of this file); not changed.  z : inputs, NaN where not available; pressures Pa,
+        motor torques Nm negative braking, ``DEMAND`` the demanded deceleration.  p : parameters,
+        `estimator.joint_parameters`.  dt : time since the last sample, s.
+
+    Returns
+    -------
+    new state; ``TORQUE`` holds the wheel torques, Nm, negative braking.
+    """
+    s = s.copy()
+    fastest = -1.0
+    for i in range(4):
+        if z[WHEEL + i] > fastest:
+            fastest = z[WHEEL + i]
+    body = not isnan(z[AX])
+    if s[STARTED] == 0.0:
+        if fastest < 0.0 or not body:
+            return s
+        start(s, p, fastest * p[P_RADIUS])
         for i in range(4):
-            if s[LOCKED + i] == 0.0:
-                own = forces[i]
-                if s[SLIDING + i] > 0.0:
-                    own += inertia * (acceleration / radius - spin[i]) / arm
-                rest -= own
-        for i in range(4):
-            if s[LOCKED + i] > 0.0:
-                held = rest * arm * loads[i] / locked_load
-                s[TORQUE + i] = min(max(held, s[TORQUE + i]), 0.0)
+            s[MOTOR_LAG + i] = 0.0 if isnan(z[MOTOR + i]) else z[MOTOR + i]
+    yaw_rate = 0.0 if isnan(z[YAW_RATE]) else z[YAW_RATE]
+    ay = 0.0 if isnan(z[AY]) else z[AY]
+    steer = 0.0 if isnan(z[STEER]) else z[STEER] / p[P_STEER_RATIO]
+
+    pressures = track_pressure_zero(s, z, p, dt)
+    force, applied = update_torques(s, z, p, dt)
+    force_rate = (force - s[FORCE_LAG]) / dt
+    s[FORCE_LAG] = force
+    if fastest <= 0.0 and s[SPEED] < 1.0:
+        stand(s, p)
+        return s
+
+    ax = level_acceleration(s, z, p, dt)
+    rear_m = p[P_BASE] - p[P_FRONT]
+    lateral = rear_m * yaw_rate - s[SPEED] * ay / (G0 * p[P_CORNER])
+    acceleration = ax - s[BIAS] - G0 * s[GRADE] + yaw_rate * lateral
+    predict(s, p, acceleration, dt)
+    speed = s[SPEED]
+    loads, along, spin = np.empty(4), np.empty(4), np.zeros(4)
+    wheel_states(s, p, ay, yaw_rate, steer, lateral, loads, along)
+
+    sliding = False
+    for i in range(4):
+        s[SLIDING + i] = max(s[SLIDING + i] - dt, 0.0)
+        omega = z[WHEEL + i]
+        if p[ROAD] > 0.5 and not isnan(omega) and speed > 1.0:
+            expected = wheel_force(s, p, i, loads[i], acceleration) / (loads[i] * p[P_STIFF] * s[STIFFNESS])
+            spin[i] = watch_wheel(s, p, i, omega, along[i], expected, dt)
+        else:
+            s[LOCKED + i] = 0.0
+        s[LAST_WHEEL + i] = 0.0 if isnan(omega) else omega
+        sliding = sliding or s[SLIDING + i] > 0.0
+
+    fast = speed > p[P_SPEED_MIN]
+    if body and pressures and fast and not sliding:
+        side_n = (rear_m / p[P_BASE]) * p[P_MASS] * s[MASS] * ay * np.sin(steer)
+        balance_forces(s, p, ax, ay, side_n, force, force_rate, applied, dt)
+    for i in range(4):
+        if isnan(z[WHEEL + i]) or s[SLIDING + i] > 0.0 or along[i] < 1.0:
+            continue
+        ground = along[i] + s[SPEED] - speed  # what the measurements so far have changed
+        compare_wheel_speed(
+            s, p, i, z[WHEEL + i], ground, loads[i], acceleration, force_rate, fast and pressures, applied
+        )
+    keep_in_bounds(s)
+    if body and s[LOCKED] + s[LOCKED + 1] + s[LOCKED + 2] + s[LOCKED + 3] > 0.0:
+        torque_of_standing_wheels(s, p, ax, acceleration, loads, spin)
     return s
