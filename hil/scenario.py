@@ -14,6 +14,7 @@ from dbc.bench_messages import PhysicalFault
 from dbc.contract import contract
 from dbc.frame import BusName
 from ecu.parameters.ecu import EcuParameters
+from hil.effects import Effects, read_effects
 from hil.parameters import load_set, override
 from hil.scenario_table import Files, ScenarioError, Table, as_number
 from hil.stimulus import ALL_WHEELS, WHEELS, FaultEvent
@@ -83,6 +84,7 @@ class Scenario:
     start_order : which node joins when.
     blending : blending factor over time that the bench sends; empty leaves it to the controller.
     faults : what breaks when.
+    effects : what this car has and the baseline has not.
     expectations, signal_expectations : what decides between exit code 0 and 1.
     """
 
@@ -98,6 +100,7 @@ class Scenario:
     start_order: StartOrder
     blending: Trace
     faults: tuple[FaultEvent, ...]
+    effects: Effects
     expectations: tuple[Expectation, ...]
     signal_expectations: tuple[SignalExpectation, ...]
 
@@ -144,6 +147,7 @@ def load_scenario(name: str) -> Scenario:
         start_order=order,
         blending=_blending(top),
         faults=tuple(event for table in top.tables("faults") for event in _faults(table)),
+        effects=read_effects(top.table("effects").rest(), f"{source.name}: effects"),
         expectations=tuple(_expectations(top.table("expect"))),
         signal_expectations=tuple(_signal_expectation(table) for table in top.tables("expect_signal")),
     )

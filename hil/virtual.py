@@ -27,7 +27,7 @@ _FLUSH_TICKS = 500
 
 def own_nodes(scenario: Scenario, seed: int) -> tuple[Node, Node]:
     """Our plant and our controller for a scenario."""
-    plant = PlantNode(scenario.plant, scenario.manoeuvre, seed, NODE_PERIOD_NS)
+    plant = PlantNode(scenario.plant, scenario.manoeuvre, seed, NODE_PERIOD_NS, **scenario.effects.for_node())
     return plant, EcuNode(scenario.ecu, NODE_PERIOD_NS)
 
 

@@ -125,6 +125,15 @@ def energy(x: Vector, p: Vector, y: Vector) -> None:
     y[Y.rate + X.friction_heat_j] = heat
 
 
+@equation
+def sensed(x: Vector, y: Vector, wheels: int) -> None:
+    """What the sensors of the wheels stand at."""
+    for i in range(wheels):
+        y[Y.sensed_wheel_speed_rad_s + i] = at_wheel(x[X.wheel_speed_rad_s + i], y, J.sensor_wheel_speed, i)
+        y[Y.sensed_pressure_pa + i] = at_wheel(y[Y.pressure_pa + i], y, J.sensor_pressure, i)
+        y[Y.sensed_motor_nm + i] = at_wheel(y[Y.motor_current_nm + i], y, J.sensor_motor_torque, i)
+
+
 @block
 def derivative(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, y: Vector) -> None:
     """Rates of change of the continuous state, in ``y.rate``, and all outputs.
@@ -146,4 +155,5 @@ def derivative(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, roa
     contacts(x, u, cut, p, y, cos_grade, wheels)
     body(x, u, p, y, cos_grade, slope * cos_grade)
     energy(x, p, y)
+    sensed(x, y, wheels)
     after(x, u, p, y)

@@ -9,8 +9,13 @@ from dbc.frame import Frame, Received
 from dbc.messages import BatteryStatus
 from plant import driver, reports
 from plant.demands import DEMANDS, Demands
+from plant.effects.bank import NO_TERMS
+from plant.effects.plugin import NO_PLUGINS
+from plant.effects.sensing.chain import Chain
+from plant.effects.theta import THETA, Theta
+from plant.layout import Vector
 from plant.manoeuvre import Manoeuvre, value_at
-from plant.model import STEP_S, advance, healthy, initial_state, pack
+from plant.model import NEUTRAL, STEP_S, advance, healthy, initial_state, pack
 from plant.parameters.plant import PlantParameters
 from plant.partners import Partners
 from plant.road import road_table
@@ -36,6 +41,8 @@ class PlantNode:
     seed : of all noise.
     period_ns : of `step`; the model takes steps of 1 ms inside.
     play : nodes of brake.dbc that it is; the frames of the others enter as measured values.
+    theta : effects; their times are of the manoeuvre's clock.  layout : where they lie in it.
+    terms, plugins : basis terms and effects from outside.
 
     Attributes
     ----------
@@ -50,6 +57,11 @@ class PlantNode:
         seed: int,
         period_ns: int = 10_000_000,
         play: frozenset[str] = SENDERS,
+        *,
+        theta: Vector = NEUTRAL,
+        layout: Theta = THETA,
+        terms: Vector = NO_TERMS,
+        plugins: Vector = NO_PLUGINS,
     ) -> None:
         if not play <= SENDERS:
             raise ValueError(f"play: {sorted(play - SENDERS)} are no nodes of the vehicle; known: {sorted(SENDERS)}")
@@ -72,15 +84,18 @@ class PlantNode:
         self._own_road = self._road = road_table(manoeuvre.road)
         first_speed = manoeuvre.initial_speed_mps / parameters.wheel.rolling_radius_m
         self._sensors = Sensors(parameters.sensor, parameters.motor.torque_constant_nm_a, seed, self._x, first_speed)
+        self.manoeuvre_start_ns: int | None = None
+        self._last_ns: int | None = None
+        self._layout, self._terms, self._plugins = layout, terms, plugins
+        self._theta = self._of_manoeuvre = theta
+        self.switch_effects(theta)
         self._receiver = Receiver((*DEMANDS, StimulusDriver, StimulusRoad))
         self._faults = Receiver((FaultCommand,))
         self._transmitter = Transmitter()
         self._demands = Demands(parameters.ehb)
         self._pedal = 0.0
         self._steering_rad = 0.0
-        self._last_ns: int | None = None
         self._standing_ns = 0
-        self.manoeuvre_start_ns: int | None = None
         self.state = ManoeuvreState.HOLDING
         self._advance(0)
 
@@ -97,9 +112,27 @@ class PlantNode:
         self._drive(now_ns, pressure_pa, motor_nm)
         return self._transmitter.frames(now_ns, self._tell(now_ns))
 
+    @property
+    def inputs(self) -> Vector:
+        """What the model is driven with from this tick on (``INPUT``), a copy."""
+        return self._u.copy()
+
+    def switch_effects(self, theta: Vector) -> None:
+        """Change the effects' numbers from this tick on; their times are of the manoeuvre's clock."""
+        self._of_manoeuvre = theta
+        if self.manoeuvre_start_ns is None:  # what has a time waits for the clock
+            self._theta = self._layout.shifted(theta, 1e9) if self._layout.timed(theta) else theta
+        else:
+            begun_s = ((self._last_ns or 0) - self.manoeuvre_start_ns) * 1e-9
+            self._theta = self._layout.shifted(theta, float(self._x[X.time_s]) - begun_s)
+        self._sensors.chain = Chain(self._theta, self._layout)
+
     def _advance(self, elapsed_ns: int) -> None:
         steps = elapsed_ns // STEP_NS
-        advance(self._x, self._u, self._cut, self._switch, self._p, self._road, self._y, steps)
+        advance(
+            self._x, self._u, self._cut, self._switch, self._p, self._road, self._y, steps, theta=self._theta,
+            terms=self._terms, plugins=self._plugins,
+        )  # fmt: skip
 
     def _take_faults(self, now_ns: int, inbox: Sequence[Received]) -> None:
         """Fault commands one by one: two may come in one tick."""
@@ -128,6 +161,8 @@ class PlantNode:
                 where = STATE.slice(part)
                 self._x[where] = self._start[where]
             self.manoeuvre_start_ns = now_ns
+            if self._layout.timed(self._of_manoeuvre):
+                self.switch_effects(self._of_manoeuvre)
             self.state = ManoeuvreState.RUNNING
         moving = abs(self._x[X.speed_mps]) > STANDING_MPS
         self._standing_ns = 0 if moving else self._standing_ns + elapsed_ns
@@ -190,10 +225,11 @@ class PlantNode:
         """Frames of the played nodes, and the truth."""
         x, y, sensors, play = self._x, self._y, self._sensors, self._play
         out: list[Message] = []
+        sensors.tick(float(x[X.time_s]))
         if "DRIVER" in play:
             out += reports.driver_messages(sensors, self._pedal, self._steering_rad)
         if "SENSORS" in play:
-            out += reports.sensor_messages(sensors, x)
+            out += reports.sensor_messages(sensors, x, y)
         if "EHB" in play:
             out += reports.ehb_messages(sensors, y, *[demand.state for demand in self._demands.pressure])
         if "IWM" in play:

@@ -48,9 +48,9 @@ def driver_messages(sensors: Sensors, travel: float, steering_wheel_rad: float) 
     return [BrakePedal(*sensors.pedal(travel)), Steering(sensors.steering_wheel_rad(steering_wheel_rad))]
 
 
-def sensor_messages(sensors: Sensors, x: Vector) -> list[Message]:
+def sensor_messages(sensors: Sensors, x: Vector, y: Vector) -> list[Message]:
     """Frames of SENSORS."""
-    fl, fr, rl, rr = sensors.wheel_speed_rad_s(x)
+    fl, fr, rl, rr = sensors.wheel_speed_rad_s(x, y)
     return [WheelSpeedFront(fl, fr), WheelSpeedRear(rl, rr), BodyMotion(*sensors.body_motion(x))]
 
 

@@ -5,6 +5,7 @@ from math import pi
 
 import numpy as np
 
+from plant.effects.sensing.chain import Chain
 from plant.layout import Vector
 from plant.parameters.sensing import SensorParameters
 from plant.vectors import X, Y
@@ -67,7 +68,12 @@ class ToothedWheels:
 
 
 class Sensors:
-    """All measured signals of one car, whose wheels turn at a speed when it starts."""
+    """All measured signals of one car, whose wheels turn at a speed when it starts.
+
+    Attributes
+    ----------
+    chain : sensing effects, None where there are none.
+    """
 
     def __init__(
         self, parameters: SensorParameters, torque_constant_nm_a: float, seed: int, x: Vector, wheel_speed_rad_s: float
@@ -76,40 +82,60 @@ class Sensors:
         self._torque_constant = torque_constant_nm_a
         self._noise = Noise(seed)
         self._wheels = ToothedWheels(parameters, x, wheel_speed_rad_s)
+        self.chain: Chain | None = None
+        self._time_s = np.zeros(1)
 
-    def wheel_speed_rad_s(self, x: Vector) -> list[float]:
+    def tick(self, time_s: float) -> None:
+        """Go to the model's time of the samples that follow."""
+        self._time_s = np.array([time_s])
+
+    def _reported(self, node: str, values: list[float]) -> list[float]:
+        if self.chain is None or not self.chain.touches(node):
+            return values
+        reported: list[float] = self.chain.sense(node, self._time_s, np.array([values]))[0].tolist()
+        return reported
+
+    def wheel_speed_rad_s(self, x: Vector, y: Vector) -> list[float]:
         """Toothed-wheel speeds; the teeth's errors grow with the speed."""
         noise, share = self._noise.normal("wheel_speed", 4), self._p.wheel_speed_noise
-        return [speed * (1.0 + share * n) for speed, n in zip(self._wheels.sample(x), noise, strict=True)]
+        true: list[float] = x[X.wheel_speed_rad_s : X.wheel_speed_rad_s + 4].tolist()
+        off: list[float] = y[Y.sensed_wheel_speed_rad_s : Y.sensed_wheel_speed_rad_s + 4].tolist()
+        teeth = self._wheels.sample(x)
+        speeds = [(teeth[i] + (off[i] - true[i])) * (1.0 + share * noise[i]) for i in range(4)]
+        return self._reported("wheel", speeds)
 
     def body_motion(self, x: Vector) -> tuple[float, float, float]:
         """Longitudinal and lateral specific force, m/s2, and yaw rate, rad/s."""
         p, noise = self._p, self._noise.normal("imu", 3)
         longitudinal, lateral, yaw_rate = x[X.imu_longitudinal_mps2 : X.imu_longitudinal_mps2 + 3].tolist()
-        return (
+        values = [
             longitudinal + p.acceleration_offset_mps2[0] + p.acceleration_noise_mps2 * noise[0],
             lateral + p.acceleration_offset_mps2[1] + p.acceleration_noise_mps2 * noise[1],
             yaw_rate + p.yaw_rate_offset_rad_s + p.yaw_rate_noise_rad_s * noise[2],
-        )
+        ]
+        ax, ay, turning = self._reported("imu", values)
+        return ax, ay, turning
 
     def pressure_pa(self, y: Vector) -> list[float]:
         """Pressures at the calipers."""
         noise, p = self._noise.normal("pressure", 4), self._p
-        true: list[float] = y[Y.pressure_pa : Y.pressure_pa + 4].tolist()
-        return [true[i] + p.pressure_offset_pa[i] + p.pressure_noise_pa * noise[i] for i in range(4)]
+        true: list[float] = y[Y.sensed_pressure_pa : Y.sensed_pressure_pa + 4].tolist()
+        values = [true[i] + p.pressure_offset_pa[i] + p.pressure_noise_pa * noise[i] for i in range(4)]
+        return self._reported("pressure", values)
 
     def current_a(self, y: Vector) -> list[float]:
         """Torque-producing motor currents, signed like the torque."""
         noise, sigma = self._noise.normal("current", 4), self._p.current_noise_a
-        true: list[float] = y[Y.motor_current_nm : Y.motor_current_nm + 4].tolist()
-        return [torque / self._torque_constant + sigma * n for torque, n in zip(true, noise, strict=True)]
+        true: list[float] = y[Y.sensed_motor_nm : Y.sensed_motor_nm + 4].tolist()
+        values = [torque + self._torque_constant * sigma * n for torque, n in zip(true, noise, strict=True)]
+        return [torque / self._torque_constant for torque in self._reported("motor", values)]
 
     def pedal(self, travel: float) -> tuple[float, float]:
         """Both channels of the pedal travel."""
         noise, p = self._noise.normal("pedal", 2), self._p
-        return travel + p.pedal_offset[0] + p.pedal_noise * noise[0], travel + p.pedal_offset[
-            1
-        ] + p.pedal_noise * noise[1]
+        values = [travel + p.pedal_offset[i] + p.pedal_noise * noise[i] for i in range(2)]
+        first, second = self._reported("driver", values)
+        return first, second
 
     def steering_wheel_rad(self, angle_rad: float) -> float:
         """Steering-wheel angle."""

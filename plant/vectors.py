@@ -90,6 +90,9 @@ OUTPUTS = {
     "road_friction": 4,
     "charge_power_limit_w": 1,
     "battery_power_w": 1,
+    "sensed_wheel_speed_rad_s": 4,  # before toothed wheels, noise and the effects of `plant.effects.sensing`
+    "sensed_pressure_pa": 4,
+    "sensed_motor_nm": 4,
     "drag_n": 1,
     "grade": 1,
 }

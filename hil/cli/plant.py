@@ -26,7 +26,7 @@ def run(args: argparse.Namespace) -> int:
 
     def make() -> Node:
         compile_model()
-        return PlantNode(scenario.plant, scenario.manoeuvre, args.seed, NODE_PERIOD_NS)
+        return PlantNode(scenario.plant, scenario.manoeuvre, args.seed, NODE_PERIOD_NS, **scenario.effects.for_node())
 
     serve(
         PLANT, make, args.bus, ready_fd=args.ready_fd, realtime=args.realtime, say=lambda s: print(s, file=sys.stderr)

@@ -31,7 +31,7 @@ EFFECT = Effect(
     parameters=PARAMETERS,
     source="M: 0.5 to 2 % of the peak, orders 28 to 84",
     signature="wheel order 28, constant amplitude, also without torque",
-    manoeuvre="coast_down",
+    manoeuvre="creep",
     confounded_with=("dtv_judder", "wheel_tooth_error"),
     dynamic=dynamic,
 )

@@ -77,7 +77,9 @@ class Effect:
     static : ``(q, k, y)``, from its numbers alone.  dynamic : ``(x, u, q, k, y)``, from the state.
     rates : ``(x, u, q, k, y)``, of its extra states.  Its numbers begin at ``k`` in ``q``; parameters are changed in
         ``q``, joints in ``y``.
-    sensing : whether it acts on measured arrays (`plant.effects.sensing`) and not in the model.
+    sense : of a sensing effect, which acts on measured arrays and not in the model (`plant.effects.sensing.chain`).
+    undo : its inverse on arrays, where it has one.
+    nodes : of `NODES`, whose signals a sensing effect changes.
     """
 
     name: str
@@ -97,7 +99,14 @@ class Effect:
     static: Callable[..., None] | None = None
     dynamic: Callable[..., None] | None = None
     rates: Callable[..., None] | None = None
-    sensing: bool = False
+    sense: Callable[..., Any] | None = None
+    undo: Callable[..., Any] | None = None
+    nodes: tuple[str, ...] = ()
+
+    @property
+    def sensing(self) -> bool:
+        """Whether it acts on what is measured and not in the model."""
+        return self.sense is not None
 
     def parameter(self, name: str) -> Parameter:
         """One parameter by name; KeyError where there is none."""

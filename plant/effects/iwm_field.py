@@ -5,7 +5,7 @@ from plant.effects.effect import Effect, Parameter, Scope, slots
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("power", "", -0.9, 0.5, -0.6),)
+PARAMETERS = (Parameter("power", "", -0.95, 0.5, -0.8),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -23,7 +23,10 @@ EFFECT = Effect(
     joints=("motor_peak_power_w",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
-    source="M: field weakening begins at another speed with voltage and temperature",
+    source=(
+        "M: field weakening begins at another speed with voltage and temperature; C: large, because the "
+        "battery binds first"
+    ),
     signature="torque is a hyperbola over the speed",
     manoeuvre="full_regeneration",
     confounded_with=("iwm_derating", "battery_soc"),

@@ -25,7 +25,7 @@ EFFECT = Effect(
     parameters=PARAMETERS,
     source="M: Pacejka 2006, section 8.6",
     signature="oscillation of 5 to 20 Hz when the car stops",
-    manoeuvre="creep_stop",
+    manoeuvre="abrupt_stop",
     confounded_with=("cogging",),
     static=static,
 )

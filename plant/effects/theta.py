@@ -74,6 +74,20 @@ class Theta:
             theta[self.slice(effect.name, "until_s")] = ALWAYS_S
         return theta
 
+    def shifted(self, theta: Vector, start_s: float) -> Vector:
+        """The same with all onsets and ends later: from the clock of a manoeuvre to that of the model."""
+        late = theta.copy()
+        for effect in self.effects:
+            for name in ("onset_s", "until_s"):
+                where = self.slice(effect.name, name)
+                if abs(late[where][0]) < ALWAYS_S:
+                    late[where] += start_s
+        return late
+
+    def timed(self, theta: Vector) -> bool:
+        """Whether any effect begins or ends at some time."""
+        return not np.array_equal(self.shifted(theta, 1.0), theta)
+
     def set(self, theta: Vector, effect: str, values: Mapping[str, Any]) -> Vector:
         """Write an effect's numbers into ``theta``: one for all its members, one for each, or a table by member.
 

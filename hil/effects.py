@@ -1,0 +1,127 @@
+"""Effects in scenarios, and effects that others add through the entry-point group ``brakebench.effects``."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from functools import cache
+from importlib.metadata import entry_points
+from typing import Any
+
+from hil.errors import BrakebenchError
+from plant.effects.apply import SIZE
+from plant.effects.bank import NO_TERMS
+from plant.effects.effect import Effect
+from plant.effects.plugin import NO_PLUGINS, table
+from plant.effects.theta import THETA, Theta
+from plant.layout import Vector
+from plant.vectors import INPUT, OUTPUT, STATE
+
+GROUP = "brakebench.effects"
+
+
+class EffectError(BrakebenchError):
+    """An effect that cannot be used as it is; the message names effect and parameter."""
+
+
+@cache
+def plugins() -> tuple[Effect, ...]:
+    """Effects that installed distributions offer; each entry point names one `plant.effects.effect.Effect`."""
+    found = []
+    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+        effect = point.load()
+        if not isinstance(effect, Effect):
+            raise EffectError(f"entry point {point.name} ({point.value}): expected an Effect, got {effect!r}")
+        if effect.static is not None or effect.sense is not None:
+            raise EffectError(f"effect {effect.name} ({point.value}): only dynamic and rates can come from outside")
+        found.append(effect)
+    return tuple(found)
+
+
+@cache
+def layout() -> Theta:
+    """Where the numbers of all effects lie, those from outside included."""
+    return Theta(plugins())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Effects:
+    """The effects of one run.
+
+    Attributes
+    ----------
+    on : names of those a scenario switches on, also later.
+    theta : their numbers; times are of the manoeuvre's clock.
+    layout : where they lie.  terms : of the basis bank.  plugins : pointers of the effects from outside.
+    """
+
+    on: tuple[str, ...] = ()
+    theta: Vector = field(default_factory=THETA.neutral)
+    layout: Theta = THETA
+    terms: Vector = field(default_factory=NO_TERMS.copy)
+    plugins: Vector = field(default_factory=NO_PLUGINS.copy)
+
+    def for_node(self) -> dict[str, Any]:
+        """Keyword arguments of `plant.node.PlantNode`."""
+        return {"theta": self.theta, "layout": self.layout, "terms": self.terms, "plugins": self.plugins}
+
+
+NONE = Effects()
+
+
+def plugin_table(effects: Theta) -> Vector:
+    """Compiled equations of the effects from outside."""
+    outside = [effect for effect in effects.effects if effect in plugins()]
+    places = [
+        (
+            effects.slice(effect.name, effect.parameters[0].name).start,
+            effects.slice(effect.name, "onset_s").start,
+        )
+        for effect in outside
+    ]
+    return table(outside, places, (STATE.size, INPUT.size, SIZE, OUTPUT.size)) if outside else NO_PLUGINS
+
+
+def read_effects(tables: Mapping[str, Any], where: str) -> Effects:
+    """Effects out of the table ``[effects]`` of a scenario: one table for each.
+
+    In it each parameter is a number, a list (one for each member) or a table by member (``{fl = 0.2}``); ``onset_s``
+    and ``until_s`` are of the manoeuvre's clock; ``at`` names the members it is to act on. Without any strength it acts
+    at its typical size.
+
+    Raises
+    ------
+    EffectError
+        No such effect or parameter, a number out of bounds.
+    """
+    if not tables:
+        return NONE
+    effects = layout()
+    theta = effects.neutral()
+    for name, values in tables.items():
+        if not isinstance(values, Mapping):
+            raise EffectError(f"{where}.{name}: expected a table, got {values!r}")
+        if name not in {effect.name for effect in effects.effects}:
+            near = get_close_matches(name, [effect.name for effect in effects.effects], 3)
+            hint = f"did you mean {', '.join(near)}?" if near else "`brakebench effects` lists them"
+            raise EffectError(f"{where}.{name}: no such effect; {hint}")
+        try:
+            effects.set(theta, name, _filled(effects.effect(name), values, f"{where}.{name}"))
+        except (KeyError, ValueError, TypeError) as error:
+            raise EffectError(f"{where}.{name}: {error.args[0] if error.args else error}") from error
+    return Effects(tuple(tables), theta, effects, NO_TERMS, plugin_table(effects))
+
+
+def _filled(effect: Effect, values: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Values with typical sizes where no strength is given, at the members named."""
+    given = dict(values)
+    members = given.pop("at", list(effect.scope.members))
+    odd = [member for member in members if member not in effect.scope.members]
+    if odd:
+        raise EffectError(f"{where}.at: no {odd[0]!r}; expected some of {', '.join(effect.scope.members)}")
+    strengths = [parameter for parameter in effect.strengths if parameter.name in given]
+    if not strengths:
+        given |= {parameter.name: parameter.typical for parameter in effect.strengths}
+    for parameter in effect.strengths:
+        if isinstance(given.get(parameter.name), int | float) and effect.scope.size > 1:
+            given[parameter.name] = dict.fromkeys(members, given[parameter.name])
+    return given

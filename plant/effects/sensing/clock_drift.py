@@ -1,0 +1,36 @@
+"""One node's clock runs slow."""
+
+import numpy as np
+
+from plant.effects.effect import NODES, Effect, Parameter, Scope
+from plant.effects.sensing.delay import advanced, delayed
+from plant.effects.sensing.kind import Memory, Numbers
+from plant.layout import Vector
+
+
+def sense(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
+    """s'(t) = s(t - e t)."""
+    return delayed(time_s, values, number["share"][:, NODES.index(node)] * np.maximum(time_s, 0.0), memory)
+
+
+def undo(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
+    """Inverse of `sense`."""
+    return advanced(time_s, values, number["share"][:, NODES.index(node)] * np.maximum(time_s, 0.0))
+
+
+EFFECT = Effect(
+    name="clock_drift",
+    row=66,
+    title="One node's clock runs slow",
+    equation="s'(t) = s(t - e t)",
+    joints=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
+    scope=Scope.NODE,
+    parameters=(Parameter("share", "", 0.0, 0.002, 0.0005),),
+    source="M: 20 to 100 ppm, 6 ms a minute; C: larger here, to be seen within a minute",
+    signature="lag linear in the time of the log",
+    manoeuvre="pressure_triangle",
+    confounded_with=("timestamp_offset",),
+    sense=sense,
+    undo=undo,
+    nodes=("wheel", "imu", "pressure", "motor", "driver"),
+)

@@ -1,0 +1,37 @@
+"""Coarse steps of the signals."""
+
+import numpy as np
+
+from plant.effects.effect import Effect, Parameter, Scope
+from plant.effects.sensing.kind import Memory, Numbers
+from plant.layout import Vector
+
+STEP_OF = {"wheel": "wheel_rad_s", "imu": "imu_mps2", "pressure": "pressure_pa", "motor": "motor_nm"}
+
+
+def sense(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
+    """s' = q round(s/q)."""
+    step = number[STEP_OF[node]]
+    size = np.where(step > 0.0, step, 1.0)
+    return np.where(step > 0.0, size * np.round(values / size), values)
+
+
+EFFECT = Effect(
+    name="quantisation",
+    row=64,
+    title="Coarse steps of the signals",
+    equation="s' = q round(s/q)",
+    joints=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor"),
+    scope=Scope.CAR,
+    parameters=(
+        Parameter("wheel_rad_s", "rad/s", 0.0, 1.0, 0.1),
+        Parameter("imu_mps2", "m/s2", 0.0, 0.5, 0.1),
+        Parameter("pressure_pa", "Pa", 0.0, 200000.0, 50000.0),
+        Parameter("motor_nm", "N m", 0.0, 10.0, 2.0),
+    ),
+    source="S: 0.05 m/s2 (Zoe), 0.1 bar (Kia), 0.5 N m (Zoe)",
+    signature="staircase",
+    manoeuvre="pressure_triangle",
+    sense=sense,
+    nodes=("wheel", "imu", "pressure", "motor"),
+)

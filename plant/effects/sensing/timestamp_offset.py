@@ -1,0 +1,34 @@
+"""One node's samples are older than their stamps."""
+
+from plant.effects.effect import NODES, Effect, Parameter, Scope
+from plant.effects.sensing.delay import advanced, delayed
+from plant.effects.sensing.kind import Memory, Numbers
+from plant.layout import Vector
+
+
+def sense(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
+    """s'(t) = s(t - d)."""
+    return delayed(time_s, values, number["delay_s"][:, NODES.index(node)], memory)
+
+
+def undo(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
+    """Inverse of `sense`."""
+    return advanced(time_s, values, number["delay_s"][:, NODES.index(node)])
+
+
+EFFECT = Effect(
+    name="timestamp_offset",
+    row=65,
+    title="One node's samples are older than their stamps",
+    equation="s'(t) = s(t - d)",
+    joints=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
+    scope=Scope.NODE,
+    parameters=(Parameter("delay_s", "s", 0.0, 0.1, 0.02),),
+    source="M: 2 to 50 ms",
+    signature="lag equal on all transients of one node",
+    manoeuvre="pressure_steps",
+    confounded_with=("ehb_dead_time", "imu_filter", "clock_drift", "tyre_relaxation"),
+    sense=sense,
+    undo=undo,
+    nodes=("wheel", "imu", "pressure", "motor", "driver"),
+)
