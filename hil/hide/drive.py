@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.hide.body import rates
-from hil.hide.car import Car
+from hil.hide.car import NOMINAL, Car
 from hil.hide.compiled import entry, equation
 from hil.hide.manoeuvres import TICK_S, Manoeuvre
 from hil.hide.strengths import OUTPUTS, ROWS, STATES, E, S, Y
@@ -18,6 +18,8 @@ Vector = NDArray[np.float64]
 STEP_S = 0.0025
 PER_TICK = round(TICK_S / STEP_S)
 HOLD_LIMIT_NM = 350.0
+NOMINAL_RADIUS_M, NOMINAL_MASS_KG = NOMINAL.rolling_radius_m, NOMINAL.mass_kg
+FRONT_GAIN_NM_PA, REAR_GAIN_NM_PA = NOMINAL.brake_gain_front_nm_pa, NOMINAL.brake_gain_rear_nm_pa
 STANDSTILL_S = 0.8
 APPLIED_PA = 1.5e5
 
@@ -75,11 +77,11 @@ def drive(manoeuvre: Manoeuvre, car: Car, strength: Vector, onset_s: Vector, law
 
 
 @equation
-def _held_demand(x: Vector, target_mps: float, car: Car) -> float:
-    push = 0.25 * car.rolling_radius_m * car.mass_kg * 1.5 * (target_mps - x[S.speed_mps])
+def _held_demand(x: Vector, target_mps: float) -> float:
+    """Torque demand of a driver who knows the nominal car: against the brake, and a share of the speed error."""
+    push = 0.25 * NOMINAL_RADIUS_M * NOMINAL_MASS_KG * 1.5 * (target_mps - x[S.speed_mps])
     for i in range(4):
-        gain = car.brake_gain_front_nm_pa if i < 2 else car.brake_gain_rear_nm_pa
-        push += 0.25 * gain * x[S.pressure_pa + i]
+        push += 0.25 * (FRONT_GAIN_NM_PA if i < 2 else REAR_GAIN_NM_PA) * x[S.pressure_pa + i]
     return min(max(push, -HOLD_LIMIT_NM), HOLD_LIMIT_NM)
 
 
@@ -102,7 +104,7 @@ def _integrate(
             for i in range(4):
                 e[k, i] = strength[k, i] if now >= onset_s[k] else 0.0
         if hold[tick] == hold[tick]:
-            motor_demand[tick, :] = _held_demand(x, hold[tick], car)
+            motor_demand[tick, :] = _held_demand(x, hold[tick])
         for sub in range(PER_TICK):
             late = now + sub * STEP_S
             for i in range(4):

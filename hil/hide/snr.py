@@ -6,6 +6,7 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 
+from hil.hide.car import NOMINAL
 from hil.hide.compiled import entry
 from hil.hide.manoeuvres import TICK_S
 from hil.hide.noise import QUANTUM, Noise
@@ -13,10 +14,10 @@ from hil.hide.noise import QUANTUM, Noise
 Vector = NDArray[np.float64]
 Table = Mapping[str, Vector]
 WHEELS = ("fl", "fr", "rl", "rr")
-START_MPS = 0.05
-RADIUS_M = 0.308
-SLOW_RAD_S = 5.0
-MOTION = ("wheel_speed_", "ax_", "ay_", "yaw_", "speed_")
+START_MPS, RADIUS_M = 0.05, NOMINAL.rolling_radius_m
+SLOW_RAD_S = 10.0
+LAG_ROWS = 6  # in which a motor has reached what it may give
+MOTION = ("wheel_speed_", "ax_", "ay_", "yaw_", "speed_", "motor_torque_")
 
 
 def whitened(differences: Sequence[Table], base: Sequence[Table], noise: Noise) -> Vector:
@@ -35,10 +36,12 @@ def whitened(differences: Sequence[Table], base: Sequence[Table], noise: Noise) 
         moving = (omega.mean(axis=1) > 0.3).astype(np.float64)
         coloured = np.array([noise.gust_mps2, noise.slope_mps2, noise.drift_mps2, *[noise.wheel_drift] * 4])
         times = np.array([noise.gust_tau_s, noise.slope_tau_s, noise.drift_tau_s, *[noise.sensor_tau_s] * 4])
+        torque = _answered(apart, table, omega)
+        known = torque.sum(axis=1) / (NOMINAL.rolling_radius_m * NOMINAL.mass_kg)
         parts.append(
             _motion_innovations(
                 motion, omega, wheel_sd, _deviation(noise.ax_mps2, "ax"), _deviation(noise.speed_mps, "speed"), moving,
-                coloured, np.exp(-TICK_S / times),
+                known, coloured, np.exp(-TICK_S / times),
             ).ravel()
         )  # fmt: skip
         keep = exp(-TICK_S / noise.sensor_tau_s)
@@ -47,10 +50,32 @@ def whitened(differences: Sequence[Table], base: Sequence[Table], noise: Noise) 
             ("yaw_rate_rad_s", noise.yaw_rad_s, noise.yaw_drift_rad_s),
         ]
         own += [(f"pressure_{w}_pa", noise.pressure_pa, noise.pressure_drift_pa) for w in WHEELS]
-        own += [(f"motor_torque_{w}_nm", noise.torque_nm, noise.torque_drift_nm) for w in WHEELS]
+        for i, w in enumerate(WHEELS):
+            own_torque = apart[f"motor_torque_{w}_nm"] - torque[:, i]
+            parts.append(_innovations(own_torque, _deviation(noise.torque_nm, "motor"), noise.torque_drift_nm, keep))
         for name, white, drift in own:
             parts.append(_innovations(apart[name], _deviation(white, name.split("_")[0]), drift, keep))
     return np.concatenate(parts)
+
+
+def _answered(apart: Table, table: Table, omega: Vector) -> Vector:
+    """Motor torque that only answers another speed: no signature, but what the motion has to be cleared of, (n, 4).
+
+    The driver who holds a speed shows in the demand. Where a motor gives less than demanded, its torque follows the
+    fading at low speed, T / (v - v0), or constant power, -T / omega.
+    """
+    result = np.zeros_like(omega)
+    for i, w in enumerate(WHEELS):
+        torque, demand = table[f"motor_torque_{w}_nm"], table[f"motor_torque_demand_{w}_nm"]
+        speed, turned = omega[:, i] * NOMINAL.rolling_radius_m, np.nan_to_num(apart[f"wheel_speed_{w}_rad_s"])
+        settled = np.minimum(np.abs(demand), np.abs(np.concatenate([demand[:1].repeat(LAG_ROWS), demand[:-LAG_ROWS]])))
+        short = np.abs(torque) < 0.97 * settled
+        fades = short & (speed < NOMINAL.motor_fade_start_mps)
+        over = np.maximum(speed - NOMINAL.motor_fade_end_mps, 0.2)
+        result[:, i] = np.where(fades, torque / over * NOMINAL.rolling_radius_m * turned, 0.0)
+        result[:, i] += np.where(short & ~fades, -torque / np.maximum(omega[:, i], 1.0) * turned, 0.0)
+        result[:, i] += np.where(short, 0.0, apart[f"motor_torque_demand_{w}_nm"])
+    return np.nan_to_num(result)
 
 
 def difference(one: Sequence[Table], other: Sequence[Table]) -> list[dict[str, Vector]]:
@@ -117,11 +142,12 @@ def _innovations(z: Vector, white: float, drift: float, keep: float) -> Vector:
 
 @entry
 def _motion_innovations(
-    motion: Vector, omega: Vector, wheel_sd: Vector, ax_sd: float, speed_sd: float, moving: Vector, coloured: Vector,
-    keep: Vector,
+    motion: Vector, omega: Vector, wheel_sd: Vector, ax_sd: float, speed_sd: float, moving: Vector,
+    known: Vector, coloured: Vector, keep: Vector,
 ) -> Vector:  # fmt: skip
     """Normalised innovations, (n, 6): wheels, accelerometer, satellite; NaN is no measurement and gives 0.
 
+    ``known`` is acceleration by torque that answers the speed.
     States: speed; force, slope, accelerometer (AR(1)); share of each wheel (AR(1)). Kalman filter, scalar updates.
     """
     n, m = motion.shape[0], 8
@@ -140,6 +166,7 @@ def _motion_innovations(
                 h[0], h[4 + j], sd = 1.0 / RADIUS_M, omega[k, j], wheel_sd[k, j]
             elif j == 4:
                 h[1], h[3], sd = moving[k], 1.0, ax_sd
+                z -= known[k] * moving[k]
             else:
                 h[0], sd = 1.0, speed_sd
             s = sd * sd
@@ -155,7 +182,7 @@ def _motion_innovations(
                 for b in range(m):
                     p[a, b] -= g[a] * g[b] / s
         step = TICK_S * moving[k]
-        x[0] += step * (x[1] - x[2])
+        x[0] += step * (x[1] - x[2] + known[k])
         for b in range(m):
             p[0, b] += step * (p[1, b] - p[2, b])
         for a in range(m):
