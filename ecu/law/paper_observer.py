@@ -224,7 +224,7 @@ def paper_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     sensed = sqrt(sensed_x * sensed_x + sensed_y * sensed_y)
     modelled = sqrt(body_x * body_x + body_y * body_y)
     fast = speed > p[P_SPEED_MIN]
-    if braking and fast and modelled > p[P_FORCE_MIN] and sensed > p[P_FORCE_MIN] and sensed_x * body_x > 0.0:
+    if braking and modelled > p[P_FORCE_MIN] and sensed > p[P_FORCE_MIN] and sensed_x * body_x > 0.0:
         window = int(p[P_K_WINDOW])
         at = int(s[K_NEXT])
         s[K_MODEL + at] = modelled
