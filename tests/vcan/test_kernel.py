@@ -8,7 +8,6 @@ import sys
 import time
 
 import can
-import pytest
 
 
 def _bus(channel: str, can_id: int) -> can.BusABC:

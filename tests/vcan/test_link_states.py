@@ -43,7 +43,7 @@ pedal = [[0.2, 0.0], [0.4, 0.6]]
 start_m = -100.0
 grade = -0.25
 [end]
-duration_s = 8.0
+duration_s = 20.0
 [ecu.blend]
 blending_factor = 0.7
 """
