@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -217,6 +218,7 @@ def test_a_run_tells_the_states_of_its_link_and_that_bus_off_spoilt_it(
     log = folder / "link" / "recording.log"
 
     def blending() -> bool:
+        time.sleep(0.2)  # this thread goes before the nodes
         assert bench.process.poll() is None, bench.words.read_text()
         demands = latest(log, MotorDemandFront, STEADY_FRAMES)
         return len(demands) == STEADY_FRAMES and all(brakes(demand) for demand in demands)
