@@ -9,6 +9,9 @@ monotonic_ns = time.monotonic_ns
 wall_time_ns = time.time_ns
 """Time of day, ns since 1970: data for logs and reports, never used for a timeout."""
 
+cpu_time_ns = time.thread_time_ns
+"""Processor time of this thread, ns: for comparisons of speed on a machine that others use too."""
+
 
 class Clock(Protocol):
     """What a loop needs to know of time."""
