@@ -1,0 +1,128 @@
+import functools
+
+import numpy as np
+import pytest
+
+from hil.hide.car import NOMINAL, TOLERANCE, true_car
+from hil.hide.catalogue import LISTED, UNLISTED
+from hil.hide.drive import STEP_S, Driven, drive, energy_balance
+from hil.hide.manoeuvres import SETS, manoeuvre_set
+from hil.hide.strengths import ROWS, E, S, Y
+
+BY_NAME = {manoeuvre.name: manoeuvre for manoeuvre in manoeuvre_set("full")}
+SHOWING = ("m03_motor_36", "m05_stop_72_cold", "m05_stop_72_hot", "m06_regen_stop", "m07_slalom_stop", "m08_motor_hard")
+
+
+def driven(name, strength=None, onset=None, law=0, car=NOMINAL, gusts=None):
+    manoeuvre = BY_NAME[name]
+    return drive(
+        manoeuvre, car, np.zeros((ROWS, 4)) if strength is None else strength,
+        np.zeros(ROWS) if onset is None else onset, law, np.zeros((manoeuvre.ticks, 2)) if gusts is None else gusts,
+    )  # fmt: skip
+
+
+def test_energy_adds_up_in_every_manoeuvre():
+    for name in BY_NAME:
+        assert abs(energy_balance(driven(name), NOMINAL)) < 1e-4, name
+
+
+def test_a_missing_loss_would_show_in_the_balance():
+    whole = driven("m05_stop_72_cold")
+    outputs = whole.outputs.copy()
+    outputs[:, Y.rolling_w] = 0.0
+    broken = Driven(whole.manoeuvre, whole.states, outputs, whole.motor_demand_nm)
+    assert abs(energy_balance(broken, NOMINAL)) > 1e-3
+
+
+def test_deceleration_is_force_over_mass():
+    """30 bar cold: gain p mu / mu0 over radius and mass with the wheels' inertia, within the drag and rolling loss."""
+    stop = driven("m05_stop_72_cold")
+    k = round(3.0 / STEP_S)
+    mu = stop.states[k, S.mu]
+    torque = 2.0 * (NOMINAL.brake_gain_front_nm_pa + NOMINAL.brake_gain_rear_nm_pa) * (30e5 - 5e4) * mu / 0.39832
+    mass = NOMINAL.mass_kg + 4.0 * NOMINAL.wheel_inertia_kg_m2 / NOMINAL.rolling_radius_m**2
+    losses = 0.011 * 9.81 + 0.5 * 1.205 * 0.645 * stop.states[k, S.speed_mps] ** 2 / NOMINAL.mass_kg
+    expected = torque / NOMINAL.rolling_radius_m / mass + losses
+    found = (stop.states[k - 20, S.speed_mps] - stop.states[k + 20, S.speed_mps]) / (40 * STEP_S)
+    assert found == pytest.approx(expected, rel=0.02)
+
+
+def test_pads_rest_where_equation_3_rests():
+    x = driven("m02_coast_slow_out").states
+    rest = NOMINAL.pad_a_1_ks / NOMINAL.pad_b_1_j * 320.0 / NOMINAL.pad_epsilon_w
+    assert x[0, S.mu] == pytest.approx(rest)
+    assert x[-1, S.mu] == pytest.approx(rest, rel=5e-3)
+
+
+def test_slope_is_felt_by_the_wheels_and_not_by_the_accelerometer():
+    plain, gusts = driven("m02_coast_fast_out"), np.zeros((BY_NAME["m02_coast_fast_out"].ticks, 2))
+    gusts[:, 1] = 0.2
+    up = driven("m02_coast_fast_out", gusts=gusts)
+    k = round(3.0 / STEP_S)
+    inertia = 4.0 * NOMINAL.wheel_inertia_kg_m2 / NOMINAL.rolling_radius_m**2 / NOMINAL.mass_kg
+    lost = plain.states[k, S.speed_mps] - up.states[k, S.speed_mps]
+    assert lost == pytest.approx(0.2 * 3.0 / (1.0 + inertia), rel=0.03)
+    assert abs(up.states[k, S.imu_ax_mps2] - plain.states[k, S.imu_ax_mps2]) < 0.02
+
+
+def acting(kind, magnitude):
+    strength = np.zeros((ROWS, 4))
+    strength[E.unlisted if kind.law else getattr(E, kind.name)] = kind.strength(magnitude, kind.where[0])
+    return strength
+
+
+CAUSES = [kind for kind in (*LISTED, *UNLISTED) if not kind.senses]
+
+
+def largest_change(kind, magnitudes):
+    seen = [S.speed_mps, S.omega_rad_s, S.imu_ax_mps2, S.pressure_pa, S.motor_nm]
+    changed = 0.0
+    for name in SHOWING:
+        before = plain(name).states[:, seen]
+        for magnitude in magnitudes:
+            after = driven(name, acting(kind, magnitude), law=kind.law).states
+            assert np.isfinite(after).all(), (name, magnitude)
+            rows = min(len(after), len(before))
+            changed = max(changed, float(np.abs(after[:rows, seen] - before[:rows]).max()))
+    return changed
+
+
+@functools.cache
+def plain(name):
+    return driven(name)
+
+
+@pytest.mark.parametrize("kind", CAUSES, ids=lambda kind: kind.name)
+def test_every_cause_shows(kind):
+    assert (largest_change(kind, (kind.typical,)) > 1e-3) == kind.shows
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", CAUSES, ids=lambda kind: kind.name)
+def test_every_cause_is_finite_at_its_bounds(kind):
+    assert largest_change(kind, (kind.low, kind.high)) >= 0.0
+
+
+def test_nothing_happens_before_the_onset():
+    strength, onset = np.zeros((ROWS, 4)), np.zeros(ROWS)
+    strength[E.pad_mu_gain], onset[E.pad_mu_gain] = -0.3, 3.0
+    whole, late = driven("m05_stop_72_cold"), driven("m05_stop_72_cold", strength, onset)
+    k = round(3.0 / STEP_S)
+    np.testing.assert_array_equal(late.states[:k], whole.states[:k])
+    assert late.states[k + 400, S.speed_mps] > whole.states[k + 400, S.speed_mps] + 0.1
+
+
+def test_true_cars_differ_within_their_tolerance():
+    cars = [true_car(np.random.default_rng([seed, 1])) for seed in range(40)]
+    for name, tolerance in TOLERANCE.items():
+        values = np.array([getattr(car, name) for car in cars]) - getattr(NOMINAL, name)
+        assert np.abs(values).max() <= tolerance * (1.0 + 1e-9)
+        assert values.std() > 0.2 * tolerance
+
+
+def test_sets_last_as_long_as_they_say():
+    assert 150.0 < sum(m.ticks for m in manoeuvre_set("full")) * 0.01 < 220.0
+    assert {m.direction for m in manoeuvre_set("full")} == {1, -1}
+    for name in SETS:
+        assert len({m.name for m in manoeuvre_set(name)}) == len(manoeuvre_set(name))
+    assert manoeuvre_set("full", 3)[1].speed_mps != manoeuvre_set("full")[1].speed_mps
