@@ -14,7 +14,7 @@ from dbc.bench_messages import (
     StimulusRoad,
     TruthMotion,
 )
-from dbc.contract import Message
+from dbc.contract import Message, spec_of
 from dbc.exchange import Receiver, Transmitter
 from dbc.frame import Frame, Received
 from plant.manoeuvre import Trace, value_at
@@ -22,10 +22,7 @@ from plant.manoeuvre import Trace, value_at
 WHEELS = ("fl", "fr", "rl", "rr")
 ALL_WHEELS = 0b1111
 BENCH_PHASE_NS = 2_500_000  # after the plant, before the controller: each hears the stimulus at its next tick
-BENCH_SENDERS = ("BENCH",)
-_OPENING_FRAMES = (
-    3  # fault commands without a fault, so that the receiver's sequence stands before the first one counts
-)
+_OPENING_FRAMES = 3  # fault commands without a fault: the receiver's sequence stands before one counts
 
 
 class Channel(StrEnum):
@@ -82,6 +79,7 @@ class Director:
         self._extra: list[Frame] = []
         self._lock = Lock()
         self._receiver = Receiver((TruthMotion,))
+        self._motion_id = spec_of(TruthMotion).can_id
         self._transmitter = Transmitter()
 
     @property
@@ -126,7 +124,7 @@ class Director:
         """Take what the nodes sent, and send what acts next."""
         with self._lock:
             self.inbox = inbox
-            self._receiver.accept(now_ns, inbox)
+            self._receiver.accept(now_ns, [item for item in inbox if item[1] == self._motion_id])  # few of many
             self.motion = self._receiver.latest(TruthMotion)
             if self.motion is not None:
                 if self._start_ns is None and self.motion.manoeuvre is not ManoeuvreState.HOLDING:

@@ -28,7 +28,7 @@ def test_objects_in_virtual_time(start, name):
 @pytest.mark.parametrize(
     ("role", "script"),
     [
-        ("ecu", ["own_ecu.py", "{spec}"]),
+        pytest.param("ecu", ["own_ecu.py", "{spec}"], marks=pytest.mark.slow),
         ("ecu", ["plain_ecu.py", "brakebench", "{name}"]),
         ("plant", ["own_plant.py", "{spec}"]),
     ],

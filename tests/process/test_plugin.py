@@ -198,6 +198,12 @@ def test_in_real_time(run_pytest):
     output(run_pytest(REAL, "--brakebench-realtime"), 0)
 
 
+def test_against_an_ecu_that_somebody_else_started(run_pytest, start, channel):
+    ecu = start("ecu", "--bus", channel)
+    output(run_pytest(REAL, "--brakebench-no-ecu", "--brakebench-bus", channel), 0)
+    assert ecu.poll() is None
+
+
 def test_interrupted_in_real_time_leaves_nothing_behind(run_pytest, channel):
     text = "def test_endless(bench):\n    bench.run_until(lambda b: False, timeout=1e6)\n"
     process = run_pytest(text, "--brakebench-bus", channel)
