@@ -1,0 +1,80 @@
+"""``brakebench explain``: what measured data have and the simulation has not, why, and what the extension gains."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from hil.cli.options import add_json
+from hil.study.table import UnusableError
+
+
+def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "explain",
+        help="measured logs against the simulation: what is wrong, why, and what an extension gains",
+        description="Replays measured manoeuvres, shows what the simulation misses, names the cause with interval, "
+        "probability and rivals, writes the extended model and measures its gain on held-out manoeuvres.",
+    )
+    parser.add_argument(
+        "logs",
+        nargs="+",
+        type=Path,
+        metavar="LOG",
+        help="CAN log, CSV, Parquet, MF4 or .mat table, or a folder of them",
+    )
+    parser.add_argument("--vehicle", type=Path, metavar="SET.toml", help="the car's numbers (default: the shipped car)")
+    parser.add_argument("--dbc", type=Path, metavar="FILE", help="another car's DBC, with --map")
+    parser.add_argument("--map", type=Path, metavar="CHANNELS.toml", help="which signal is which channel")
+    parser.add_argument(
+        "--logs", dest="about", type=Path, metavar="LOGS.toml", help="direction, disc temperature per file"
+    )
+    parser.add_argument("--extend", type=Path, metavar="FILE", help="extension to begin with")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="write report.html, report.png, result.json, extension.toml"
+    )
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Explain and print."""
+    from hil.study.explain import explain
+    from hil.study.summary import build_report
+
+    def say(text: str) -> None:
+        print(f"  {text} ...", file=sys.stderr)
+
+    try:
+        found = explain(
+            list(args.logs), args.vehicle, channel_map=args.map, database=args.dbc, about=args.about,
+            extend=args.extend, out=args.out, say=say,
+        )  # fmt: skip
+    except UnusableError as error:
+        if not args.json:
+            raise
+        print(json.dumps(_unusable(str(error)), indent=2))
+        return error.exit_code
+    report = build_report(found, [str(path) for path in args.logs])
+    if args.out is not None:
+        from hil.report.figure import write_figure
+        from hil.report.html import write_html
+
+        write_html(report, args.out / "report.html")
+        write_figure(report, args.out / "report.png")
+        (args.out / "result.json").write_text(json.dumps(found.json, indent=2), encoding="utf-8")
+    if args.json:
+        print(json.dumps(found.json, indent=2, allow_nan=False))
+    else:
+        from hil.report.text import print_text
+
+        print_text(report, sys.stdout)
+    return 0
+
+
+def _unusable(why: str) -> dict[str, object]:
+    return {
+        "verdict": "unusable", "why": why, "causes": [], "rivals": [], "not_testable": [], "decide_with": [],
+        "wrong": [], "gain": {}, "extension": None,
+    }  # fmt: skip

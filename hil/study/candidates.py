@@ -1,0 +1,91 @@
+"""What may be wrong: every listed effect, each of its numbers, at each place where it can act."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from hil.study.table import Floats
+from hil.study.world import World
+from plant.effects.effect import NODES, Effect, Parameter, Scope
+from plant.effects.theta import THETA
+
+_GROUPS: Mapping[Scope, Mapping[str, tuple[int, ...]]] = {
+    Scope.CAR: {"car": (0,)},
+    Scope.AXLE: {"car": (0, 1), "front": (0,), "rear": (1,)},
+    Scope.WHEEL: {
+        "car": (0, 1, 2, 3), "front": (0, 1), "rear": (2, 3), "left": (0, 2), "right": (1, 3),
+        "fl": (0,), "fr": (1,), "rl": (2,), "rr": (3,),
+    },
+    Scope.NODE: {node: (k,) for k, node in enumerate(NODES)},
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """One number of theta that is moved: its place, and by how much for a finite difference."""
+
+    effect: Effect
+    parameter: Parameter
+    member: int
+
+    @property
+    def at(self) -> int:
+        """Index in theta."""
+        return int(THETA.slice(self.effect.name, self.parameter.name).start) + self.member
+
+    @property
+    def step(self) -> float:
+        """A third of what is met on real cars, on the side that is allowed."""
+        return self.parameter.typical / 3.0 if self.parameter.typical else 0.1 * self.parameter.high
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A listed effect's number at a place; its columns move together."""
+
+    effect: Effect
+    parameter: Parameter
+    place: str
+    columns: tuple[int, ...]
+    places: int
+
+    @property
+    def name(self) -> str:
+        """For people and keys."""
+        extra = "" if len(self.effect.strengths) == 1 else f".{self.parameter.name}"
+        return f"{self.effect.name}{extra}@{self.place}"
+
+    def members(self) -> tuple[int, ...]:
+        """Members of the effect's scope it moves."""
+        return _GROUPS[self.effect.scope][self.place]
+
+    def applied(self, world: World, value: float) -> World:
+        """The world with this number set (added to what is there) at this place."""
+        theta: Floats = world.theta.copy()
+        start = THETA.slice(self.effect.name, self.parameter.name).start
+        for member in self.members():
+            theta[start + member] += value
+        return replace(world, theta=theta)
+
+
+def columns() -> list[Column]:
+    """Every strength of every effect at every member."""
+    found = []
+    for effect in THETA.effects:
+        for parameter in effect.strengths:
+            found += [Column(effect, parameter, member) for member in range(parameter.size(effect.scope))]
+    return found
+
+
+def candidates(of: list[Column]) -> list[Candidate]:
+    """All places of all strengths."""
+    index: Mapping[tuple[str, str, int], int] = {
+        (column.effect.name, column.parameter.name, column.member): k for k, column in enumerate(of)
+    }
+    found = []
+    for effect in THETA.effects:
+        groups = _GROUPS[effect.scope]
+        for parameter in effect.strengths:
+            for place, members in groups.items():
+                at = tuple(index[effect.name, parameter.name, member] for member in members)
+                found.append(Candidate(effect, parameter, place, at, len(groups) * len(effect.strengths)))
+    return found

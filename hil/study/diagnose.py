@@ -1,0 +1,223 @@
+"""The diagnosis: noise first, then nuisances, then one cause at a time, fitted non-linearly before it is believed."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hil.study.candidates import Candidate, Column, candidates, columns
+from hil.study.fit import Fitter, Model, Term, Tracks
+from hil.study.linear import Sums, project, track_columns
+from hil.study.noise import Frame, Noise
+from hil.study.prepare import Case
+from hil.study.screen import INDIFFERENT, Score, inflation, leaders, not_testable, score, scores, threshold
+from hil.study.table import Floats
+from hil.study.vehicle import Vehicle
+from hil.study.world import Rig, World, start_nuisances
+
+Say = Callable[[str], None]
+ALPHA = 0.003
+MOST_CAUSES = 3
+LEADERS = 6
+TIED = 9.2
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What may be switched off, so that the tests can show that it matters."""
+
+    noise_model: bool = True
+    relinearise: bool = True
+    alpha: float = ALPHA
+    most_causes: int = MOST_CAUSES
+
+
+@dataclass(frozen=True, eq=False)
+class Contender:
+    """A model that explains the data with one cause in a certain place: its term, cost and log of the odds."""
+
+    term: Term
+    model: Model
+    cost: float
+    evidence: float
+    information: float
+
+
+@dataclass(eq=False)
+class Diagnosis:
+    """Everything the diagnosis found.
+
+    ``base`` explains with nuisances alone, ``final`` with the accepted causes; ``contenders`` has, for each accepted
+    cause, all that were fitted in its place, best first.
+    """
+
+    case: Case
+    vehicle: Vehicle
+    fitter: Fitter
+    noise: Noise
+    first_noise: Noise
+    nominal: Model
+    base: Model
+    final: Model
+    contenders: list[list[Contender]] = field(default_factory=list)
+    screened: list[Score] = field(default_factory=list)
+    untestable: list[str] = field(default_factory=list)
+    sums: Sums | None = None
+    looks: int = 0
+    least_gain: float = 0.0
+    remarks: list[str] = field(default_factory=list)
+
+
+def diagnose(
+    case: Case, vehicle: Vehicle, base: World, settings: Settings | None = None, say: Say | None = None
+) -> Diagnosis:
+    """Diagnose a case; see the module."""
+    return _Search(case, vehicle, base, settings or Settings(), say or (lambda _: None)).run()
+
+
+class _Search:
+    def __init__(self, case: Case, vehicle: Vehicle, base: World, settings: Settings, say: Say) -> None:
+        self.settings, self.say = settings, say
+        self.rig = Rig(case, vehicle).quieted(base)
+        self.frame = Frame.of(case)
+        self.nuisances = (*vehicle.nuisances, *start_nuisances())
+        self.base_world = base
+        self.columns: list[Column] = columns()
+        self.candidates: list[Candidate] = candidates(self.columns)
+        self.fitter: Fitter
+        self.now: Floats = np.zeros(0)
+
+    def run(self) -> Diagnosis:
+        """All of it."""
+        self.say("replaying the car as handed in")
+        self._nuisance_columns(np.zeros(len(self.nuisances)))
+        nominal, noise = self.fitter.start(self.settings.noise_model)
+        self.say("noise, and the vehicle's numbers within their tolerance")
+        model = self.fitter.fit(nominal, noise, 1)
+        model, noise = self.fitter.settle(model, noise, 1, 60)
+        if self.settings.relinearise and np.abs(model.z).max() > 1.5:
+            self._nuisance_columns(model.z)
+        model, noise = self.fitter.settle(model, noise, 1, 100)
+        self.say(f"sensitivities of {len(self.candidates)} candidates")
+        effect_columns = self._effect_columns(model)
+        found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, noise, noise, nominal, model, model)
+        sums = self.fitter.screen(model, effect_columns, noise)
+        found.sums = sums
+        found.screened = self._scores(sums, model)
+        found.untestable = not_testable(found.screened)
+        found.looks = _independent(found.screened)
+        found.least_gain = threshold(found.looks, self.settings.alpha) * inflation(found.screened)
+        while len(model.terms) < self.settings.most_causes:
+            if model.terms:
+                sums = self.fitter.screen(model, effect_columns, noise)
+            accepted = self._next(found, model, noise, sums)
+            if accepted is None:
+                break
+            model, noise, list_of = accepted
+            found.contenders.append(list_of)
+            self.say(f"accepted {model.terms[-1].candidate.name} = {model.terms[-1].value:.4g}")
+        found.final, found.noise = model, noise
+        if len(model.terms) > 1:
+            self._backward(found)
+        return found
+
+    def _nuisance_columns(self, z: Floats) -> None:
+        world = self.base_world.shifted(self.nuisances, z)
+        base, step = self.rig.run(world), 0.5
+        worlds = []
+        for k in range(len(self.nuisances)):
+            moved = z.copy()
+            moved[k] += step
+            worlds.append(self.base_world.shifted(self.nuisances, moved))
+        tracks = track_columns(self.rig, self.frame, base, worlds, [step] * len(worlds))
+        self.fitter = Fitter(self.rig, self.frame, self.base_world, self.nuisances, tracks)
+
+    def _effect_columns(self, model: Model) -> Tracks:
+        world = self.fitter.world(model.z, model.terms)
+        base = model.stack
+        worlds = []
+        for column in self.columns:
+            theta = world.theta.copy()
+            theta[column.at] += column.step
+            worlds.append(replace(world, theta=theta))
+        return track_columns(self.rig, self.frame, base, worlds, [column.step for column in self.columns])
+
+    def _scores(self, sums: Sums, model: Model) -> list[Score]:
+        accepted = len(model.terms)
+        projected = project(sums.total(), sums.nuisances, range(accepted), model.z)
+        in_use = {id(term.candidate): term.value for term in model.terms}
+        now = [in_use.get(id(candidate), 0.0) for candidate in self.candidates]
+        return scores(self.candidates, projected, accepted, now)
+
+    def _next(
+        self, found: Diagnosis, model: Model, noise: Noise, sums: Sums
+    ) -> tuple[Model, Noise, list[Contender]] | None:
+        """The next cause, if one is beyond doubt."""
+        listed = self._scores(sums, model)
+        used = {(t.candidate.effect.name, t.candidate.parameter.name, t.candidate.place) for t in model.terms}
+        listed = [
+            s for s in listed if (s.candidate.effect.name, s.candidate.parameter.name, s.candidate.place) not in used
+        ]
+        top = leaders(listed, LEADERS)
+        if not top or top[0].gain < 0.4 * found.least_gain:
+            return None
+        self.say(f"fitting {len(top)} leaders")
+        fitted = [self._contender(model, item, noise) for item in top]
+        best = min(fitted, key=lambda c: c.cost - 2.0 * c.evidence)
+        # what the noise model had taken for noise: estimated again with the best leader in place
+        tighter = self.fitter.estimated(best.model, noise, 80)
+        fitted = [self._again(c, tighter) for c in fitted]
+        reference = self.fitter.fit(model, tighter, 1).cost
+        loose = self.fitter.cost(model.residual, model.z, noise)
+        fitted.sort(key=lambda c: c.cost - 2.0 * c.evidence)
+        best = fitted[0]
+        size = abs(best.term.candidate.parameter.typical)
+        gained = min(reference, loose) - best.cost
+        gained *= max(1.0 - INDIFFERENT * size / max(abs(best.term.value), 1e-300), 0.0) ** 2
+        if gained < found.least_gain:
+            self.say(f"{best.term.candidate.name} gains {gained:.1f}, {found.least_gain:.1f} is asked")
+            return None
+        return best.model, tighter, fitted
+
+    def _contender(self, model: Model, item: Score, noise: Noise) -> Contender:
+        term = Term(item.candidate, item.value)
+        tried = self.fitter.at(model.z, (*model.terms, term), noise)
+        if not tried.cost < model.cost + 50.0:  # too long a step: begin nearer
+            tried = self.fitter.at(model.z, (*model.terms, Term(item.candidate, 0.3 * item.value)), noise)
+        fitted = self.fitter.fit(tried, noise, 2, self.settings.relinearise)
+        return self._judged(fitted, item, noise)
+
+    def _judged(self, fitted: Model, item: Score, noise: Noise) -> Contender:
+        parameter = item.candidate.parameter
+        tau = 1.5 * abs(parameter.typical) if parameter.typical else 0.5 * (parameter.high - parameter.low)
+        information = 1.0 / max(float(fitted.covariance[-1, -1]), 1e-30) if fitted.covariance.size else item.information
+        value = fitted.terms[-1].value
+        occam = -0.5 * float(np.log1p(information * tau * tau)) - 0.5 * (value / tau) ** 2
+        return Contender(
+            fitted.terms[-1], fitted, fitted.cost, occam - float(np.log(item.candidate.places)), information
+        )
+
+    def _again(self, contender: Contender, noise: Noise) -> Contender:
+        fitted = self.fitter.fit(contender.model, noise, 1, self.settings.relinearise)
+        return replace(contender, model=fitted, term=fitted.terms[-1], cost=fitted.cost)
+
+    def _backward(self, found: Diagnosis) -> None:
+        """Take out each cause in turn; what is not missed stays out."""
+        model = found.final
+        for k in reversed(range(len(model.terms))):
+            rest = tuple(term for j, term in enumerate(model.terms) if j != k)
+            without = self.fitter.fit(self.fitter.at(model.z, rest, found.noise), found.noise, 2)
+            if without.cost - model.cost < found.least_gain:
+                self.say(f"{model.terms[k].candidate.name} is not needed any more")
+                model = without
+                del found.contenders[k]
+        found.final = model
+
+
+def _independent(found: Sequence[Score]) -> int:
+    """How many looks: candidates that can show at all, places of one effect counted as one and a half."""
+    names = {(s.candidate.effect.name, s.candidate.parameter.name) for s in found if s.reach > 1.0}
+    return max(1, round(1.5 * len(names)))
+
+
+__all__ = ["ALPHA", "TIED", "Contender", "Diagnosis", "Settings", "diagnose", "score"]

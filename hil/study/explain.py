@@ -1,0 +1,78 @@
+"""`explain`: measured logs in, an answer out. The library call behind ``brakebench explain``."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from dbc.database import parse_database
+from hil.study.answer import Answer, answer
+from hil.study.channel_map import load_map
+from hil.study.diagnose import Say, Settings, diagnose
+from hil.study.extension import load_extension, write_extension
+from hil.study.measure import gains
+from hil.study.patterns import wrongs
+from hil.study.prepare import prepare
+from hil.study.read import from_frame, read_logs
+from hil.study.table import Log
+from hil.study.vehicle import Vehicle, load_vehicle
+from hil.study.world import nominal
+
+
+def explain(
+    logs: Any, vehicle: Path | str | Mapping[str, Any] | None = None, *, channel_map: Path | None = None,
+    database: Path | None = None, about: Path | None = None, extend: Path | None = None, out: Path | None = None,
+    settings: Settings | None = None, say: Say | None = None,
+) -> Answer:  # fmt: skip
+    """Explain what measured data have and the simulation has not.
+
+    Parameters
+    ----------
+    logs : a data frame (or mapping of columns) in the canonical table, a path, or a list of either.
+    vehicle : flat vehicle set as file or mapping; None is the shipped car.
+    channel_map, database, about : another car's channels, its DBC, and ``logs.toml``.
+    extend : extension file to begin with.
+    out : folder for the extension file; none is written without.
+    settings, say : what to switch off (for tests), and where to tell the progress.
+
+    Raises
+    ------
+    hil.study.table.UnusableError
+        Data or files that nothing can be concluded from: the message says why.
+    """
+    car = load_vehicle(Path(vehicle) if isinstance(vehicle, str) else vehicle)
+    read = _logs(logs, car, channel_map, database, about)
+    case = prepare(read, float(car.parameters.wheel.rolling_radius_m))
+    handed_in = nominal(car)
+    base = handed_in if extend is None else load_extension(Path(extend)).applied(handed_in)
+    found = diagnose(case, car, base, settings, say)
+    (say or (lambda _: None))("measuring the gain on held-out manoeuvres")
+    gained, missed = gains(found), wrongs(found)
+    written = None
+    if out is not None:
+        Path(out).mkdir(parents=True, exist_ok=True)
+        written = str(Path(out) / "extension.toml")
+        names = ", ".join(term.candidate.name for term in found.final.terms) or "no effect"
+        extended = found.fitter.world(found.final.z, found.final.terms)
+        write_extension(Path(written), handed_in, extended, found.final, f"Taught by {len(read)} logs: {names}")
+    remarks = [*car.remarks, *(f"{log.name}: {text}" for log in read for text in log.remarks)]
+    return answer(found, gained, missed, written, remarks)
+
+
+def _logs(
+    logs: Any, car: Vehicle, channel_map: Path | None, database: Path | None, about: Path | None
+) -> Sequence[Log]:
+    items = list(logs) if isinstance(logs, list | tuple) else [logs]
+    mapped = None if channel_map is None else load_map(Path(channel_map))
+    dbc = None
+    if database is not None:
+        dbc = parse_database(Path(database).read_bytes(), str(database))
+    constant = float(car.parameters.motor.torque_constant_nm_a)
+    read: list[Log] = []
+    for k, item in enumerate(items):
+        if isinstance(item, Log):
+            read.append(item)
+        elif isinstance(item, str | Path):
+            read += read_logs([Path(item)], dbc, mapped, None if about is None else Path(about), constant)
+        else:
+            read.append(from_frame(item, f"dataframe {k}" if len(items) > 1 else "dataframe"))
+    return read

@@ -1,0 +1,185 @@
+"""Non-linear fits: bounded Gauss-Newton steps on nuisances and effects, each step a free replay."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hil.study.candidates import Candidate
+from hil.study.linear import Sums, solve, sums, track_columns
+from hil.study.noise import Frame, Noise, estimate, first_guess, tracks_of, whiten
+from hil.study.table import Floats
+from hil.study.vehicle import Nuisance
+from hil.study.world import Rig, Stack, World
+
+Tracks = dict[str, Floats]
+_LARGEST_STEP = 3.0
+_DIVERGED = 1e15
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """An effect in the model: candidate and its value."""
+
+    candidate: Candidate
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """The car so far: nuisances ``z`` in standard deviations and effects; ``residual`` tracks are at exactly this, and
+    ``stack`` the simulated channels."""
+
+    z: Floats
+    terms: tuple[Term, ...]
+    residual: Tracks
+    cost: float
+    covariance: Floats
+    stack: Stack = field(default_factory=dict)
+
+    def values(self) -> list[float]:
+        """Values of the effects."""
+        return [term.value for term in self.terms]
+
+
+class Fitter:
+    """Fits models of one case."""
+
+    def __init__(
+        self, rig: Rig, frame: Frame, base: World, nuisances: Sequence[Nuisance], nuisance_columns: Tracks
+    ) -> None:
+        self.rig, self.frame, self.base = rig, frame, base
+        self.nuisances, self.nuisance_columns = tuple(nuisances), nuisance_columns
+        self.radius = float(rig.vehicle.parameters.wheel.rolling_radius_m)
+        self._measured = rig.measured()
+        self._white_for: Noise | None = None
+        self._white: Floats = np.empty((0, 0), np.float32)
+        self._products: Floats = np.empty((0, 0))
+
+    def world(self, z: Floats, terms: Sequence[Term]) -> World:
+        """The world of a model."""
+        world = self.base.shifted(self.nuisances, z)
+        for term in terms:
+            world = term.candidate.applied(world, term.value)
+        return world
+
+    def at(self, z: Floats, terms: Sequence[Term], noise: Noise) -> Model:
+        """The model with these numbers, simulated."""
+        stack = self.rig.run(self.world(z, terms))
+        residual = self.of_stack({group: self._measured[group] - values for group, values in stack.items()})
+        return Model(z, tuple(terms), residual, self.cost(residual, z, noise), np.zeros((0, 0)), stack)
+
+    def residual(self, z: Floats, terms: Sequence[Term]) -> Tracks:
+        """Residual tracks of a model."""
+        return tracks_of(self.rig.residual(self.world(z, terms)), self.frame, self.radius)
+
+    def of_stack(self, stack: Stack) -> Tracks:
+        """Tracks, (samples, 1), of channels."""
+        return tracks_of({group: values[:, :, None] for group, values in stack.items()}, self.frame, self.radius)
+
+    def cost(self, residual: Tracks, z: Floats, noise: Noise) -> float:
+        """Twice the negative log-likelihood, tolerances included."""
+        if not all(np.isfinite(values).all() for values in residual.values()):
+            return _DIVERGED
+        whitened, likelihood = whiten(residual, self.frame, noise)
+        excess = sum(float(np.sum(np.clip(np.abs(v[:, 0]) - 6.0, 0.0, None) ** 2)) for v in whitened.values())
+        return -2.0 * likelihood - excess + float(z @ z)
+
+    def start(self, enabled: bool = True) -> tuple[Model, Noise]:
+        """The car as handed in, and a first guess of the noise."""
+        z = np.zeros(len(self.nuisances))
+        noise = first_guess(self.residual(z, ()), self.frame, enabled)
+        return self.at(z, (), noise), noise
+
+    def term_columns(self, model: Model) -> Tracks:
+        """Sensitivities to the values of the effects, at the model."""
+        world = self.world(model.z, model.terms)
+        steps = [_difference(term) for term in model.terms]
+        worlds = [term.candidate.applied(world, step) for term, step in zip(model.terms, steps, strict=True)]
+        return track_columns(self.rig, self.frame, model.stack or self.rig.run(world), worlds, steps)
+
+    def fit(self, model: Model, noise: Noise, steps: int = 2, relinearise: bool = True) -> Model:
+        """Improve nuisances and values; keeps the model where no step does."""
+        best = replace(model, cost=self.cost(model.residual, model.z, noise))
+        own: Tracks = {}
+        for step in range(steps):
+            if best.terms and (relinearise or not step):
+                own = self.term_columns(best)
+            moved = self._step(best, own, noise)
+            if moved is None:
+                break
+            gained = best.cost - moved.cost
+            best = moved
+            if gained < 1.0:
+                break
+        return best
+
+    def _step(self, model: Model, own: Tracks, noise: Noise) -> Model | None:
+        count = len(self.nuisances)
+        change, covariance = solve(self._total(model, own, noise), count, range(len(model.terms)), model.z)
+        for share in (1.0, 0.4):
+            dz = np.clip(change[:count] * share, -_LARGEST_STEP, _LARGEST_STEP)
+            z = np.clip(model.z + dz, -4.0, 4.0)
+            terms = tuple(
+                Term(term.candidate, _bounded(term.candidate, term.value + share * float(step)))
+                for term, step in zip(model.terms, change[count:], strict=True)
+            )
+            moved = self.at(z, terms, noise)
+            if moved.cost < model.cost:
+                return replace(moved, covariance=covariance)
+        return replace(model, covariance=covariance) if model.terms and not model.covariance.size else None
+
+    def _total(self, model: Model, own: Tracks, noise: Noise) -> Floats:
+        """Products of [residual, nuisances, own columns], the nuisances' from memory."""
+        if self._white_for is not noise:
+            white, _ = whiten({k: v.astype(np.float64) for k, v in self.nuisance_columns.items()}, self.frame, noise)
+            self._white = np.concatenate([white[name] for name in self.frame.names]).astype(np.float32)
+            self._products = np.asarray(self._white.T @ self._white, np.float64)
+            self._white_for = noise
+        joined = {
+            name: np.hstack([values, own[name].astype(np.float64)]) if own else values
+            for name, values in model.residual.items()
+        }
+        white, _ = whiten(joined, self.frame, noise)
+        outer = np.concatenate([white[name] for name in self.frame.names])
+        outer[:, 0] = np.clip(outer[:, 0], -6.0, 6.0)
+        count, width = len(self.nuisances), outer.shape[1]
+        total = np.empty((count + width, count + width))
+        at = [0, *range(1 + count, count + width)]
+        total[1 : 1 + count, 1 : 1 + count] = self._products
+        cross = np.asarray(self._white.T @ outer.astype(np.float32), np.float64)
+        total[np.ix_(range(1, 1 + count), at)] = cross
+        total[np.ix_(at, range(1, 1 + count))] = cross.T
+        total[np.ix_(at, at)] = outer.T @ outer
+        return total
+
+    def settle(self, model: Model, noise: Noise, rounds: int, budget: int = 160) -> tuple[Model, Noise]:
+        """Noise and fit in turn."""
+        for _ in range(rounds):
+            noise = self.estimated(model, noise, budget)
+            model = self.fit(model, noise, 2)
+        return model, noise
+
+    def estimated(self, model: Model, noise: Noise, budget: int = 160) -> Noise:
+        """Noise of largest likelihood at the model's residual."""
+        return estimate(model.residual, self.frame, noise, budget) if noise.enabled else noise
+
+    def screen(self, model: Model, columns: Tracks, noise: Noise) -> Sums:
+        """Sums with nuisances, the model's effects and all columns."""
+        parts = [self.nuisance_columns]
+        if model.terms:
+            parts.append(self.term_columns(model))
+        parts.append(columns)
+        joined = {name: np.hstack([part[name] for part in parts]) for name in columns}
+        return sums(model.residual, joined, self.frame, noise, len(self.nuisances))
+
+
+def _difference(term: Term) -> float:
+    """Step of a finite difference: small against what is usual, and inside the bounds."""
+    parameter = term.candidate.parameter
+    size = max(abs(parameter.typical) / 5.0, 0.05 * abs(term.value))
+    return -size if term.value + size > parameter.high else size
+
+
+def _bounded(candidate: Candidate, value: float) -> float:
+    return float(np.clip(value, candidate.parameter.low, candidate.parameter.high))

@@ -1,0 +1,113 @@
+"""The linearised problem: whitened residual and sensitivities summed by manoeuvre, nuisances within tolerance."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hil.study.noise import Frame, Noise, tracks_of, whiten
+from hil.study.table import Floats
+from hil.study.world import Rig, Stack, World
+
+_CHUNK = 48
+_HUBER = 6.0
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Sums of products per manoeuvre: ``matrix`` (manoeuvres, m, m) of [residual, nuisances, columns]; how many
+    samples, and the log-likelihood of the noise at the residual."""
+
+    matrix: Floats
+    nuisances: int
+    samples: int
+    likelihood: float
+
+    def total(self, weights: Floats | None = None) -> Floats:
+        """Sum over manoeuvres, weighted."""
+        if weights is None:
+            return np.asarray(self.matrix.sum(axis=0))
+        return np.asarray(np.tensordot(weights, self.matrix, axes=1))
+
+
+def track_columns(
+    rig: Rig, frame: Frame, base: Stack, worlds: Sequence[World], steps: Sequence[float]
+) -> dict[str, Floats]:
+    """Finite differences of all worlds against ``base``, as tracks (samples, worlds)."""
+    radius = float(rig.vehicle.parameters.wheel.rolling_radius_m)
+    out = {name: np.zeros((len(frame.fresh), len(worlds)), np.float32) for name in frame.names}
+    for k, (stack, step) in enumerate(zip(rig.run_all(worlds), steps, strict=True)):
+        change = {group: ((values - base[group]) / step)[:, :, None] for group, values in stack.items()}
+        for name, values in tracks_of(change, frame, radius).items():
+            out[name][:, k] = np.clip(values[:, 0], -1e12, 1e12)
+    return out
+
+
+def sums(residual: dict[str, Floats], columns: dict[str, Floats], frame: Frame, noise: Noise, nuisances: int) -> Sums:
+    """Whiten residual and columns, and sum their products by manoeuvre."""
+    white_residual, likelihood = whiten(residual, frame, noise)
+    count = next(iter(columns.values())).shape[1]
+    blocks = np.asarray(frame.blocks, np.int64)
+    manoeuvres = int(blocks.max()) + 1
+    order = np.argsort(blocks, kind="stable")
+    bounds = np.searchsorted(blocks[order], np.arange(manoeuvres + 1))
+    whitened = {name: np.empty((len(blocks), count + 1), np.float32) for name in residual}
+    for name, values in white_residual.items():
+        whitened[name][:, 0] = _limited(values[:, 0])
+    for begin in range(0, count, _CHUNK):
+        chunk = {name: values[:, begin : begin + _CHUNK].astype(np.float64) for name, values in columns.items()}
+        for name, values in whiten(chunk, frame, noise)[0].items():
+            whitened[name][:, 1 + begin : 1 + begin + values.shape[1]] = values
+    matrix = np.zeros((manoeuvres, count + 1, count + 1))
+    for values in whitened.values():
+        ordered = values[order] if (np.diff(blocks) < 0).any() else values
+        for k in range(manoeuvres):
+            part = ordered[bounds[k] : bounds[k + 1]]
+            matrix[k] += part.T @ part
+    samples = int(sum(float(known.sum()) for known in frame.present.values()))
+    return Sums(matrix, nuisances, samples, likelihood)
+
+
+def _limited(innovations: Floats) -> Floats:
+    """Innovations within six standard deviations: a single wild sample is no evidence for a cause."""
+    return np.clip(innovations, -_HUBER, _HUBER)
+
+
+@dataclass(frozen=True, eq=False)
+class Projected:
+    """Residual and columns after the nuisances (and what is accepted) have taken their part.
+
+    ``b`` (columns,) products with the residual, ``q`` (columns, columns) among themselves, ``chi2`` of the residual.
+    """
+
+    b: Floats
+    q: Floats
+    chi2: float
+
+
+def project(total: Floats, nuisances: int, free: Sequence[int] = (), z: Floats | None = None) -> Projected:
+    """Project out nuisances (normal, standard deviation 1, now ``z`` off) and the columns ``free`` (unbounded)."""
+    taken = [1 + k for k in range(nuisances)] + [1 + nuisances + k for k in free]
+    a = total[np.ix_(taken, taken)].copy()
+    right = total[taken].copy()
+    a[range(nuisances), range(nuisances)] += 1.0
+    if z is not None:
+        right[:nuisances, 0] -= z
+    a[range(len(a)), range(len(a))] += 1e-9 * (1.0 + np.diag(a))
+    solved = np.linalg.solve(a, right) if taken else np.zeros((0, total.shape[1]))
+    left = total - right.T @ solved
+    keep = 1 + nuisances
+    prior = float(z @ z) if z is not None else 0.0
+    return Projected(np.asarray(left[0, keep:]), np.asarray(left[keep:, keep:]), float(left[0, 0]) + prior)
+
+
+def solve(total: Floats, nuisances: int, free: Sequence[int], z: Floats) -> tuple[Floats, Floats]:
+    """Steps of the nuisances and of the columns ``free``, and the covariance of the latter."""
+    taken = [1 + k for k in range(nuisances)] + [1 + nuisances + k for k in free]
+    a = total[np.ix_(taken, taken)].copy()
+    right = total[taken, 0].copy()
+    a[range(nuisances), range(nuisances)] += 1.0
+    right[:nuisances] -= z
+    a[range(len(a)), range(len(a))] += 1e-9 * (1.0 + np.diag(a))
+    inverse = np.linalg.inv(a)
+    return np.asarray(inverse @ right), np.asarray(inverse[nuisances:, nuisances:])

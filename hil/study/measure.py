@@ -1,0 +1,158 @@
+"""What the extension gains on manoeuvres that its fit never saw, beside doing nothing and the best wrong cause."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hil.study.diagnose import Contender, Diagnosis
+from hil.study.fit import Model, Term, Tracks
+from hil.study.linear import solve, sums
+from hil.study.noise import Frame
+from hil.study.table import Floats
+
+FOLDS = 4
+_DRAWS = 400
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Error of one track: root mean square as handed in, extended, and with the best wrong effect."""
+
+    channel: str
+    before: float
+    after: float
+    low: float
+    high: float
+    tuned: float
+    best_wrong: float | None
+
+
+def best_wrong(found: Diagnosis) -> Contender | None:
+    """The best contender of another effect for the first cause."""
+    if not found.contenders:
+        return None
+    right = found.final.terms[0].candidate.effect.name
+    return next((c for c in found.contenders[0] if c.term.candidate.effect.name != right), None)
+
+
+def folds(found: Diagnosis) -> list[Floats]:
+    """Weights of the manoeuvres each fold trains on; neighbours in time go to different folds."""
+    count = int(np.max(found.fitter.frame.blocks)) + 1
+    parts = min(FOLDS, count)
+    return [np.array([0.0 if k % parts == fold else 1.0 for k in range(count)]) for fold in range(parts)]
+
+
+def held_out(found: Diagnosis, model: Model) -> Tracks:
+    """Residual of every manoeuvre from a fit on the others."""
+    fitter, frame = found.fitter, found.fitter.frame
+    trained = folds(found)
+    if len(trained) < 2:
+        return model.residual
+    columns = dict(fitter.nuisance_columns)
+    if model.terms:
+        own = fitter.term_columns(model)
+        columns = {name: np.hstack([values, own[name]]) for name, values in columns.items()}
+    count = len(fitter.nuisances)
+    of = sums(model.residual, columns, frame, found.noise, count)
+    out = {name: np.zeros_like(values) for name, values in model.residual.items()}
+    blocks = np.asarray(frame.blocks, np.int64)
+    for weights in trained:
+        change, _ = solve(of.total(weights), count, range(len(model.terms)), model.z)
+        z = np.clip(model.z + np.clip(change[:count], -1.5, 1.5), -4.0, 4.0)
+        terms = tuple(
+            Term(t.candidate, float(np.clip(t.value + step, t.candidate.parameter.low, t.candidate.parameter.high)))
+            for t, step in zip(model.terms, change[count:], strict=True)
+        )
+        residual = fitter.residual(z, terms)
+        test = weights[blocks] < 0.5
+        for name, values in residual.items():
+            out[name][test] = values[test]
+    return out
+
+
+def gains(found: Diagnosis) -> list[Gain]:
+    """Gain of every track."""
+    frame = found.fitter.frame
+    wrong = best_wrong(found)
+    after = held_out(found, found.final) if found.final.terms else None
+    tuned = held_out(found, found.base)
+    other = held_out(found, wrong.model) if wrong is not None else None
+    listed = []
+    for name in frame.names:
+        before = _by_manoeuvre(found.nominal.residual[name], frame, name)
+        own = _by_manoeuvre((after or tuned)[name], frame, name)
+        low, high = _interval(own)
+        listed.append(
+            Gain(
+                name, _rms(before), _rms(own), low, high, _rms(_by_manoeuvre(tuned[name], frame, name)),
+                None if other is None else _rms(_by_manoeuvre(other[name], frame, name)),
+            )
+        )  # fmt: skip
+    return listed
+
+
+def _by_manoeuvre(values: Floats, frame: Frame, name: str) -> Floats:
+    """Sums of squares and counts, (manoeuvres, 2); the start speed's error within a manoeuvre is part of it."""
+    known = frame.present[name] > 0.5
+    blocks = np.asarray(frame.blocks, np.int64)[known]
+    count = int(np.max(frame.blocks)) + 1
+    squares = np.bincount(blocks, values[known, 0].astype(np.float64) ** 2, count)
+    return np.column_stack((squares, np.bincount(blocks, minlength=count)))
+
+
+def _rms(sums_by: Floats) -> float:
+    return float(np.sqrt(sums_by[:, 0].sum() / max(sums_by[:, 1].sum(), 1.0)))
+
+
+def _interval(sums_by: Floats) -> tuple[float, float]:
+    """95 % by bootstrap over manoeuvres."""
+    rng = np.random.default_rng(0)
+    drawn = rng.integers(0, len(sums_by), (_DRAWS, len(sums_by)))
+    total = sums_by[drawn].sum(axis=1)
+    values = np.sqrt(total[:, 0] / np.maximum(total[:, 1], 1.0))
+    low, high = np.quantile(values, (0.025, 0.975))
+    return float(low), float(high)
+
+
+def intervals(found: Diagnosis) -> list[tuple[float, float]]:
+    """95 % interval of each cause's value: curvature of the likelihood, widened where manoeuvres disagree."""
+    model, fitter = found.final, found.fitter
+    if not model.terms:
+        return []
+    own = fitter.term_columns(model)
+    columns = {name: np.hstack([values, own[name]]) for name, values in fitter.nuisance_columns.items()}
+    count = len(fitter.nuisances)
+    of = sums(model.residual, columns, fitter.frame, found.noise, count)
+    free = list(range(len(model.terms)))
+    _, covariance = solve(of.total(), count, free, model.z)
+    curvature = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    rng = np.random.default_rng(1)
+    manoeuvres = len(of.matrix)
+    draws = []
+    for _ in range(60 if manoeuvres >= 6 else 0):
+        weights = rng.multinomial(manoeuvres, np.full(manoeuvres, 1.0 / manoeuvres)).astype(np.float64)
+        change, _ = solve(of.total(weights), count, free, model.z)
+        draws.append(change[count:])
+    spread = curvature
+    if draws:
+        low, high = np.quantile(np.array(draws), (0.16, 0.84), axis=0)
+        spread = np.clip(0.5 * (high - low), curvature, 1.6 * curvature)
+    return [
+        (
+            float(np.clip(term.value - 1.96 * s, term.candidate.parameter.low, term.candidate.parameter.high)),
+            float(np.clip(term.value + 1.96 * s, term.candidate.parameter.low, term.candidate.parameter.high)),
+        )
+        for term, s in zip(model.terms, spread, strict=True)
+    ]
+
+
+def probabilities(contenders: Sequence[Contender], tempering: float = 1.5) -> list[float]:
+    """Softmax of the log-odds, tempered: two contenders are less far apart than an exact noise model would say."""
+    logs = np.array([(-0.5 * c.cost + c.evidence) / tempering for c in contenders])
+    logs -= logs.max()
+    weights = np.exp(logs)
+    return [float(v) for v in weights / weights.sum()]
+
+
+__all__ = ["Gain", "best_wrong", "gains", "held_out", "intervals", "probabilities"]

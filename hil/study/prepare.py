@@ -1,0 +1,294 @@
+"""Logs into what the plant replays: inputs on a 10 ms grid, cut points, segments, and the tracks to compare."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from hil.study.table import (
+    MOTOR_DEMAND,
+    MOTOR_TORQUE,
+    PRESSURE,
+    PRESSURE_DEMAND,
+    WHEEL_SPEED,
+    Floats,
+    Log,
+    UnusableError,
+)
+from plant.vectors import CUT, INPUT
+
+ROW_S = 0.01
+SLOW_MPS = 2.0  # below, wheel sensors and the contact's low-speed terms say little
+SETTLE_S = 1.0
+SHORTEST_S, LONGEST_S = 8.0, 25.0
+_RELEASED_PA, _RELEASED_NM = 1e5, 20.0
+_TRACK = {
+    "wheel": WHEEL_SPEED, "pressure": PRESSURE, "motor": MOTOR_TORQUE,
+    "ax": ("ax_mps2",), "ay": ("ay_mps2",), "yaw": ("yaw_rate_rad_s",), "gps": ("speed_mps",),
+}  # fmt: skip
+SINGLES = ("ax", "ay", "yaw", "gps")
+GROUPS = ("wheel", "pressure", "motor")
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """A stretch that is replayed freely from its start: rows of one drive, and the speed it starts with."""
+
+    first: int
+    last: int
+    start_wheel_rad_s: float
+    start_speed_mps: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """One log, ready for replay.
+
+    Attributes
+    ----------
+    inputs : (rows, INPUT.size), rows of 10 ms.  segments : in order, without gaps.
+    measured : group of tracks -> (samples, channels); NaN where nothing is known.  stride : rows a sample.
+    moving, resting : (samples,) where speeds, and where the body at rest is compared.
+    speed_mps, pressure_pa : (samples,) about the speed, and the largest pressure.
+    """
+
+    log: Log
+    inputs: Floats
+    segments: tuple[Segment, ...]
+    measured: dict[str, Floats]
+    stride: int
+    moving: Floats
+    resting: Floats
+    speed_mps: Floats
+    pressure_pa: Floats
+
+    @property
+    def samples(self) -> int:
+        """Samples compared."""
+        return len(self.inputs) // self.stride
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """All drives of one diagnosis."""
+
+    drives: tuple[Drive, ...]
+    cut: Floats
+    groups: tuple[str, ...]
+    sample_s: float
+    missing: tuple[str, ...]
+
+    @property
+    def segments(self) -> list[tuple[int, Segment]]:
+        """Every segment with its drive's number."""
+        return [(k, segment) for k, drive in enumerate(self.drives) for segment in drive.segments]
+
+    def blocks(self) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+        """Segment number of every sample of all drives, in order."""
+        numbers, parts = 0, []
+        for drive in self.drives:
+            part = np.zeros(drive.samples, np.int64)
+            for segment in drive.segments:
+                part[segment.first // drive.stride : segment.last // drive.stride] = numbers
+                numbers += 1
+            parts.append(part)
+        return np.concatenate(parts)
+
+
+def prepare(logs: Sequence[Log], radius_m: float) -> Case:
+    """Cut and grid logs.
+
+    Raises
+    ------
+    UnusableError
+        Nothing that moves or nothing that drives the brakes is measured.
+    """
+    there = set.intersection(*(set(log.channels) for log in logs))
+    if not (set(WHEEL_SPEED) & there or "speed_mps" in there):
+        raise UnusableError("neither wheel speeds nor a speed in every log; nothing says how the car moved")
+    driven = [
+        set(PRESSURE) <= there,
+        set(PRESSURE_DEMAND) <= there,
+        set(MOTOR_TORQUE) <= there,
+        set(MOTOR_DEMAND) <= there,
+    ]
+    if not any(driven):
+        raise UnusableError(
+            "neither pressures nor motor torques, measured or demanded; nothing says what braked the car"
+        )
+    cut = CUT.zeros()
+    cut[CUT.slice("pressure")] = 1.0 if driven[0] else 0.0
+    cut[CUT.slice("motor_torque")] = 1.0 if driven[2] else 0.0
+    groups = [name for name, names in _TRACK.items() if set(names) <= there]
+    if "wheel" not in groups and set(WHEEL_SPEED) & there:
+        groups.insert(0, "wheel")  # some wheels only: the others are empty
+    for name, demand in (("pressure", driven[1]), ("motor", driven[3])):
+        if name in groups and not demand:
+            groups.remove(name)  # nothing simulates it
+    rate = max(float(np.median(np.diff(log.t_s))) for log in logs)
+    stride = max(2, int(np.ceil(rate / ROW_S - 0.2)))
+    drives = tuple(_drive(log, groups, stride, radius_m) for log in logs)
+    moving = sum(float(drive.moving.sum()) for drive in drives) * stride * ROW_S
+    if moving < 4.0:
+        raise UnusableError(f"the car moves for {moving:.1f} s in all; expected 4 s or more above {SLOW_MPS:g} m/s")
+    return Case(drives, cut, tuple(groups), stride * ROW_S, tuple(_costs(there)))
+
+
+def _costs(there: set[str]) -> list[str]:
+    """What each missing channel costs."""
+    said = {
+        "ax_mps2": "without acceleration: road grade, drag and a wrong accelerometer cannot be told apart",
+        "speed_mps": "without a ground speed: tyre radius and speed scale are tied",
+        "yaw_rate_rad_s": "without yaw rate: brakes pulling to one side show in wheel speeds only",
+        "steer_rad": "without steering: the car is taken to drive straight",
+        "soc": "without state of charge: 70 % is taken, limits of the battery are not tested",
+    }
+    costs = [text for name, text in said.items() if name not in there]
+    if not set(WHEEL_SPEED) <= there:
+        costs.append("without all wheel speeds: single wheels, slip and radius cannot be judged")
+    if not set(PRESSURE) <= there:
+        costs.append("without pressure at the wheels: hydraulics and pad friction are one gain")
+    if not set(PRESSURE_DEMAND) <= there:
+        costs.append("without pressure demand: nothing is said of the pressure control")
+    if not (set(MOTOR_TORQUE) | set(MOTOR_DEMAND)) & there:
+        costs.append("without motor torque: the motors are taken to be off; no known force to weigh the car with")
+    return costs
+
+
+def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float) -> Drive:
+    begin, end = float(log.t_s[0]), float(log.t_s[-1])
+    rows = int((end - begin) / ROW_S) // stride * stride
+    grid = begin + ROW_S * np.arange(rows)
+
+    def on_grid(name: str, hold: bool = False) -> Floats:
+        values = log.channels.get(name)
+        if values is None:
+            return np.full(rows, np.nan)
+        good = np.isfinite(values)
+        if not good.any():
+            return np.full(rows, np.nan)
+        if hold:
+            late = 0.4 * float(np.median(np.diff(log.t_s[good]))) if good.sum() > 1 else 0.0  # stamps jitter
+            at = np.clip(np.searchsorted(log.t_s[good], grid + late, side="right") - 1, 0, None)
+            return np.asarray(values[good][at], np.float64)
+        filled: Floats = np.interp(grid, log.t_s[good], values[good])
+        nearest = np.clip(np.searchsorted(log.t_s[good], grid), 1, max(int(good.sum()) - 1, 1))
+        gap = np.diff(log.t_s[good])[nearest - 1] if good.sum() > 1 else np.full(rows, np.inf)
+        filled[gap > 0.25] = np.nan
+        return filled
+
+    def input_of(measured: Sequence[str]) -> Floats:
+        return np.column_stack([_filled(on_grid(name)) for name in measured])
+
+    inputs = np.zeros((rows, INPUT.size))
+    inputs[:, INPUT.slice("pressure_pa")] = input_of(PRESSURE)
+    inputs[:, INPUT.slice("motor_torque_nm")] = input_of(MOTOR_TORQUE)
+    for part, names, fallback in (
+        ("pressure_demand_pa", PRESSURE_DEMAND, PRESSURE), ("motor_demand_nm", MOTOR_DEMAND, MOTOR_TORQUE),
+    ):  # fmt: skip
+        chosen = names if log.has(*names) else fallback
+        inputs[:, INPUT.slice(part)] = np.column_stack([_filled(on_grid(name, hold=True)) for name in chosen])
+    inputs[:, INPUT.slice("steering_wheel_rad")] = _filled(on_grid("steer_rad"))[:, None]
+
+    wheels = np.column_stack([on_grid(name) for name in WHEEL_SPEED])
+    turning = np.any(np.isfinite(wheels))
+    spins = _median(wheels)
+    ground = on_grid("speed_mps")
+    speed = np.abs(_filled(spins * radius_m if turning else ground))
+    brakes = inputs[:, INPUT.slice("pressure_pa")].max(axis=1)
+    brakes = np.maximum(brakes, inputs[:, INPUT.slice("pressure_demand_pa")].max(axis=1))
+    motors = np.maximum(
+        np.abs(inputs[:, INPUT.slice("motor_torque_nm")]).max(axis=1),
+        np.abs(inputs[:, INPUT.slice("motor_demand_nm")]).max(axis=1),
+    )
+    quiet = (brakes < _RELEASED_PA) & (motors < _RELEASED_NM)
+    bounds = _bounds(speed, quiet, stride)
+    smooth = _smoothed(_filled(spins))
+    smooth_ground = _smoothed(_filled(ground)) if not turning else None
+    segments = tuple(
+        Segment(a, b, float(smooth[a]), None if smooth_ground is None else float(smooth_ground[a]))
+        for a, b in pairwise(bounds)
+    )
+    measured = {}
+    for name in groups:
+        columns = np.column_stack([on_grid(channel) for channel in _TRACK[name]])
+        measured[name] = averaged(columns, stride)
+        for k, channel in enumerate(_TRACK[name]):
+            measured[name][~_sampled(log, channel, begin, len(measured[name]), stride), k] = np.nan
+    slow = averaged(speed[:, None], stride)[:, 0]
+    after = max(int(SETTLE_S / (stride * ROW_S)), 1)
+    near_stop = np.convolve(slow < SLOW_MPS, np.ones(2 * after + 1), mode="same") > 0.5
+    resting = np.convolve(slow > 0.02, np.ones(2 * after + 1), mode="same") < 0.5
+    return Drive(
+        log,
+        inputs,
+        segments,
+        measured,
+        stride,
+        ~near_stop * 1.0,
+        resting * 1.0,
+        slow,
+        averaged(brakes[:, None], stride)[:, 0],
+    )
+
+
+def _sampled(
+    log: Log, channel: str, begin: float, samples: int, stride: int
+) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Where a channel was really measured: between sparse samples a straight line is no measurement."""
+    values = log.channels.get(channel)
+    if values is None:
+        return np.zeros(samples, bool)
+    t = log.t_s[np.isfinite(values)]
+    if len(t) < 2 or float(np.median(np.diff(t))) < 1.5 * stride * ROW_S:
+        return np.ones(samples, bool)
+    bins = np.round((t - begin) / (stride * ROW_S) - 0.25).astype(np.int64)
+    found = np.zeros(samples, bool)
+    found[bins[(bins >= 0) & (bins < samples)]] = True
+    return found
+
+
+def averaged(values: Floats, stride: int) -> Floats:
+    """Means of ``stride`` rows, (rows // stride, columns)."""
+    rows = len(values) // stride * stride
+    return np.asarray(values[:rows].reshape(-1, stride, values.shape[1]).mean(axis=1))
+
+
+def _filled(values: Floats) -> Floats:
+    good = np.isfinite(values)
+    if not good.any():
+        return np.zeros(len(values))
+    at = np.arange(len(values))
+    return np.asarray(np.interp(at, at[good], values[good]))
+
+
+def _median(wheels: Floats) -> Floats:
+    some = np.isfinite(wheels).any(axis=1)
+    found = np.full(len(wheels), np.nan)
+    found[some] = np.nanmedian(wheels[some], axis=1)
+    return found
+
+
+def _smoothed(values: Floats) -> Floats:
+    """Straight line through the 0.2 s that follow, its value at the start."""
+    n = 20
+    padded = np.concatenate((values, np.full(n - 1, values[-1])))
+    windows = np.lib.stride_tricks.sliding_window_view(padded, n)
+    x = np.arange(n) - (n - 1) / 2.0
+    slope = windows @ x / float(x @ x)
+    return np.asarray(windows.mean(axis=1) + slope * x[0])
+
+
+def _bounds(speed: Floats, quiet: Floats, stride: int) -> list[int]:
+    """Where to restart: at rest, else released after 8 s, else after 25 s."""
+    rows, bounds, begin = len(speed), [0], 0
+    rest = speed < 0.3
+    for row in range(1, rows - int(2.0 / ROW_S)):
+        since = (row - begin) * ROW_S
+        stopped = rest[row] and not rest[row - 1] and since > 2.0
+        if stopped or (since > SHORTEST_S and quiet[row] and speed[row] > SLOW_MPS + 1.0) or since > LONGEST_S:
+            begin = (row + (int(SETTLE_S / ROW_S) if stopped else 0)) // stride * stride
+            if begin > bounds[-1] and begin < rows - int(1.0 / ROW_S):
+                bounds.append(begin)
+    return [*bounds, rows]

@@ -1,0 +1,45 @@
+"""Sensor and clock effects on the study's arrays: on simulated channels, and taken back from measured inputs."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from hil.study.table import Floats
+from plant.effects.sensing.chain import Chain
+from plant.vectors import INPUT
+
+Stack = Mapping[str, Floats]
+_IMU = ("ax", "ay", "yaw")
+_INPUT = {"pressure": "pressure_pa", "motor": "motor_torque_nm"}
+
+
+def inverted(inputs: Floats, theta: Floats, row_s: float) -> Floats:
+    """Inputs as they were before the sensors; what loses information (a filter, a step) is left as it is."""
+    chain = Chain(theta)
+    if not any(chain.touches(node) for node in _INPUT):
+        return inputs
+    time_s: Floats = np.arange(len(inputs)) * row_s
+    true = inputs.copy()
+    for node, part in _INPUT.items():
+        if chain.touches(node):
+            where = INPUT.slice(part)
+            try:
+                true[:, where] = chain.undo(node, time_s, inputs[:, where])
+            except ValueError:
+                true[:, where] = inputs[:, where]
+    return true
+
+
+def sensed(stack: Stack, theta: Floats, row_s: float) -> dict[str, Floats]:
+    """Channels as the sensors give them."""
+    found = dict(stack)
+    chain = Chain(theta)
+    time_s: Floats = np.arange(len(next(iter(stack.values())))) * row_s
+    for node in ("wheel", "pressure", "motor"):
+        if node in found and chain.touches(node):
+            found[node] = chain.sense(node, time_s, found[node])
+    if chain.touches("imu") and any(name in found for name in _IMU):
+        rest = np.zeros((len(time_s), 1))
+        body = chain.sense("imu", time_s, np.hstack([found.get(name, rest) for name in _IMU]))
+        found |= {name: body[:, k : k + 1] for k, name in enumerate(_IMU) if name in found}
+    return found

@@ -1,0 +1,249 @@
+"""The report of a diagnosis: measured against simulated, what is left over, who was in the race, what it gains."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hil.report.report import Chart, Curve, Number, Panel, Report, Section, Table, Trace, Verdict
+from hil.report.units import BAR, Display, Unit
+from hil.study.answer import Answer
+from hil.study.fit import Model
+from hil.study.measure import Gain, probabilities
+from hil.study.patterns import UNITS, WORDS
+from hil.study.table import Floats
+
+_SENTENCE = {
+    "none": "Nothing beyond noise and the stated tolerances.",
+    "named": "A listed cause explains what the simulation missed.",
+    "cannot_tell_apart": "Several causes explain these data equally well.",
+    "unlisted": "No listed cause explains the data; where it acts is shown.",
+    "not_testable": "These manoeuvres excite too little to conclude anything.",
+}
+_SHOWN: dict[str, Unit] = {"wheel": Display("km/h", 3.6), "pressure": BAR, "motor": "N m"}
+_PANELS = (
+    ("wheel", "Wheel speed, mean of all wheels"),
+    ("ax", "Longitudinal acceleration"),
+    ("pressure", "Pressure, mean"),
+)
+
+
+def build_report(answer: Answer, sources: Sequence[str]) -> Report:
+    """Build the report."""
+    content, found = answer.json, answer.found
+    verdict = content["verdict"]
+    return Report(
+        title="Measured data against the simulation",
+        verdict=Verdict.PASSED if verdict in ("none", "named") else Verdict.INCOMPLETE,
+        reason=_headline(content),
+        numbers=tuple(_numbers(answer)),
+        sections=(_comparison(answer), _missed(answer), _race(answer), _gained(answer), _limits(answer)),
+        provenance={
+            "logs": list(sources), "segments": len(found.case.segments), "replays": found.fitter.rig.runs,
+            "extension": content["extension"] or "not written", "remarks": content["remarks"],
+        },
+    )  # fmt: skip
+
+
+def _headline(content: dict[str, object]) -> str:
+    causes = content["causes"]
+    text = _SENTENCE[str(content["verdict"])]
+    if isinstance(causes, list) and causes:
+        named = "; ".join(f"{c['effect']} ({c['wheel']})" for c in causes)
+        text = f"{named}: {text[0].lower()}{text[1:]}"
+    return text
+
+
+def _numbers(answer: Answer) -> list[Number]:
+    numbers = [Number("Verdict", answer.json["verdict"].replace("_", " "))]
+    for cause in answer.json["causes"]:
+        for name, entry in cause["parameters"].items():
+            low, high = entry["ci95"]
+            label = f"{cause['effect']} {name}, {cause['wheel']}"
+            numbers.append(Number(label, entry["value"], entry["unit"], note=f"95 %: {low:.4g} to {high:.4g}"))
+        numbers.append(Number(f"Probability of {cause['effect']}", 100.0 * cause["probability"], "%"))
+    best = _most_gained(answer.gains)
+    if best is not None and best.before > 0.0:
+        note = f"{WORDS[best.channel]}, on manoeuvres no fit saw"
+        numbers.append(Number("Held-out error removed", 100.0 * (1.0 - best.after / best.before), "%", note=note))
+    return numbers
+
+
+def _most_gained(gains: Sequence[Gain]) -> Gain | None:
+    shown = [g for g in gains if g.channel in ("wheel.mean", "ax", "gps", "pressure.mean", "motor.mean")]
+    return max(shown, key=lambda g: 1.0 - g.after / max(g.before, 1e-12), default=None)
+
+
+def _joined_time(answer: Answer) -> tuple[Floats, Floats]:
+    """Time over all logs in a row, and a gap before each log."""
+    times, gaps, begin = [], [], 0.0
+    for drive in answer.found.case.drives:
+        times.append(begin + np.arange(drive.samples) * answer.found.case.sample_s)
+        gap = np.zeros(drive.samples, bool)
+        gap[0] = True
+        gaps.append(gap)
+        begin = float(times[-1][-1]) + 1.0
+    return np.concatenate(times), np.concatenate(gaps)
+
+
+def _comparison(answer: Answer) -> Section:
+    """Measured, as handed in, and extended, over all logs in a row; residuals below."""
+    found = answer.found
+    t, gaps = _joined_time(answer)
+    measured = found.fitter.rig.measured()
+    panels = []
+    for group, title in _PANELS:
+        if group not in found.case.groups:
+            continue
+        factor = found.fitter.radius if group == "wheel" else 1.0
+        unit: Unit = _SHOWN.get(group, "m/s²")
+        known = np.nanmean(measured[group], axis=1) * factor
+        traces = [Trace("measured", t, np.where(gaps, np.nan, known), "demand")]
+        for name, model in _models(answer):
+            simulated = np.nanmean(model.stack[group], axis=1) * factor
+            traces.append(
+                Trace(name, t, np.where(gaps, np.nan, simulated), group="rl" if name == "handed in" else "fl")
+            )
+        panels.append(Panel(title, unit, tuple(traces)))
+        residuals = []
+        for name, model in _models(answer):
+            left = known - np.nanmean(model.stack[group], axis=1) * factor
+            residuals.append(Trace(name, t, np.where(gaps, np.nan, left), group="rl" if name == "handed in" else "fl"))
+        panels.append(Panel(f"{title.split(',')[0]}: measured less simulated", unit, tuple(residuals)))
+    return Section(
+        "Measured against simulated", panels=tuple(panels),
+        text="The logs in a row, each replayed freely from measured inputs; the speed starts anew at every segment.",
+    )  # fmt: skip
+
+
+def _models(answer: Answer) -> list[tuple[str, Model]]:
+    found = answer.found
+    extended = found.final if found.final.terms else found.base
+    return [("handed in", found.nominal), ("extended" if found.final.terms else "tuned", extended)]
+
+
+def _missed(answer: Answer) -> Section:
+    rows = tuple(
+        (
+            w.channel,
+            *_scaled(w.rms, w.track),
+            *_scaled(w.noise, w.track)[:1],
+            round(w.rms / max(w.noise, 1e-12), 1),
+            w.pattern,
+        )
+        for w in sorted(answer.wrongs, key=lambda w: -w.rms / max(w.noise, 1e-12))
+    )
+    table = Table(
+        "What the simulation as handed in misses", ("channel", "rms", "unit", "noise", "rms/noise", "goes with"), rows
+    )
+    return Section("What is wrong", tables=(table,), charts=tuple(_residual_charts(answer)))
+
+
+def _scaled(value: float, track: str) -> tuple[float, str]:
+    group = track.split(".")[0]
+    if group == "pressure":
+        return float(f"{value * 1e-5:.3g}"), "bar"
+    return float(f"{value:.3g}"), UNITS[group]
+
+
+def _residual_charts(answer: Answer) -> list[Chart]:
+    """Residual of the acceleration over what it may go with, in bins, before and after."""
+    found = answer.found
+    if "ax" not in found.case.groups:
+        return []
+    pressure = np.concatenate([d.pressure_pa for d in found.case.drives])
+    speed = np.concatenate([d.speed_mps for d in found.case.drives])
+    known = found.fitter.frame.present["ax"] > 0.5
+    charts = []
+    for title, x, mask, label, unit in (
+        ("Acceleration residual over pressure", pressure, known, "pressure", BAR),
+        ("Acceleration residual over speed, braking", speed, known & (pressure > 3e5), "speed", Display("km/h", 3.6)),
+    ):
+        curves = []
+        for name, model in _models(answer):
+            left = model.residual["ax"][:, 0]
+            curve = _binned(x[mask], left[mask], name)
+            if curve is not None:
+                curves.append(curve)
+        if curves:
+            charts.append(Chart(title, label, unit, "measured less simulated", "m/s²", tuple(curves)))
+    return charts
+
+
+def _binned(x: Floats, y: Floats, name: str) -> Curve | None:
+    if len(x) < 100 or np.ptp(x) <= 0.0:
+        return None
+    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, 13)))
+    at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
+    rows = [
+        (x[at == k].mean(), y[at == k].mean(), y[at == k].std()) for k in range(len(edges) - 1) if (at == k).sum() > 10
+    ]
+    if len(rows) < 3:
+        return None
+    centre, mean, spread = (np.array(v) for v in zip(*rows, strict=True))
+    return Curve(name, centre, mean, mean - spread, mean + spread, group="rl" if name == "handed in" else "fl")
+
+
+def _race(answer: Answer) -> Section:
+    """Who was in the race, and how far apart they are."""
+    found = answer.found
+    tables = []
+    for k, listed in enumerate(found.contenders):
+        chances = probabilities(listed)
+        rows = tuple(
+            (
+                c.term.candidate.effect.title, c.term.candidate.name, float(f"{c.term.value:.4g}"),
+                c.term.candidate.parameter.unit, round(c.cost - listed[0].cost, 1), round(100.0 * p, 1),
+            )
+            for c, p in zip(listed, chances, strict=True)
+        )  # fmt: skip
+        tables.append(
+            Table(
+                f"Cause {k + 1}: candidates, fitted non-linearly",
+                ("candidate", "name", "value", "unit", "Δχ² to the best", "probability %"),
+                rows,
+                note="Below Δχ² 9.2 two candidates are rivals.",
+            )
+        )
+    top = sorted(found.screened, key=lambda s: -s.gain)[:15]
+    screened = tuple(
+        (s.candidate.name, round(s.gain, 1), float(f"{s.value:.4g}"), s.candidate.parameter.unit) for s in top
+    )
+    tables.append(
+        Table(
+            "Screen: one linear step each, against noise and tolerances",
+            ("candidate", "Δχ²", "value", "unit"),
+            screened,
+            note=f"Asked of a cause: Δχ² {found.least_gain:.0f}.",
+        )
+    )
+    bars = Curve("gain", np.arange(1.0, len(top) + 1.0), np.array([s.gain for s in top]), style="points")
+    asked = Curve("asked", np.array([1.0, float(max(len(top), 2))]), np.full(2, found.least_gain), style="demand")
+    chart = Chart("Explained by each candidate alone", "rank in the screen", "", "Δχ²", "", (bars, asked))
+    return Section("Candidates", tables=tuple(tables), charts=(chart,) if top else ())
+
+
+def _gained(answer: Answer) -> Section:
+    rows = tuple(
+        (
+            WORDS[g.channel], *_scaled(g.before, g.channel)[:1], *_scaled(g.tuned, g.channel)[:1],
+            None if g.best_wrong is None else _scaled(g.best_wrong, g.channel)[0], _scaled(g.after, g.channel)[0],
+            f"{_scaled(g.low, g.channel)[0]:.3g} to {_scaled(g.high, g.channel)[0]:.3g}",
+            _scaled(g.after, g.channel)[1],
+        )
+        for g in answer.gains
+    )  # fmt: skip
+    table = Table(
+        "Free-running error on manoeuvres that no fit saw (root mean square)",
+        ("channel", "handed in", "tuned, no effect", "best wrong effect", "extended", "95 %", "unit"), rows,
+    )  # fmt: skip
+    return Section("Gain", tables=(table,))
+
+
+def _limits(answer: Answer) -> Section:
+    content = answer.json
+    rows = [("not testable with these manoeuvres", ", ".join(content["not_testable"]) or "-")]
+    rows += [("missing channel", text) for text in content["missing"]]
+    rows += [("remark", text) for text in content["remarks"]]
+    if content["decide_with"]:
+        rows.append(("drive this instead", ", ".join(content["decide_with"])))
+    return Section("What these data cannot show", tables=(Table("Limits", ("what", "which"), tuple(rows)),))

@@ -1,0 +1,121 @@
+"""The canonical table: one log as SI channels over one time base."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.errors import BrakebenchError
+
+Floats = NDArray[Any]  # of numbers; float64 unless a docstring says otherwise
+WHEELS = ("fl", "fr", "rl", "rr")
+
+
+def four(stem: str, unit: str) -> tuple[str, ...]:
+    """Names of a quantity's channels at the wheels."""
+    return tuple(f"{stem}_{wheel}_{unit}" for wheel in WHEELS)
+
+
+WHEEL_SPEED = four("wheel_speed", "rad_s")
+PRESSURE = four("pressure", "pa")
+PRESSURE_DEMAND = four("pressure_demand", "pa")
+MOTOR_TORQUE = four("motor_torque", "nm")
+MOTOR_DEMAND = four("motor_torque_demand", "nm")
+SINGLE = ("ax_mps2", "ay_mps2", "yaw_rate_rad_s", "steer_rad", "pedal", "soc", "speed_mps")
+CHANNELS = (*WHEEL_SPEED, *PRESSURE, *PRESSURE_DEMAND, *MOTOR_TORQUE, *MOTOR_DEMAND, *SINGLE)
+"""Every channel a table may have beside ``t_s``; all are optional."""
+
+PLAUSIBLE = {
+    "wheel_speed": (-400.0, 400.0),
+    "pressure": (-2e6, 4e7),
+    "motor_torque": (-5000.0, 5000.0),
+    "ax": (-40.0, 40.0),
+    "ay": (-40.0, 40.0),
+    "yaw_rate": (-5.0, 5.0),
+    "steer": (-20.0, 20.0),
+    "pedal": (-0.2, 1.2),
+    "soc": (-0.05, 1.05),
+    "speed": (-10.0, 120.0),
+}
+SHORTEST_S = 2.0
+SLOWEST_HZ = 5.0
+
+
+class UnusableError(BrakebenchError):
+    """Measured data that no conclusion can be drawn from; the message says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """One recording.
+
+    Attributes
+    ----------
+    name : file it is from.
+    t_s : (n,) strictly increasing, s.
+    channels : name of `CHANNELS` -> (n,) values; NaN where there is none.
+    direction : +1 or -1, which way along the road.
+    disc_temperature_k : at the start, None where nobody knows.
+    remarks : what was done to the data, for the report.
+    """
+
+    name: str
+    t_s: Floats
+    channels: Mapping[str, Floats]
+    direction: int = 1
+    disc_temperature_k: float | None = None
+    remarks: tuple[str, ...] = field(default=())
+
+    def has(self, *names: str) -> bool:
+        """Whether all these channels are there."""
+        return all(name in self.channels for name in names)
+
+
+def make_log(name: str, t_s: Floats, channels: Mapping[str, Floats], remarks: tuple[str, ...] = ()) -> Log:
+    """A log after all checks.
+
+    Raises
+    ------
+    UnusableError
+        A clock that stands still or runs backwards, too short, too slow, no channel, values no car has.
+    """
+    t_s = np.asarray(t_s, np.float64)
+    known = {key: np.asarray(value, np.float64) for key, value in channels.items() if key in CHANNELS}
+    said = list(remarks)
+    odd = sorted(set(channels) - set(known))
+    if odd:
+        said.append(f"columns nobody here knows are left out: {', '.join(odd[:12])}")
+    known = {key: value for key, value in known.items() if np.isfinite(value).any()}
+    if not known:
+        raise UnusableError(f"{name}: no channel of the table is there; expected some of {', '.join(CHANNELS)}")
+    if not np.isfinite(t_s).all():
+        raise UnusableError(f"{name}: t_s has {int((~np.isfinite(t_s)).sum())} values that are no time; mend the clock")
+    steps = np.diff(t_s)
+    if len(steps) and (steps < 0.0).any():
+        at = int(np.argmax(steps < 0.0))
+        raise UnusableError(f"{name}: the clock runs backwards at row {at + 1} ({t_s[at]:g} to {t_s[at + 1]:g} s)")
+    if len(steps) and (steps == 0.0).any():
+        keep = np.concatenate((steps > 0.0, [True]))
+        said.append(f"{int((~keep).sum())} rows with a doubled time are left out")
+        t_s, known = t_s[keep], {key: value[keep] for key, value in known.items()}
+    length = float(t_s[-1] - t_s[0]) if len(t_s) > 1 else 0.0
+    if length < SHORTEST_S:
+        raise UnusableError(f"{name}: {length:.2f} s long; expected {SHORTEST_S:g} s or more (is t_s in seconds?)")
+    if len(t_s) / length < SLOWEST_HZ:
+        raise UnusableError(f"{name}: {len(t_s) / length:.2f} samples a second; expected {SLOWEST_HZ:g} or more")
+    for key, value in known.items():
+        low, high = next(limits for stem, limits in PLAUSIBLE.items() if key.startswith(stem))
+        outside = (value < low) | (value > high)
+        if outside.mean() > 0.01:
+            raise UnusableError(
+                f"{name}: {key} goes from {np.nanmin(value):g} to {np.nanmax(value):g}; expected {low:g} to {high:g}: "
+                "wrong unit? The name of a column says its unit"
+            )
+        if outside.any():
+            value = value.copy()
+            value[outside] = np.nan
+            known[key] = value
+            said.append(f"{int(outside.sum())} impossible values of {key} are left out")
+    return Log(name, t_s, known, remarks=tuple(said))

@@ -1,0 +1,116 @@
+"""Innovations of the noise model: what is left of a track, sample by sample, after all that the past foretells.
+
+The same linear filter goes over residuals and sensitivities, so a fit on its output is the fit of maximum likelihood.
+"""
+
+from collections.abc import Callable
+from typing import Any, cast
+
+import numpy as np
+from numba import njit
+
+from hil.study.table import Floats
+
+_UNKNOWN = 1e4  # variance of a start that nothing is known of
+_compile = cast(Callable[[Callable[..., Any]], Callable[..., Any]], njit(cache=True, nogil=True, error_model="numpy"))
+
+
+def _coloured(y: Floats, fresh: Floats, white: Floats, phi: float, colour: float, out: Floats) -> float:
+    columns = y.shape[1]
+    state = np.zeros(columns)
+    variance, likelihood = colour, 0.0
+    for t in range(y.shape[0]):
+        if fresh[t] > 0.5:
+            state[:] = 0.0
+            variance = colour
+        else:
+            for k in range(columns):
+                state[k] *= phi
+            variance = phi * phi * variance + (1.0 - phi * phi) * colour
+        if white[t] > 0.0:
+            total = variance + white[t]
+            gain, scale = variance / total, 1.0 / np.sqrt(total)
+            for k in range(columns):
+                innovation = y[t, k] - state[k]
+                state[k] += gain * innovation
+                out[t, k] = innovation * scale
+            variance -= gain * variance
+            likelihood -= 0.5 * (out[t, 0] * out[t, 0] + np.log(total))
+        else:
+            for k in range(columns):
+                out[t, k] = 0.0
+    return likelihood
+
+
+def _moving(
+    y: Floats, fresh: Floats, restart: Floats, white: Floats, step_s: float, colours: Floats, out: Floats
+) -> float:
+    # states: error of the speed, force disturbance, slope disturbance, disturbance of the accelerometer alone
+    columns = y.shape[2]
+    x = np.zeros((4, columns))
+    cov = np.zeros((4, 4))
+    h = np.zeros(4)
+    likelihood = 0.0
+    move = np.zeros((4, 4))
+    for t in range(y.shape[0]):
+        if fresh[t] > 0.5:
+            x[:] = 0.0
+            cov[:] = 0.0
+            for i in range(3):
+                cov[1 + i, 1 + i] = colours[i, 1]
+            cov[0, 0] = _UNKNOWN
+        else:
+            for k in range(columns):
+                x[0, k] += step_s * (x[1, k] + x[2, k])
+                for i in range(3):
+                    x[1 + i, k] *= colours[i, 0]
+            for i in range(4):
+                for j in range(4):
+                    move[i, j] = cov[i, j]
+            for j in range(4):
+                move[0, j] += step_s * (cov[1, j] + cov[2, j])
+                for i in range(3):
+                    move[1 + i, j] *= colours[i, 0]
+            for i in range(4):
+                cov[i, 0] = move[i, 0] + step_s * (move[i, 1] + move[i, 2])
+                for j in range(3):
+                    cov[i, 1 + j] = move[i, 1 + j] * colours[j, 0]
+            for i in range(3):
+                cov[1 + i, 1 + i] += (1.0 - colours[i, 0] ** 2) * colours[i, 1]
+            if restart[t] > 0.5:
+                for i in range(4):
+                    cov[0, i] = 0.0
+                    cov[i, 0] = 0.0
+                cov[0, 0] = _UNKNOWN
+                for k in range(columns):
+                    x[0, k] = 0.0
+        for m in range(3):
+            if white[t, m] <= 0.0:
+                for k in range(columns):
+                    out[t, m, k] = 0.0
+                continue
+            for i in range(4):  # speed, acceleration, ground speed
+                h[i] = (cov[i, 1] + cov[i, 3]) if m == 1 else cov[i, 0]
+            total = white[t, m] + ((h[1] + h[3]) if m == 1 else h[0])
+            scale = 1.0 / np.sqrt(total)
+            for k in range(columns):
+                expected = (x[1, k] + x[3, k]) if m == 1 else x[0, k]
+                innovation = y[t, m, k] - expected
+                for i in range(4):
+                    x[i, k] += h[i] / total * innovation
+                out[t, m, k] = innovation * scale
+            for i in range(4):
+                for j in range(4):
+                    cov[i, j] -= h[i] * h[j] / total
+            likelihood -= 0.5 * (out[t, m, 0] ** 2 + np.log(total))
+    return likelihood
+
+
+coloured = _compile(_coloured)
+"""White noise and AR(1) on one track: (samples, columns) in, innovations of variance 1 into ``out``; log-likelihood of
+the first column. ``white`` is the variance of each sample, 0 where nothing is compared; ``fresh`` begins a log."""
+moving = _compile(_moving)
+"""The moving car: (samples, 3 tracks, columns) of speed, acceleration, ground speed.
+
+``colours`` holds rows (factor from sample to sample, variance) of force, slope and accelerometer disturbance;
+``restart`` forgets the speed's error."""
