@@ -40,6 +40,7 @@ def _numbers(result: RunResult) -> tuple[Number, ...]:
         Number("Frames on the vehicle bus", result.frames_sent, ""),
         Number("Frames lost", result.frames_lost, "", limit="= 0", met=result.frames_lost == 0),
         Number("Frames corrupt", result.frames_corrupt, "", limit="= 0", met=result.frames_corrupt == 0),
+        Number("Link events", ", ".join(f"{name} {count}" for name, count in result.link_states.items()) or "none"),
         Number("Bus load", result.bus_load, PERCENT, "with worst-case stuff bits"),
         Number("Overruns", result.overruns, "", "ticks skipped by ECU and plant"),
         Number("Lateness p50 / p99 / max", f"{late.p50:.3f} / {late.p99:.3f} / {late.max:.3f}", "ms", "worse node"),
