@@ -24,6 +24,7 @@ COMMANDS = (
     "doctor",
     "perf",
     "hide",
+    "explain",
 )
 """Subcommands in the order of the help; each is a module of this package."""
 
