@@ -113,6 +113,16 @@ class PlantNode:
         return self._transmitter.frames(now_ns, self._tell(now_ns))
 
     @property
+    def model_state(self) -> Vector:
+        """State of the model at this tick (``STATE``), a copy."""
+        return self._x.copy()
+
+    @property
+    def pedal(self) -> float:
+        """Brake pedal travel from this tick on."""
+        return self._pedal
+
+    @property
     def inputs(self) -> Vector:
         """What the model is driven with from this tick on (``INPUT``), a copy."""
         return self._u.copy()

@@ -25,6 +25,8 @@ COMMANDS = (
     "perf",
     "hide",
     "explain",
+    "effects",
+    "sensitivities",
 )
 """Subcommands in the order of the help; each is a module of this package."""
 

@@ -54,7 +54,7 @@ MANOEUVRES: dict[str, Show] = {
     "coast_down": Show("130 km/h, nothing pressed, 12 s", _manoeuvre(36.0, 12.0, _direct())),
     "straight_stop": Show(
         "72 km/h, 30 bar, friction only, to standstill",
-        _manoeuvre(20.0, 5.5, _direct(((0.3, 0.0), (0.5, 30 * BAR))), pedal=((0.3, 0.0), (0.5, 0.55))),
+        _manoeuvre(20.0, 7.0, _direct(((0.3, 0.0), (0.5, 30 * BAR))), pedal=((0.3, 0.0), (0.5, 0.55))),
     ),
     "fast_stop": Show(
         "130 km/h, 30 bar, to standstill", _manoeuvre(36.0, 12.0, _direct(((0.3, 0.0), (0.5, 30 * BAR))))
