@@ -98,6 +98,7 @@ class _Search:
         if self.settings.relinearise and np.abs(model.z).max() > 1.5:
             self._nuisance_columns(model.z)
         model, noise = self.fitter.settle(model, noise, 1, 100)
+        model = self.fitter.fit(model, noise, 4)
         self.say(f"sensitivities of {len(self.candidates)} candidates")
         effect_columns = self._effect_columns(model)
         found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, noise, noise, nominal, model, model)
@@ -167,7 +168,7 @@ class _Search:
         # what the noise model had taken for noise: estimated again with the best leader in place
         tighter = self.fitter.estimated(best.model, noise, 80)
         fitted = [self._again(c, tighter) for c in fitted]
-        reference = self.fitter.fit(model, tighter, 1).cost
+        reference = self.fitter.fit(model, tighter, 3).cost
         loose = self.fitter.cost(model.residual, model.z, noise)
         fitted.sort(key=lambda c: c.cost - 2.0 * c.evidence)
         best = fitted[0]

@@ -13,7 +13,7 @@ from hil.study.vehicle import Nuisance
 from hil.study.world import Rig, Stack, World
 
 Tracks = dict[str, Floats]
-_LARGEST_STEP = 3.0
+_LARGEST_STEP, _FARTHEST = 3.0, 8.0
 _DIVERGED = 1e15
 
 
@@ -119,7 +119,7 @@ class Fitter:
         change, covariance = solve(self._total(model, own, noise), count, range(len(model.terms)), model.z)
         for share in (1.0, 0.4):
             dz = np.clip(change[:count] * share, -_LARGEST_STEP, _LARGEST_STEP)
-            z = np.clip(model.z + dz, -4.0, 4.0)
+            z = np.clip(model.z + dz, -_FARTHEST, _FARTHEST)
             terms = tuple(
                 Term(term.candidate, _bounded(term.candidate, term.value + share * float(step)))
                 for term, step in zip(model.terms, change[count:], strict=True)

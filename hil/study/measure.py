@@ -59,7 +59,7 @@ def held_out(found: Diagnosis, model: Model) -> Tracks:
     blocks = np.asarray(frame.blocks, np.int64)
     for weights in trained:
         change, _ = solve(of.total(weights), count, range(len(model.terms)), model.z)
-        z = np.clip(model.z + np.clip(change[:count], -1.5, 1.5), -4.0, 4.0)
+        z = np.clip(model.z + np.clip(change[:count], -1.5, 1.5), -8.0, 8.0)
         terms = tuple(
             Term(t.candidate, float(np.clip(t.value + step, t.candidate.parameter.low, t.candidate.parameter.high)))
             for t, step in zip(model.terms, change[count:], strict=True)

@@ -19,7 +19,8 @@ INDIFFERENT = 0.08
 @dataclass(frozen=True, eq=False)
 class Score:
     """One candidate: estimate by one linear step, gain in chi2, log of the Bayes factor against leaving it out,
-    and how many standard deviations its largest allowed value would make (``reach``) and its usual one (``usual``)."""
+    ``raw`` is the gain before what is too small to matter is taken off;
+    how many standard deviations its largest allowed value would make (``reach``) and its usual one (``usual``)."""
 
     candidate: Candidate
     value: float
@@ -28,6 +29,7 @@ class Score:
     reach: float
     usual: float
     information: float
+    raw: float = 0.0
 
 
 def scores(candidates: Sequence[Candidate], projected: Projected, offset: int, now: Sequence[float]) -> list[Score]:
@@ -51,12 +53,12 @@ def score(candidate: Candidate, b: float, q: float, now: float = 0.0) -> Score:
     step = b / (q + 1.0 / tau**2)
     step = float(np.clip(now + step, parameter.low, parameter.high)) - now
     gain = 2.0 * b * step - q * step * step
+    raw = gain
     blunt = max(1.0 - INDIFFERENT * abs(parameter.typical) / max(abs(now + step), 1e-300), 0.0)
     gain *= blunt * blunt
     evidence = 0.5 * (gain - (step / tau) ** 2) - 0.5 * float(np.log1p(q * tau * tau)) - float(np.log(candidate.places))
-    return Score(
-        candidate, now + step, gain, evidence, largest * float(np.sqrt(q)), tau / _USUAL * float(np.sqrt(q)), q
-    )
+    reach, usual = largest * float(np.sqrt(q)), tau / _USUAL * float(np.sqrt(q))
+    return Score(candidate, now + step, gain, evidence, reach, usual, q, raw)
 
 
 def threshold(looks: int, alpha: float) -> float:
@@ -70,7 +72,7 @@ def inflation(found: Sequence[Score]) -> float:
     Most candidates are absent; what half of them seem to explain measures the model's own error (genomic control,
     Devlin and Roeder 1999).
     """
-    shown = [item.gain for item in found if item.reach > SEEN]
+    shown = [item.raw for item in found if item.reach > SEEN]
     return float(np.clip(np.median(shown) / _MEDIAN_CHI2, 1.0, 6.0)) if shown else 1.0
 
 

@@ -33,7 +33,7 @@ def build_report(answer: Answer, sources: Sequence[str]) -> Report:
     verdict = content["verdict"]
     return Report(
         title="Measured data against the simulation",
-        verdict=Verdict.PASSED if verdict in ("none", "named") else Verdict.INCOMPLETE,
+        verdict={"none": Verdict.PASSED, "named": None}.get(verdict, Verdict.INCOMPLETE),
         reason=_headline(content),
         numbers=tuple(_numbers(answer)),
         sections=(_comparison(answer), _missed(answer), _race(answer), _gained(answer), _limits(answer)),
@@ -97,17 +97,19 @@ def _comparison(answer: Answer) -> Section:
         factor = found.fitter.radius if group == "wheel" else 1.0
         unit: Unit = _SHOWN.get(group, "m/s²")
         known = np.nanmean(measured[group], axis=1) * factor
-        traces = [Trace("measured", t, np.where(gaps, np.nan, known), "demand")]
+        shown = ~gaps & (found.fitter.frame.present.get("ax", ~gaps) > 0.5) if group == "ax" else ~gaps
+        traces = []
         for name, model in _models(answer):
             simulated = np.nanmean(model.stack[group], axis=1) * factor
             traces.append(
-                Trace(name, t, np.where(gaps, np.nan, simulated), group="rl" if name == "handed in" else "fl")
+                Trace(name, t, np.where(shown, simulated, np.nan), group="rl" if name == "handed in" else "fl")
             )
+        traces.append(Trace("measured", t, np.where(shown, known, np.nan), "demand"))
         panels.append(Panel(title, unit, tuple(traces)))
         residuals = []
         for name, model in _models(answer):
             left = known - np.nanmean(model.stack[group], axis=1) * factor
-            residuals.append(Trace(name, t, np.where(gaps, np.nan, left), group="rl" if name == "handed in" else "fl"))
+            residuals.append(Trace(name, t, np.where(shown, left, np.nan), group="rl" if name == "handed in" else "fl"))
         panels.append(Panel(f"{title.split(',')[0]}: measured less simulated", unit, tuple(residuals)))
     return Section(
         "Measured against simulated", panels=tuple(panels),
@@ -236,7 +238,26 @@ def _gained(answer: Answer) -> Section:
         "Free-running error on manoeuvres that no fit saw (root mean square)",
         ("channel", "handed in", "tuned, no effect", "best wrong effect", "extended", "95 %", "unit"), rows,
     )  # fmt: skip
-    return Section("Gain", tables=(table,))
+    return Section("Gain", tables=(table,), charts=_gain_charts(answer))
+
+
+def _gain_charts(answer: Answer) -> tuple[Chart, ...]:
+    """Held-out error of each channel as a share of the error as handed in."""
+    gains = [g for g in answer.gains if g.before > 0.0]
+    if not gains:
+        return ()
+    x = np.arange(1.0, len(gains) + 1.0)
+    before = np.array([g.before for g in gains])
+    own = np.array([g.after for g in gains]) / before
+    low, high = np.array([g.low for g in gains]) / before, np.array([g.high for g in gains]) / before
+    curves = [Curve("extended", x, own, low, high, "points", "fl")]
+    curves.append(Curve("tuned, no effect", x, np.array([g.tuned for g in gains]) / before, style="points", group="rr"))
+    if all(g.best_wrong is not None for g in gains):
+        wrong = np.array([g.best_wrong for g in gains], np.float64) / before
+        curves.append(Curve("best wrong effect", x, wrong, style="points", group="rl"))
+    curves.append(Curve("handed in", x, np.ones(len(gains)), style="demand"))
+    title = "Held-out error against the simulation as handed in"
+    return (Chart(title, "channel, in the order of the table", "", "error / error as handed in", "", tuple(curves)),)
 
 
 def _limits(answer: Answer) -> Section:

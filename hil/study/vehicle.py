@@ -18,19 +18,19 @@ from plant.model import pack
 from plant.parameters.plant import PlantParameters
 from plant.vectors import PARAMETER
 
-HALF_WIDTH_TO_SIGMA = 0.6  # a uniform number within +-1 has a standard deviation of 0.577
+HALF_WIDTH_TO_SIGMA = 0.5  # a tolerance is two standard deviations
 _CONSTANT_EPSILON_W = 1e7
 _CONSTANT_B_1_J = 2e-6
 _BRAKE_K = 423.15
 _STATED = 0.01
 _FORM = {
-    "motor_time_constant_s": 0.3, "ehb_dead_time_s": 0.15, "wheel_inertia_kg_m2": 0.1, "vehicle_cog_height_m": 0.05,
+    "motor_time_constant_s": 0.3, "ehb_dead_time_s": 0.15, "wheel_inertia_kg_m2": 0.1, "vehicle_cog_height_m": 0.15,
     "vehicle_yaw_inertia_kg_m2": 0.1, "vehicle_steering_ratio": 0.05,
 }  # fmt: skip
 _SUSPENSION = {
     "suspension_ride_rate_n_m": 0.3, "suspension_progression_n_m3": 1.0, "suspension_damping_ns_m": 0.3,
-    "suspension_brake_support_tangent": 0.6, "suspension_anti_roll_nm_rad": 0.7, "suspension_roll_centre_height_m": 1.0,
-    "vehicle_pitch_inertia_kg_m2": 0.2, "vehicle_roll_inertia_kg_m2": 0.2,
+    "suspension_brake_support_tangent": 0.6, "suspension_anti_roll_nm_rad": 0.7, "suspension_roll_centre_height_m": 3.0,
+    "vehicle_pitch_inertia_kg_m2": 0.6, "vehicle_roll_inertia_kg_m2": 0.2,
 }  # fmt: skip
 
 
@@ -296,9 +296,9 @@ def _nuisances(p: Floats, tolerance: Mapping[str, float], layout: Layout) -> lis
     # forms of curves that no vehicle set states: the tyre's near its peak and at the side, the roll of the body
     add("tyre_curve", [layout.slice("tyre_lex").start], [1.5])
     add("tyre_shape", [layout.slice("tyre_lcx").start], [0.1])
-    add("tyre_stiffness_load", [layout.slice("tyre_pkx3").start], [0.1])
+    add("tyre_stiffness_load", [layout.slice("tyre_pkx3").start], [0.3])
     add("tyre_friction_load", [layout.slice("tyre_pdx2").start], [0.04])
-    add("tyre_relaxation_load", [layout.slice("tyre_ptx2").start], [1.4])
+    add("tyre_relaxation_load", [layout.slice("tyre_ptx2").start], [3.0])
     add("wheel_brake_windup_time_s", [layout.slice("wheel_brake_windup_time_s").start], [0.006])
     add("tyre_lsgal", [layout.slice("tyre_lsgal").start], [0.5])
     add("tyre_lmuy", [layout.slice("tyre_lmuy").start], [0.15])

@@ -1,0 +1,57 @@
+"""Vehicle sets: six numbers are enough, unknown keys are told, tolerances become standard deviations."""
+
+import numpy as np
+import pytest
+
+from hil.study.table import UnusableError
+from hil.study.vehicle import HALF_WIDTH_TO_SIGMA, load_vehicle, paper_car, rest_friction
+
+SIX = {
+    "mass_kg": 1800.0,
+    "wheelbase_m": 2.8,
+    "cog_to_front_axle_m": 1.3,
+    "rolling_radius_m": 0.33,
+    "brake_gain_front_nm_pa": 2.5e-4,
+    "brake_gain_rear_nm_pa": 1.2e-4,
+}
+
+
+def test_six_numbers_make_a_car_with_a_constant_brake_gain() -> None:
+    car = load_vehicle(SIX)
+    brake, p = car.parameters.friction_brake, car.parameters
+    assert p.vehicle.mass_kg == 1800.0
+    assert p.vehicle.cog_to_axle_m == pytest.approx((1.3, 1.5))
+    for temperature in (280.0, 293.15):
+        mu = rest_friction(p, 293.15)
+        gain = 2.0 * mu * brake.efficiency * brake.piston_area_m2[0] * brake.effective_radius_m[0]
+        assert gain == pytest.approx(2.5e-4)
+        assert temperature > 0.0
+    assert not car.pad_temperature_matters
+    assert any("wide uncertainty" in text for text in car.remarks)
+
+
+def test_an_unknown_key_is_told_not_refused() -> None:
+    assert any("'colour'" in text for text in load_vehicle({**SIX, "colour": 3.0}).remarks)
+
+
+def test_a_tolerance_is_two_standard_deviations() -> None:
+    car = load_vehicle({**SIX, "mass_kg_tolerance": 60.0, "brake_gain_front_nm_pa_tolerance": 2.5e-5})
+    found = {n.name: (n.step[0], car.p[n.at[0]]) for n in car.nuisances}
+    assert found["vehicle_mass_kg"][0] == pytest.approx(HALF_WIDTH_TO_SIGMA * 60.0)
+    step, area = found["brake_gain_front"]
+    assert step == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.1 * area, rel=1e-3)
+
+
+def test_the_shipped_car_keeps_its_own_numbers() -> None:
+    car = paper_car()
+    assert car.parameters.vehicle.mass_kg == 1463.0
+    assert np.isfinite(car.p).all()
+
+
+@pytest.mark.parametrize("value", ["heavy", True, [], float("nan")])
+def test_what_is_no_number_is_refused(value: object) -> None:
+    if isinstance(value, str):
+        assert load_vehicle({**SIX, "colour": value})
+        return
+    with pytest.raises(UnusableError, match="expected a number"):
+        load_vehicle({**SIX, "mass_kg": value})

@@ -1,0 +1,58 @@
+"""The noise model: innovations are white with variance 1, and without it they are not."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from hil.study.whiten import coloured, moving
+
+STEP_S = 0.02
+
+
+def _ar1(n: int, size: float, tau_s: float, rng: np.random.Generator) -> np.ndarray:
+    phi = np.exp(-STEP_S / tau_s)
+    return lfilter([1.0], [1.0, -phi], size * np.sqrt(1.0 - phi * phi) * rng.standard_normal(n))
+
+
+def test_coloured_noise_becomes_white() -> None:
+    rng, n = np.random.default_rng(1), 20000
+    y = (_ar1(n, 0.5, 0.4, rng) + 0.2 * rng.standard_normal(n))[:, None]
+    fresh, white, out = np.zeros(n), np.full(n, 0.04), np.empty((n, 1))
+    fresh[0] = 1.0
+    coloured(y, fresh, white, np.exp(-STEP_S / 0.4), 0.25, out)
+    assert out.std() == pytest.approx(1.0, abs=0.03)
+    assert abs(np.corrcoef(out[1:, 0], out[:-1, 0])[0, 1]) < 0.03
+
+
+def _moving_car(n: int, rng: np.random.Generator) -> np.ndarray:
+    force = _ar1(n, 0.05, 1.0, rng)
+    y = np.zeros((n, 3, 1))
+    y[:, 0, 0] = np.cumsum(force) * STEP_S + 0.01 * rng.standard_normal(n)
+    y[:, 1, 0] = force + 0.02 * rng.standard_normal(n)
+    return y
+
+
+def _innovations(y: np.ndarray, force: float) -> np.ndarray:
+    n = len(y)
+    fresh, white, out = np.zeros(n), np.tile([1e-4, 4e-4, 0.0], (n, 1)), np.empty_like(y)
+    fresh[0] = 1.0
+    colours = np.array([[np.exp(-STEP_S), force**2], [0.5, 1e-12], [0.5, 1e-12]])
+    moving(y, fresh, np.zeros(n), white, STEP_S, colours, out)
+    return out[:, :2, 0]
+
+
+def test_a_force_disturbance_shows_in_speed_and_acceleration_as_one() -> None:
+    out = _innovations(_moving_car(10000, np.random.default_rng(2)), 0.05)
+    assert out[10:].std(axis=0) == pytest.approx([1.0, 1.0], abs=0.05)
+    assert abs(np.corrcoef(out[10:].T)[0, 1]) < 0.05
+
+
+def test_without_the_disturbance_in_the_model_nothing_is_white() -> None:
+    out = _innovations(_moving_car(10000, np.random.default_rng(2)), 1e-6)
+    assert out[10:, 0].std() > 3.0
+
+
+def test_what_is_not_measured_leaves_nothing() -> None:
+    y, out = np.ones((50, 1)), np.ones((50, 1))
+    coloured(y, np.zeros(50), np.zeros(50), 0.9, 1.0, out)
+    assert not out.any()
