@@ -1,0 +1,1 @@
+"""Faults of signals and frames, one family a file, deterministic by seed."""
