@@ -1,4 +1,4 @@
-"""From logs to the answer, on logs that the plant itself made: nothing is found in nothing, a dead weight by its name."""
+"""From logs to the answer, on logs that the plant itself made: nothing in nothing, a hidden drag by its name."""
 
 import json
 from pathlib import Path

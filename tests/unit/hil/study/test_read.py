@@ -50,7 +50,8 @@ def test_a_data_frame_is_a_log() -> None:
 def test_channel_map_scales_signs_and_offsets(tmp_path: Path) -> None:
     path = _csv(tmp_path / "a.csv", "clock,v,decel", _rows())
     (tmp_path / "map.toml").write_text(
-        'time = "clock"\n[speed_mps]\nsignal = "v"\nunit = "km/h"\n[ax_mps2]\nsignal = "decel"\nsign = -1\noffset = 0.1\n'
+        'time = "clock"\n[speed_mps]\nsignal = "v"\nunit = "km/h"\n'
+        '[ax_mps2]\nsignal = "decel"\nsign = -1\noffset = 0.1\n'
     )
     log = read_one(path, channel_map=load_map(tmp_path / "map.toml"))
     assert np.allclose(log.channels["speed_mps"], (20.0 - log.t_s) / 3.6)
