@@ -14,16 +14,22 @@ from ecu.law.types import UNKNOWN, ZERO, Four, Inputs, Source
 from ecu.parameters.ecu import EcuParameters
 
 Vector = NDArray[np.float64]
+PLAUSIBLE = (False, False, False, False)
+IMPLAUSIBLE_S = 1.0
 
 
 class Estimates(NamedTuple):
-    """Speed over ground, wheel torques (negative braking), pad friction with confidence 0..1, mass over nominal."""
+    """Speed over ground, wheel torques (negative braking), pad friction with confidence 0..1, mass over nominal.
+
+    ``implausible`` wheels have not turned as the car moves for longer than a wheel slides.
+    """
 
     speed_mps: float
     wheel_torque_nm: Four
     pad_friction: Four
     confidence: Four
     mass_factor: float
+    implausible: tuple[bool, bool, bool, bool] = PLAUSIBLE
 
 
 def _four(values: Vector, start: int) -> Four:
@@ -150,8 +156,14 @@ def estimate(state: Vector, z: Vector, parameters: EcuParameters, dt_s: float) -
         variance = state[at : at + 3 * (joint.N + 1) + 1 : joint.N + 1].tolist()
         full = parameters.compensation.confidence_full
         a, b, c, d = (1.0 - min(math.sqrt(max(v, 0.0)) / (full * m), 1.0) for v, m in zip(variance, mu, strict=True))
+        e, f, g, h = (slid > IMPLAUSIBLE_S for slid in _four(state, joint.SLID_S))
         return state, Estimates(
-            float(state[joint.SPEED]), _four(state, joint.TORQUE), mu, (a, b, c, d), float(state[joint.MASS])
+            float(state[joint.SPEED]),
+            _four(state, joint.TORQUE),
+            mu,
+            (a, b, c, d),
+            float(state[joint.MASS]),
+            (e, f, g, h),
         )
     state = paper.paper_step(state, z, paper_parameters(parameters), dt_s)
     return state, Estimates(

@@ -35,8 +35,9 @@ LOCKED = TORQUE + 4  # seconds that a wheel has stood while the car moves
 LAST_WHEEL = LOCKED + 4
 SPIN = LAST_WHEEL + 4  # speed and rate with which a wheel spins down
 SPIN_RATE = SPIN + 4
-PITCH, PITCH_RATE, LOAD_ACCELERATION, FORCE_LAG, RELEASED_S, STARTED, REJECTED_S = (SPIN_RATE + 4 + i for i in range(7))
-SIZE = SPIN_RATE + 11
+SLID_S = SPIN_RATE + 4  # how long a wheel has been sliding by now
+PITCH, PITCH_RATE, LOAD_ACCELERATION, FORCE_LAG, RELEASED_S, STARTED, REJECTED_S = (SLID_S + 4 + i for i in range(7))
+SIZE = SLID_S + 11
 
 # inputs
 AX, AY, YAW_RATE, STEER, DEMAND = 0, 1, 2, 3, 4
@@ -402,7 +403,7 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     if s[STARTED] == 0.0:
         if fastest < 0.0 or not body:
             return s
-        start(s, p, fastest * p[P_RADIUS])
+        start(s, p, np.nanmedian(z[WHEEL : WHEEL + 4]) * p[P_RADIUS])
         for i in range(4):
             s[MOTOR_LAG + i] = 0.0 if isnan(z[MOTOR + i]) else z[MOTOR + i]
     yaw_rate = 0.0 if isnan(z[YAW_RATE]) else z[YAW_RATE]
@@ -436,6 +437,7 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
         else:
             s[LOCKED + i] = 0.0
         s[LAST_WHEEL + i] = 0.0 if isnan(omega) else omega
+        s[SLID_S + i] = s[SLID_S + i] + dt if s[SLIDING + i] > 0.0 else 0.0
         sliding = sliding or s[SLIDING + i] > 0.0
 
     fast = speed > p[P_SPEED_MIN]

@@ -109,6 +109,7 @@ def supervise(
     inputs: Inputs,
     lost: tuple[bool, ...],
     pedal: PedalReading,
+    implausible: tuple[bool, bool, bool, bool],
     p: SupervisionParameters,
     dt_s: float,
 ) -> tuple[ModeMemory, Fault]:
@@ -118,11 +119,16 @@ def supervise(
     ----------
     lost : sources that have timed out, from `lost_sources`.
     pedal : what the two channels say.
+    implausible : wheels that do not turn as the car moves.
     """
     faults = _missing(inputs)
     for source, fault in _SOURCE_FAULT:
         if lost[source]:
             faults |= fault
+    if implausible[0] or implausible[1]:
+        faults |= Fault.WHEEL_SPEED_FRONT
+    if implausible[2] or implausible[3]:
+        faults |= Fault.WHEEL_SPEED_REAR
     if pedal.channel_1_lost:
         faults |= Fault.PEDAL_1
     if pedal.channel_2_lost:

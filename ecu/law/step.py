@@ -64,7 +64,9 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     p = parameters
     lost = modes.lost_sources(inputs, p.supervision)
     pedal = base_brake.read_pedal(inputs, lost[Source.PEDAL], p.supervision.pedal_disagreement)
-    mode_memory, faults = modes.supervise(memory.modes, inputs, lost, pedal, p.supervision, dt_s)
+    mode_memory, faults = modes.supervise(
+        memory.modes, inputs, lost, pedal, memory.estimates.implausible, p.supervision, dt_s
+    )
     mode = mode_memory.mode
 
     if math.isfinite(pedal.travel):
@@ -90,7 +92,7 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     factor_now = compensation.motor_factor(factor, mu, nominal, p.compensation)
     mass = p.vehicle.mass_kg * known.mass_factor
 
-    speeds = _usable_wheel_speeds(inputs, lost)
+    speeds = _usable_wheel_speeds(inputs, lost, known.implausible)
     wheel_speed = max(speeds) if speeds else 0.0
     speed = max(wheel_speed * p.vehicle.rolling_radius_m, 0.0)
     resistance = base_brake.driving_resistance(speed, mass, p.vehicle)
@@ -138,11 +140,14 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     return memory, outputs
 
 
-def _usable_wheel_speeds(inputs: Inputs, lost: tuple[bool, ...]) -> list[float]:
-    """Wheel speeds that are present and not timed out, rad/s."""
-    front = () if lost[Source.WHEEL_SPEED_FRONT] else inputs.wheel_speed_rad_s[:2]
-    rear = () if lost[Source.WHEEL_SPEED_REAR] else inputs.wheel_speed_rad_s[2:]
-    return [w for w in (*front, *rear) if math.isfinite(w)]
+def _usable_wheel_speeds(
+    inputs: Inputs, lost: tuple[bool, ...], implausible: tuple[bool, bool, bool, bool]
+) -> list[float]:
+    """Wheel speeds that are present, not timed out and plausible (or all that are there where none is), rad/s."""
+    gone = (lost[Source.WHEEL_SPEED_FRONT],) * 2 + (lost[Source.WHEEL_SPEED_REAR],) * 2
+    wheels = zip(inputs.wheel_speed_rad_s, gone, implausible, strict=True)
+    present = [(w, odd) for w, missing, odd in wheels if math.isfinite(w) and not missing]
+    return [w for w, odd in present if not odd] or [w for w, _ in present]
 
 
 def _usable_torque(inputs: Inputs, lost: tuple[bool, ...], mode: BrakeMode) -> Four:

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from dbc.bench_messages import PhysicalFault
+from dbc.messages import BrakeMode
+from ecu.law import estimator, joint_filter
 from hil.parameters import override
 from hil.reproduce import runs
 from plant.manoeuvre import Manoeuvre, SpeedPhase
@@ -74,6 +76,23 @@ def test_a_slippery_patch_is_told_from_the_pads(car, parameters):
         errors.append(np.sqrt(np.mean((run.estimated_torque_nm - run.wheel_torque_nm)[braking, 0] ** 2)))
     assert errors[0] < 25.0
     assert errors[0] < 0.4 * errors[1]
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.8, 1.2])
+def test_a_wheel_that_does_not_turn_as_the_car_moves_is_left_out_and_reported(car, parameters, monkeypatch, factor):
+    manoeuvre = Manoeuvre(20.0, 6.0, pedal=((1.0, 0.0), (1.3, 0.5)), speed_phases=(SpeedPhase(0.0, 1.0, 20.0),))
+    whole = estimator.measured
+
+    def broken(*arguments):
+        z = whole(*arguments)
+        z[joint_filter.WHEEL + 2] *= factor
+        return z
+
+    monkeypatch.setattr(estimator, "measured", broken)
+    run = runs.drive(manoeuvre, car, parameters, seed=5)
+    braking = steady(run, 2.0, 5.5)
+    assert set(run.mode[braking]) == {float(BrakeMode.DEGRADED)}
+    assert run.estimated_speed_mps[braking] == pytest.approx(run.speed_mps[braking], rel=0.03)
 
 
 def test_the_same_frames_give_the_same_bytes(car, parameters):
