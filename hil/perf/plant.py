@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from hil.perf import effects
 from hil.perf.row import Row, paired, time_per_call_ns
 from hil.rt.clock import monotonic_ns
 from hil.verify.car import paper_car
@@ -25,7 +26,7 @@ from plant.integrate import RUNGE_KUTTA_4, SEMI_IMPLICIT
 from plant.model import STEP_S, advance, healthy, initial_state, pack, replay
 from plant.parameters import PlantParameters
 from plant.road import DRY, road_table
-from plant.vectors import CUT, INPUT, OUTPUT, RATES
+from plant.vectors import BASE_RATES, CUT, INPUT, OUTPUT, RATES
 
 Vector = NDArray[np.float64]
 DURATION_S = 2.0
@@ -79,13 +80,14 @@ def reference() -> tuple[Vector, Vector]:
 
 def plain(error: float, exact: Vector, scale: Vector) -> dict[str, float]:
     """What the same source does without its compiler."""
+    base = slice(BASE_RATES.size)  # without the extra states of effects, which that process has not
     task = {
-        "state": start()[: RATES.size].tolist(), "inputs": bend().tolist(), "parameters": pack(car()).tolist(),
-        "duration_s": [DURATION_S], "error": [error], "exact": exact.tolist(), "scale": scale.tolist(),
+        "state": start()[base].tolist(), "inputs": bend().tolist(), "parameters": pack(car()).tolist(),
+        "duration_s": [DURATION_S], "error": [error], "exact": exact[base].tolist(), "scale": scale[base].tolist(),
     }  # fmt: skip
     done = subprocess.run(
         [sys.executable, "-m", "hil.perf.plant_child"], input=json.dumps(task), capture_output=True, text=True,
-        check=True, env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
+        check=True, env=os.environ | {"NUMBA_DISABLE_JIT": "1", "BRAKEBENCH_EFFECTS": "0"},
     )  # fmt: skip
     result: dict[str, float] = json.loads(done.stdout)
     return result
@@ -144,6 +146,7 @@ def measure() -> list[Row]:
             paired(f"{name} against the clock", lambda m=method: per_step_ns(m), lambda: STEP_S * 1e9,  # type: ignore[misc]
                    "real time", "ns/step", pairs=PAIRS)
         )  # fmt: skip
+    rows += effects.measure(per_step_ns)
     cores = len(os.sched_getaffinity(0))
     rows.append(
         paired(f"{CARS} cars on {cores} cores", lambda: batch_ns(cores), lambda: batch_ns(1), "one core", "ns/step",
