@@ -6,12 +6,17 @@ from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
 from plant.layout import Vector
 
-STEP_OF = {"wheel": "wheel_rad_s", "imu": "imu_mps2", "pressure": "pressure_pa", "motor": "motor_nm"}
+STEPS_OF = {
+    "wheel": ("wheel_rad_s",) * 4,
+    "imu": ("imu_mps2", "imu_mps2", "imu_rad_s"),
+    "pressure": ("pressure_pa",) * 4,
+    "motor": ("motor_nm",) * 4,
+}
 
 
 def sense(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
     """s' = q round(s/q)."""
-    step = number[STEP_OF[node]]
+    step = np.column_stack([number[name][:, 0] for name in STEPS_OF[node]])
     size = np.where(step > 0.0, step, 1.0)
     return np.where(step > 0.0, size * np.round(values / size), values)
 
@@ -26,6 +31,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("wheel_rad_s", "rad/s", 0.0, 1.0, 0.1),
         Parameter("imu_mps2", "m/s2", 0.0, 0.5, 0.1),
+        Parameter("imu_rad_s", "rad/s", 0.0, 0.05, 0.005),
         Parameter("pressure_pa", "Pa", 0.0, 200000.0, 50000.0),
         Parameter("motor_nm", "N m", 0.0, 10.0, 2.0),
     ),
