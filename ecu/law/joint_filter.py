@@ -55,6 +55,8 @@ PARAMETERS = 52
 
 G0 = 9.80665
 SLIDING_HOLD_S = 0.15
+COARSE_MPS = 0.1  # what tooth sensing can be off at low speed
+LOST_S, AGREE = 0.3, 0.03  # all wheels "slide" for so long and agree so well: it is the speed that is wrong
 REJECT_S = 0.5
 LOCKED_SHARE = 0.15  # of the speed of the car: slower than that a wheel may be locked
 SPIN_UP_RAD_S = 1.0  # faster in one sample: it is turning again
@@ -255,7 +257,7 @@ def watch_wheel(s: Vector, p: Vector, i: int, omega: float, ground: float, expec
     A toothed wheel reports standstill long after it: below about a tooth a sample the spin-down seen before goes on.
     """
     slip = (omega * p[P_RADIUS] - ground) / max(ground, 1.0)
-    if abs(slip - expected_slip) > p[P_SLIDE]:
+    if abs(slip - expected_slip) > p[P_SLIDE] + COARSE_MPS / max(ground, 1.0):
         s[SLIDING + i] = SLIDING_HOLD_S
     step = omega - s[LAST_WHEEL + i]
     s[SPIN + i] += s[SPIN_RATE + i] * dt
@@ -272,6 +274,24 @@ def watch_wheel(s: Vector, p: Vector, i: int, omega: float, ground: float, expec
     elif (s[SPIN + i] + 0.75 * s[SPIN_RATE + i] * dt <= 0.0 and slip < -0.5) or (slow and omega < STANDING_RAD_S):
         s[LOCKED + i] = dt
     return float(step / dt)
+
+
+@compiled
+def find_speed_again(s: Vector, z: Vector, p: Vector) -> None:
+    """Take the speed from the wheels where all of them seem to slide and yet agree, as after driving off."""
+    mean = 0.25 * (z[WHEEL] + z[WHEEL + 1] + z[WHEEL + 2] + z[WHEEL + 3])
+    if mean * p[P_RADIUS] < 0.7 * s[SPEED]:  # all locked, as on ice
+        return
+    for i in range(4):
+        if not abs(z[WHEEL + i] - mean) <= AGREE * mean:
+            return
+    s[SPEED] = mean * p[P_RADIUS]
+    for j in range(N):
+        s[COVARIANCE + SPEED * N + j] = 0.0
+        s[COVARIANCE + j * N + SPEED] = 0.0
+    s[COVARIANCE] = 0.25
+    for i in range(4):
+        s[SLIDING + i], s[SLID_S + i], s[LOCKED + i] = 0.0, 0.0, 0.0
 
 
 @compiled
@@ -440,6 +460,8 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
         s[SLID_S + i] = s[SLID_S + i] + dt if s[SLIDING + i] > 0.0 else 0.0
         sliding = sliding or s[SLIDING + i] > 0.0
 
+    if min(min(s[SLID_S], s[SLID_S + 1]), min(s[SLID_S + 2], s[SLID_S + 3])) > LOST_S:
+        find_speed_again(s, z, p)
     fast = speed > p[P_SPEED_MIN]
     if body and pressures and fast and not sliding:
         side_n = (rear_m / p[P_BASE]) * p[P_MASS] * s[MASS] * ay * np.sin(steer)

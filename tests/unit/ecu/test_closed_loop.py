@@ -100,3 +100,18 @@ def test_the_same_frames_give_the_same_bytes(car, parameters):
     first, second = (runs.drive(manoeuvre, car, parameters, seed=4, blending=0.5) for _ in range(2))
     assert first.pressure_demand_pa.tobytes() == second.pressure_demand_pa.tobytes()
     assert first.observer.tobytes() == second.observer.tobytes()
+
+
+def test_finds_its_speed_after_driving_off_and_keeps_it_on_ice(car, parameters):
+    away = Manoeuvre(0.0, 8.0, speed_phases=(SpeedPhase(0.0, 8.0, 15.0),), end_after_standstill_s=None)
+    run = runs.drive(away, car, parameters, seed=6)
+    assert set(run.mode) == {float(BrakeMode.NORMAL)}
+    late = run.time_s > 5.0
+    assert run.estimated_speed_mps[late] == pytest.approx(run.speed_mps[late], rel=0.02)
+
+    ice = Manoeuvre(
+        20.0, 4.0, pedal=((1.0, 0.0), (1.3, 0.7)), speed_phases=(SpeedPhase(0.0, 1.0, 20.0),),
+        road=(RoadSegment(-1e9), RoadSegment(30.0, 0.1, 0.1)),
+    )  # fmt: skip
+    run = runs.drive(ice, car, parameters, seed=6)
+    assert run.estimated_speed_mps == pytest.approx(run.speed_mps, abs=1.0)
