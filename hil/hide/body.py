@@ -14,8 +14,8 @@ from hil.hide.motors import motors
 from hil.hide.strengths import LAW_STEER_DRAG, LAW_STEP_DRAG, LAW_WAVE_ROLLING, E, S, Y
 
 Vector = NDArray[np.float64]
-GRAVITY_MPS2, NOMINAL_LOAD_N = 9.81, 4000.0
-SHAPE_X, SHAPE_Y, SIDE_FRICTION = 1.6, 1.35, 1.0
+GRAVITY_MPS2, NOMINAL_LOAD_N, RELAXATION_LOAD_N = 9.81, 4000.0, 3590.0
+SHAPE_X, SHAPE_Y, SIDE_FRICTION = 1.64, 1.35, 0.9
 FILM_S2_M3 = 0.33
 LINKS = 0.4  # share of the load transfer that the links pass at once, past the springs
 HUB_HZ, HUB_DAMPING = 15.0, 0.1
@@ -35,7 +35,7 @@ def road_height(s: float) -> float:
 
 @equation
 def wheel_load(x: Vector, i: int, mass: float, car: Car, e: Vector) -> float:
-    """Load of one wheel, N: static share, transfer by pitch and links, lateral transfer, lift, rough road.
+    """Load of one wheel, N: static share, transfer by springs, dampers and links, lateral transfer, lift, rough road.
 
     Mitschke/Wallentowitz, Dynamik der Kraftfahrzeuge: m h a / L between the axles, m h a / t across.
     """
@@ -44,7 +44,8 @@ def wheel_load(x: Vector, i: int, mass: float, car: Car, e: Vector) -> float:
     share = (rear_m if front else car.cog_to_front_axle_m) / car.wheelbase_m
     side = 1.0 - 2.0 * (i % 2)
     height = car.cog_height_m + e[E.cog_height, 0]
-    sprung = -x[S.pitch_rad] / (car.dive_rad_s2_m * (1.0 + e[E.pitch_dive, 0]))
+    damper_s = car.pitch_damping / (3.141592654 * car.pitch_frequency_hz)
+    sprung = -(x[S.pitch_rad] + damper_s * x[S.pitch_rate_rad_s]) / (car.dive_rad_s2_m * (1.0 + e[E.pitch_dive, 0]))
     along = LINKS * x[S.load_ax_mps2] + (1.0 - LINKS) * sprung
     load = 0.5 * mass * GRAVITY_MPS2 * share
     load += (-0.5 if front else 0.5) * mass * height * along / car.wheelbase_m
@@ -70,7 +71,8 @@ def wheel(x: Vector, i: int, steer: float, mass: float, car: Car, e: Vector, law
     """Tyre forces of one wheel and the rates of its slips, speed, hub and temperature.
 
     Relaxation: sigma k' = vs - |v| k (Pacejka, Tire and Vehicle Dynamics, section 7.2). Force: both slips, each scaled
-    by its stiffness, act as one; F = D sin(C atan(k / (C D))) along their direction (Pacejka 1987, without curvature).
+    by its stiffness, act as one along their direction; F = D sin(C atan(x - E (x - atan(x)))), x = k / (C D)
+    (Pacejka 1987), C and D between their longitudinal and lateral values.
     """
     front = i < 2
     side = 1.0 - 2.0 * (i % 2)
@@ -93,12 +95,12 @@ def wheel(x: Vector, i: int, steer: float, mass: float, car: Car, e: Vector, law
     carcass = (1.0 + e[E.slip_stiffness, i]) * (1.0 + 0.25 * loss)
     carcass *= 1.0 + e[E.tyre_temperature, i] * (x[S.tyre_k + i] - 313.15)
     stiff_x = car.slip_stiffness * (1.0 + car.slip_stiffness_load * dfz) * load * carcass
-    stiff_y = car.cornering_stiffness * (1.0 - 0.35 * dfz) * load
+    stiff_y = car.cornering_stiffness * (1.0 - 0.43 * dfz) * load
 
     omega = x[S.omega_rad_s + i]
     sliding = radius * omega - along
     speed = abs(along)
-    length = max(car.relaxation_length_m * (1.0 + e[E.tyre_relaxation, i]), 0.03)
+    length = max(car.relaxation_length_m * (1.0 + e[E.tyre_relaxation, i]) * load / RELAXATION_LOAD_N, 0.03)
     spare = max(1.0 - abs(x[S.slip + i]) * stiff_x / (3.0 * mu * load), 0.15)
     dx[S.slip + i] = (sliding - speed * x[S.slip + i]) / (length * spare)
     dx[S.side_slip + i] = (-across - speed * x[S.side_slip + i]) / (2.0 * length)
@@ -107,9 +109,12 @@ def wheel(x: Vector, i: int, steer: float, mass: float, car: Car, e: Vector, law
     pull_x = stiff_x * x[S.slip + i] + slow * sliding
     pull_y = stiff_y * x[S.side_slip + i] - slow * across
     pull = sqrt(pull_x * pull_x + pull_y * pull_y) + 1e-9
-    shape = SHAPE_X if abs(pull_x) >= abs(pull_y) else SHAPE_Y
-    peak = mu * load * (1.0 if abs(pull_x) >= abs(pull_y) else SIDE_FRICTION)
-    force = peak * sin(shape * atan(pull / (shape * peak)))
+    share = (pull_x / pull) ** 2
+    shape = SHAPE_Y + (SHAPE_X - SHAPE_Y) * share
+    peak = mu * load * (SIDE_FRICTION + (1.0 - SIDE_FRICTION) * share)
+    bent = pull / (shape * peak)
+    bent -= share * (car.tyre_curvature + car.tyre_curvature_load * dfz) * (bent - atan(bent))
+    force = peak * sin(shape * atan(bent))
     force_x, force_y = force * pull_x / pull, force * pull_y / pull
     y[Y.tyre_n + i], y[Y.load_n + i] = force_x, load
 
@@ -147,7 +152,8 @@ def rates(
     """Rates of all states.
 
     m (v' - vy r) = sum Fx - 1/2 rho CdA (v + wind)^2 - m g sin(grade) + m (gust - slope). What the accelerometer feels
-    has no g sin(grade) of the road, but turns with the body: a cos(pitch) - g sin(pitch), nose down positive.
+    has no g sin(grade) of the road, but turns with the body: a cos(pitch) - g sin(pitch), nose down positive, and
+    g sin(roll) across.
     """
     dx[:] = 0.0
     y[:] = 0.0
@@ -184,11 +190,12 @@ def rates(
         w * w * (-dive * specific_x - x[S.pitch_rad]) - 2.0 * car.pitch_damping * w * x[S.pitch_rate_rad_s]
     )
     dx[S.load_ax_mps2] = (specific_x - x[S.load_ax_mps2]) / 0.02
-    dx[S.load_ay_mps2] = (specific_y - x[S.load_ay_mps2]) / 0.1
+    dx[S.load_ay_mps2] = (specific_y - x[S.load_ay_mps2]) / 0.04
     felt = specific_x * cos(x[S.pitch_rad]) - GRAVITY_MPS2 * sin(x[S.pitch_rad])
     arm = e[E.imu_position, 0]
     felt -= arm * yaw * yaw
     turned = specific_y + arm * dx[S.yaw_rate_rad_s]
+    turned += GRAVITY_MPS2 * sin(car.roll_rad_s2_m * x[S.load_ay_mps2])
     quick = 6.283185307 * car.imu_cutoff_hz
     dx[S.imu_ax_mps2] = quick * (felt - x[S.imu_ax_mps2])
     dx[S.imu_ay_mps2] = quick * (turned - x[S.imu_ay_mps2])

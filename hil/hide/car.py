@@ -12,10 +12,12 @@ REFERENCE_MU = 0.39832
 class Car(NamedTuple):
     """Numbers of one car, SI. What of them goes into ``vehicle.toml``: `hil.hide.files`.
 
-    Tyre: longitudinal force D sin(C atan(K s / (C D))), K = ``slip_stiffness`` Fz (1 + ``slip_stiffness_load`` dfz),
+    Tyre: force D sin(C atan(x - E (x - atan(x)))), x = K s / (C D), E = ``tyre_curvature`` +
+    ``tyre_curvature_load`` dfz, K = ``slip_stiffness`` Fz (1 + ``slip_stiffness_load`` dfz),
     D = ``tyre_friction`` Fz (1 + ``tyre_friction_load`` dfz), dfz = Fz / 4000 N - 1.
     Brake: torque = ``brake_gain`` mu / 0.398 (p - ``threshold_pressure``), mu and its temperature by Ricciardi et al.,
-    equations (3) and (4), with ``pad_a`` to ``pad_epsilon``. ``dive_rad_s2_m``: pitch angle over deceleration.
+    equations (3) and (4), with ``pad_a`` to ``pad_epsilon``. ``dive_rad_s2_m``: pitch angle over deceleration;
+    ``roll_rad_s2_m``: roll angle over lateral acceleration.
     """
 
     mass_kg: float = 1463.0
@@ -34,13 +36,16 @@ class Car(NamedTuple):
     dive_rad_s2_m: float = 0.00231
     pitch_frequency_hz: float = 1.4
     pitch_damping: float = 0.3
+    roll_rad_s2_m: float = 0.0063
     rolling_radius_m: float = 0.308
     wheel_inertia_kg_m2: float = 1.5
     slip_stiffness: float = 22.3
-    slip_stiffness_load: float = 0.23
-    tyre_friction: float = 1.15
+    slip_stiffness_load: float = 0.235
+    tyre_friction: float = 1.174
     tyre_friction_load: float = -0.14
-    cornering_stiffness: float = 17.5
+    tyre_curvature: float = 0.46
+    tyre_curvature_load: float = 0.25
+    cornering_stiffness: float = 16.8
     relaxation_length_m: float = 0.25
     brake_gain_front_nm_pa: float = 2.128e-4
     brake_gain_rear_nm_pa: float = 8.994e-5
@@ -92,10 +97,11 @@ TOLERANCE: dict[str, float] = {
     "dive_rad_s2_m": 0.00015,
     "pitch_frequency_hz": 0.07,
     "pitch_damping": 0.03,
+    "roll_rad_s2_m": 0.0003,
     "rolling_radius_m": 0.0015,
     "wheel_inertia_kg_m2": 0.1,
     "slip_stiffness": 2.2,
-    "tyre_friction": 0.08,
+    "tyre_friction": 0.05,
     "cornering_stiffness": 2.0,
     "relaxation_length_m": 0.06,
     "brake_gain_front_nm_pa": 0.8e-5,

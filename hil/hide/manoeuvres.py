@@ -126,7 +126,7 @@ def _full() -> list[_Drive]:
             + _triangles(13.0, 1.0, 4, 14 * BAR)(t)}, hold=_constant(22.0),
         ),
         _stop("m05_stop_72_cold", 20.0, 30.0, 7.5, 293.15),
-        _stop("m05_stop_130_firm", 36.0, 60.0, 7.5, 420.0),
+        _stop("m05_stop_130_firm", 36.0, 52.0, 7.5, 420.0),
         _stop("m05_stop_130_hot", 36.0, 30.0, 12.0, 590.0),
         _stop("m05_stop_72_hot", 20.0, 35.0, 6.0, 650.0, -1),
         _stop("m05_stop_40_soft", 11.0, 10.0, 10.0, 380.0, -1),
