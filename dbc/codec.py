@@ -8,6 +8,7 @@ it stand the conversion to SI, clamping to the signal's range and the SNA value.
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
+from math import ceil, floor
 from typing import Any
 
 from cantools.database.can import Message as DbcMessage
@@ -117,34 +118,51 @@ def compile_encoder(message: DbcMessage, fields: list[Field]) -> Callable[[tuple
     ``None`` and non-finite values become SNA; a signal without SNA refuses them with `CodecError`. Values outside
     the range are clamped to it.
     """
-    lines = ["def encode(values):", " little = big = 0"]
-    names = ", ".join(f"v{i}" for i in range(len(fields)))
-    lines.append(f" {names}{',' if len(fields) == 1 else ''} = values")
-    for i, (field, signal) in enumerate(zip(fields, payload_signals(message), strict=True)):
+    signals = payload_signals(message)
+    little = [f"v{i}" for i in range(len(fields))]
+    namespace: dict[str, Any] = {}
+    lines = ["def encode(values):", f" {', '.join(little)}{',' if len(fields) == 1 else ''} = values", " try:"]
+    words: dict[str, list[str]] = {"little_endian": [], "big_endian": []}
+    for i, (field, signal) in enumerate(zip(fields, signals, strict=True)):
         mask = (1 << signal.length) - 1
-        absent = f"refuse({field.signal!r}, v{i})" if field.sna is None else str(field.sna)
         scaled = f"v{i}" if field.si_per_unit == 1.0 else f"v{i} / {field.si_per_unit!r}"
+        shifted = "x" if signal.offset == 0 else f"(x - {_number(signal.offset)})"
+        raw = f"round({shifted})" if signal.scale == 1 else f"round({shifted} / {_number(signal.scale)})"
+        signed = f" & {mask}" if signal.is_signed else ""
+        namespace[f"odd{i}"] = _odd_value(message, field, signal)
         lines += [
-            f" if v{i} is None or not -1e300 < v{i} < 1e300: r = {absent}",
-            " else:",
             f"  x = {scaled}",
-            f"  if x < {_number(field.minimum)}: x = {_number(field.minimum)}",
-            f"  elif x > {_number(field.maximum)}: x = {_number(field.maximum)}",
-            f"  r = round((x - {_number(signal.offset)}) / {_number(signal.scale)})",
+            f"  v{i} = {raw}{signed} if {_number(field.minimum)} <= x <= {_number(field.maximum)} else odd{i}(v{i})",
         ]
-        word = "little" if signal.byte_order == "little_endian" else "big"
-        lines.append(f" {word} |= (r & {mask}) << {_shift(signal, message.length)}")
-    lines.append(f" return bytearray((little).to_bytes({message.length}, 'little'))")
-    if any(s.byte_order == "big_endian" for s in payload_signals(message)):
-        lines[-1] = (
-            f" word = little | int.from_bytes(big.to_bytes({message.length}, 'big'), 'little')\n"
-            f" return bytearray(word.to_bytes({message.length}, 'little'))"
-        )
+        shift = _shift(signal, message.length)
+        words[signal.byte_order].append(f"v{i} << {shift}" if shift else f"v{i}")
+    odd = ", ".join(f"odd{i}(w{i})" for i in range(len(fields)))
+    names = ", ".join(f"w{i}" for i in range(len(fields)))
+    comma = "," if len(fields) == 1 else ""
+    lines += [" except TypeError:", f"  {names}{comma} = values", f"  {', '.join(little)}{comma} = {odd}{comma}"]
+    word = " | ".join(words["little_endian"]) or "0"
+    if words["big_endian"]:
+        big = f"({' | '.join(words['big_endian'])}).to_bytes({message.length}, 'big')"
+        word = f"{word} | int.from_bytes({big}, 'little')"
+    lines.append(f" return bytearray(({word}).to_bytes({message.length}, 'little'))")
+    return _compile("\n".join(lines), "encode", namespace)
 
-    def refuse(signal_name: str, value: float | None) -> int:
-        raise CodecError(f"{message.name}.{signal_name}: expected a finite number, got {value!r}; it has no SNA value")
 
-    return _compile("\n".join(lines), "encode", {"refuse": refuse})
+def _odd_value(message: DbcMessage, field: Field, signal: DbcSignal) -> Callable[[float | None], int]:
+    """Raw value of any value of a signal: SNA for what is none, the range's end for what is beyond."""
+    mask = (1 << signal.length) - 1
+
+    def raw(value: float | None) -> int:
+        if value is None or not -1e300 < value < 1e300:
+            if field.sna is None:
+                raise CodecError(
+                    f"{message.name}.{field.signal}: expected a finite number, got {value!r}; it has no SNA value"
+                )
+            return field.sna & mask
+        x = min(max(value / field.si_per_unit, field.minimum), field.maximum)
+        return round((x - signal.offset) / signal.scale) & mask
+
+    return raw
 
 
 def compile_decoder(message: DbcMessage, fields: list[Field], make: Callable[..., Any]) -> Callable[[bytes], Any]:
@@ -157,19 +175,38 @@ def compile_decoder(message: DbcMessage, fields: list[Field], make: Callable[...
     for i, (field, signal) in enumerate(zip(fields, signals, strict=True)):
         word = "little" if signal.byte_order == "little_endian" else "big"
         shift = _shift(signal, message.length)
-        lines.append(f" r = ({word} >> {shift}) & {(1 << signal.length) - 1}")
-        if signal.is_signed:
-            lines.append(f" if r >= {1 << (signal.length - 1)}: r -= {1 << signal.length}")
+        moved = f"{word} >> {shift}" if shift else word
+        raw = f"{moved} & {(1 << signal.length) - 1}"
+        half = 1 << (signal.length - 1)
+        lines.append(f" r = ({raw} ^ {half}) - {half}" if signal.is_signed else f" r = {raw}")
         if field.enum is not None:
             namespace[f"enum{i}"] = {int(member): member for member in field.enum}
             lines.append(f" v{i} = enum{i}.get(r)")
             continue
-        plain = signal.scale == 1 and signal.offset == 0
-        lines.append(" x = r" if plain else f" x = r * {_number(signal.scale)} + {_number(signal.offset)}")
-        si = "" if field.si_per_unit == 1.0 else f" * {field.si_per_unit!r}"
-        slack = abs(signal.scale) * 1e-6  # the clamped end of a range must survive its own rounding
-        low, high = field.minimum - slack, field.maximum + slack
-        absent = "" if field.sna is None else f"r == {field.sna} or "
-        lines.append(f" v{i} = None if {absent}not {_number(low)} <= x <= {_number(high)} else x{si}")
-    lines.append(f" return make({', '.join(f'v{i}' for i in range(len(fields)))})")
+        value = "r" if signal.scale == 1 else f"r * {_number(signal.scale)}"
+        value += "" if signal.offset == 0 else f" + {_number(signal.offset)}"
+        if field.si_per_unit != 1.0:
+            value = f"({value}) * {field.si_per_unit!r}" if signal.offset else f"{value} * {field.si_per_unit!r}"
+        test = _raw_test(signal, field)
+        lines.append(f" v{i} = {value}" + (f" if {test} else None" if test else ""))
+    values = ", ".join(f"v{i}" for i in range(len(fields)))
+    if isinstance(make, type) and issubclass(make, tuple):  # spares a NamedTuple its own Python-made __new__
+        namespace["new"] = tuple.__new__
+        lines.append(f" return new(make, ({values},))")
+    else:
+        lines.append(f" return make({values})")
     return _compile("\n".join(lines), "decode", namespace)
+
+
+def _raw_test(signal: DbcSignal, field: Field) -> str:
+    """Condition on the raw value ``r`` for a usable value; empty where every raw value is one."""
+    lowest, highest = _raw_range(signal)
+    slack = abs(signal.scale) * 1e-6  # the clamped end of a range must survive its own rounding
+    ends = sorted((end - signal.offset) / signal.scale for end in (field.minimum - slack, field.maximum + slack))
+    first, last = max(lowest, ceil(ends[0])), min(highest, floor(ends[1]))
+    parts = [str(first), "<="] if first > lowest else []
+    parts += ["r"] + (["<=", str(last)] if last < highest else [])
+    test = [" ".join(parts)] if len(parts) > 1 else []
+    if field.sna is not None and first <= field.sna <= last:
+        test.append(f"r != {field.sna}")
+    return " and ".join(test)

@@ -6,7 +6,7 @@ from typing import TypeVar
 from dbc import e2e
 from dbc.contract import Message, MessageSpec, spec_of
 from dbc.e2e import Checker, Status
-from dbc.frame import Frame, LinkEvent, Received
+from dbc.frame import BusName, Frame, LinkEvent, Received
 
 M = TypeVar("M", bound=Message)
 
@@ -39,7 +39,7 @@ class Reception:
             self.status = self.checker.check(data)
         else:
             self.status = Status.OK if len(data) == self.spec.length else Status.WRONG_CRC
-        if self.status in e2e.USABLE:
+        if self.status is Status.OK or self.status is Status.OK_SOME_LOST:
             self.message = self.spec.decode(data)
             self.fresh = True
             self.valid_in_row += 1
@@ -60,24 +60,28 @@ class Receiver:
 
     def __init__(self, types: Iterable[type[Message]]) -> None:
         self.receptions = {t: Reception(spec_of(t)) for t in types}
-        self._by_key = {(r.spec.bus, r.spec.can_id): r for r in self.receptions.values()}
+        self._all = list(self.receptions.values())
+        # by bus and identifier, in two steps: hashing the name of a bus for each frame is slow
+        self._vehicle, self._bench = (
+            {r.spec.can_id: r for r in self._all if r.spec.bus is bus} for bus in (BusName.VEHICLE, BusName.BENCH)
+        )
         self.link_events: list[LinkEvent] = []
 
     def accept(self, now_ns: int, inbox: Sequence[Received]) -> None:
         """Take the inbox of the tick ``now_ns``; ``link_events`` then holds the tick's link events."""
         self.link_events = []
-        for reception in self.receptions.values():
+        for reception in self._all:
             reception.fresh = False
             reception.status = Status.NO_NEW_DATA
+        vehicle, bench = self._vehicle, self._bench
         for item in inbox:
             if isinstance(item, LinkEvent):
                 self.link_events.append(item)
                 continue
-            if item.extended:
-                continue
-            known = self._by_key.get((item.bus, item.can_id))
-            if known is not None:
-                known.accept(now_ns, item.data)
+            bus, can_id, data, _, extended = item
+            known = (vehicle if bus is BusName.VEHICLE else bench).get(can_id)
+            if known is not None and not extended:
+                known.accept(now_ns, data)
 
     def latest(self, message_type: type[M]) -> M | None:
         """Last usable message of a type, however old."""
@@ -112,29 +116,48 @@ class Transmitter:
     """
 
     def __init__(self) -> None:
-        self._slot: dict[type[Message], int] = {}
-        self._counter: dict[type[Message], int] = {}
+        self._state: dict[type[Message], _Sending] = {}
+
+    def _of(self, message_type: type[Message]) -> "_Sending":
+        state = self._state.get(message_type)
+        if state is None:
+            state = self._state[message_type] = _Sending(spec_of(message_type))
+        return state
 
     def due(self, message_type: type[Message], now_ns: int) -> bool:
         """Whether `frames` would send a message of this type at ``now_ns``."""
-        cycle_ns = spec_of(message_type).cycle_ns
-        return cycle_ns == 0 or self._slot.get(message_type) != now_ns // cycle_ns
+        state = self._of(message_type)
+        return state.cycle_ns == 0 or state.slot != now_ns // state.cycle_ns
 
     def frames(self, now_ns: int, outgoing: Iterable[Message]) -> list[Frame]:
         """Frames of the messages that are due, protected with their next counters."""
         frames = []
+        known = self._state
         for message in outgoing:
             kind = type(message)
-            spec = spec_of(kind)
-            if not self.due(kind, now_ns):
-                continue
-            if spec.cycle_ns:
-                self._slot[kind] = now_ns // spec.cycle_ns
-            payload = spec.encode(message)
-            if spec.data_id is None:
-                frames.append(Frame(spec.bus, spec.can_id, bytes(payload)))
-                continue
-            counter = self._counter.get(kind, 0)
-            self._counter[kind] = (counter + 1) % e2e.COUNTER_MODULUS
-            frames.append(Frame(spec.bus, spec.can_id, e2e.protect(spec.data_id, payload, counter)))
+            state = known.get(kind) or self._of(kind)
+            if state.cycle_ns:
+                slot = now_ns // state.cycle_ns
+                if slot == state.slot:
+                    continue
+                state.slot = slot
+            payload = state.encode(message)
+            if state.data_id is None:
+                data = bytes(payload)
+            else:
+                data = e2e.protect(state.data_id, payload, state.counter)
+                state.counter = (state.counter + 1) % e2e.COUNTER_MODULUS
+            frames.append(Frame(state.bus, state.can_id, data))
         return frames
+
+
+class _Sending:
+    """State of one sent message."""
+
+    __slots__ = ("bus", "can_id", "counter", "cycle_ns", "data_id", "encode", "slot")
+
+    def __init__(self, spec: MessageSpec) -> None:
+        self.bus, self.can_id, self.data_id, self.encode = spec.bus, spec.can_id, spec.data_id, spec.encode
+        self.cycle_ns = spec.cycle_ns
+        self.slot: int | None = None
+        self.counter = 0
