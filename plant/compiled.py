@@ -48,7 +48,7 @@ def entry(function: F) -> F:
 def _source_stamp() -> str:
     """Digest of every source file of the plant."""
     digest = hashlib.sha256(b"effects" if EFFECTS else b"")
-    for folder in ("plant", "plant.parameters", "plant.effects"):
+    for folder in ("plant", "plant.parameters", "plant.effects", "plant.effects.sensing"):
         for file in sorted(resources.files(folder).iterdir(), key=lambda f: f.name):
             if file.name.endswith(".py"):
                 digest.update(file.read_bytes())
