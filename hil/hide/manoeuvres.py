@@ -135,7 +135,7 @@ def _full() -> list[_Drive]:
             pressure={ALL: _steps((0.5, 18 * BAR), (2.0, 5 * BAR), (3.5, 0.0), (5.0, 18 * BAR), (6.5, 9 * BAR))},
             motor={ALL: _steps((2.0, -170.0), (3.5, -250.0), (5.0, 0.0), (6.5, -125.0))},
         ),
-        _Drive("m06_regen_stop", 5.0, 8.0, 350.0, motor={ALL: _steps((0.5, -260.0))}),
+        _Drive("m06_regen_stop", 5.0, 12.0, 350.0, motor={ALL: _steps((0.5, -550.0))}),
         _Drive("m07_slalom_stop", 13.0, 18.0, 350.0, steer=_slalom, hold=lambda t: np.where(t < 7.9, 18.0, np.nan),
                pressure={ALL: _ramps((8.0, 0.0), (8.3, 25 * BAR))}),
         _Drive("m08_motor_hard", 5.0, 18.0, 350.0,
