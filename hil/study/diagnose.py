@@ -178,7 +178,10 @@ class _Search:
         if gained < found.least_gain:
             self.say(f"{best.term.candidate.name} gains {gained:.1f}, {found.least_gain:.1f} is asked")
             return None
-        return best.model, tighter, fitted
+        polished = self.fitter.fit(best.model, tighter, 4, self.settings.relinearise)
+        polished, tighter = self.fitter.settle(polished, tighter, 2, 60)
+        fitted[0] = replace(best, model=polished, term=polished.terms[-1], cost=polished.cost)
+        return polished, tighter, fitted
 
     def _contender(self, model: Model, item: Score, noise: Noise) -> Contender:
         term = Term(item.candidate, item.value)

@@ -13,7 +13,7 @@ from hil.study.vehicle import Nuisance
 from hil.study.world import Rig, Stack, World
 
 Tracks = dict[str, Floats]
-_LARGEST_STEP, _FARTHEST = 3.0, 8.0
+_LARGEST_STEP, _FARTHEST = 8.0, 8.0
 _DIVERGED = 1e15
 
 
@@ -117,7 +117,7 @@ class Fitter:
     def _step(self, model: Model, own: Tracks, noise: Noise) -> Model | None:
         count = len(self.nuisances)
         change, covariance = solve(self._total(model, own, noise), count, range(len(model.terms)), model.z)
-        for share in (1.0, 0.4):
+        for share in (1.0, 0.4, 0.1):
             dz = np.clip(change[:count] * share, -_LARGEST_STEP, _LARGEST_STEP)
             z = np.clip(model.z + dz, -_FARTHEST, _FARTHEST)
             terms = tuple(

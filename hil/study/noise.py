@@ -15,6 +15,7 @@ _REFERENCE_MPS = 20.0
 MODES = np.array([[0.25, 0.25, 0.25, 0.25], [0.25, 0.25, -0.25, -0.25], [0.5, -0.5, 0.0, 0.0], [0.0, 0.0, 0.5, -0.5]])
 MODE_NAMES = ("mean", "front-rear", "left-right front", "left-right rear")
 _FLOOR = {"wheel": 5e-4, "ax": 2e-3, "gps": 2e-3, "ay": 2e-3, "yaw": 2e-4, "pressure": 500.0, "motor": 0.05}
+_LONGEST_S = 1.0  # what is slower is no noise but wants a cause
 _PRIOR_SAMPLES, _SCALES = 60.0, (0.4, 8.0)
 _LONG = ("wheel.mean", "ax", "gps")
 
@@ -226,7 +227,9 @@ def _estimate_side(name: str, values: Floats, frame: Frame, noise: Noise, budget
 
     def built(z: Floats) -> Noise:
         a, b, c, tau = np.exp(z)
-        track = Track(max(float(a), floor), float(b) if by_speed else 0.0, float(c), float(np.clip(tau, 0.02, 20.0)))
+        track = Track(
+            max(float(a), floor), float(b) if by_speed else 0.0, float(c), float(np.clip(tau, 0.02, _LONGEST_S))
+        )
         return replace(noise, tracks={**noise.tracks, name: track})
 
     def cost(z: Floats) -> float:
