@@ -21,6 +21,7 @@ PADS = {"pads -25 %": 0.75, "pads nominal": 1.0, "pads +25 %": 1.25}
 SLOWEST_MPS = 1.5
 SETTLED_S = 0.8
 ADAPTED = 0.10
+GRAVITY_MPS2 = 9.81
 Numbers = dict[str, float]
 
 
@@ -216,7 +217,9 @@ def weak_pads(condition: Condition, seed: int) -> Numbers:
         run = drive(manoeuvres.two_stops(condition.road()), plant, ecu, seed)
         second = onset(run, manoeuvres.STOP_AT_S + 10.0)
         k = slice(second + 60, second + 460)
-        reached = 100.0 * float(np.mean(-run.acceleration_mps2[k]) / np.mean(run.demanded_mps2[k]) - 1.0)
+        hill = GRAVITY_MPS2 * condition.grade  # what the hill brakes is the driver's, not the pedal's
+        braked = float(np.mean(-run.acceleration_mps2[k])) - hill
+        reached = 100.0 * (braked / float(np.mean(run.demanded_mps2[k])) - 1.0)
         out[f"{name} second"] = abs(reached)
         first = onset(run)
         at = slice(first + 150, first + 430)
