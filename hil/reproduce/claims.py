@@ -40,7 +40,7 @@ def _friction(alpha: str, median: float, p95: float) -> tuple[Claim, Claim]:
 
 def _not_worse(alpha: str) -> Claim:
     paper_key = f"paper worst {alpha}" if alpha in ("0", "0.7") else None
-    name = f"torque error with less without compensation, worst of three pads, alpha {alpha}"
+    name = f"torque error with compensation less that without, worst of three pads, alpha {alpha}"
     return Claim("13", name, "%", None, "compensation", f"worst {alpha}", paper_key, 0.0)
 
 
