@@ -25,6 +25,7 @@ COMMANDS = (
     "perf",
     "hide",
     "explain",
+    "trials",
     "effects",
     "sensitivities",
 )

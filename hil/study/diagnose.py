@@ -10,7 +10,7 @@ from hil.study.fit import Fitter, Model, Term, Tracks
 from hil.study.linear import Sums, project, track_columns
 from hil.study.noise import Frame, Noise
 from hil.study.prepare import Case
-from hil.study.screen import INDIFFERENT, Score, inflation, leaders, not_testable, score, scores, threshold
+from hil.study.screen import Score, inflation, leaders, not_testable, relevance, score, scores, threshold
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
 from hil.study.world import Rig, World, start_nuisances
@@ -172,9 +172,7 @@ class _Search:
         loose = self.fitter.cost(model.residual, model.z, noise)
         fitted.sort(key=lambda c: c.cost - 2.0 * c.evidence)
         best = fitted[0]
-        size = abs(best.term.candidate.parameter.typical)
-        gained = min(reference, loose) - best.cost
-        gained *= max(1.0 - INDIFFERENT * size / max(abs(best.term.value), 1e-300), 0.0) ** 2
+        gained = (min(reference, loose) - best.cost) * relevance(best.term.candidate, best.term.value)
         if gained < found.least_gain:
             self.say(f"{best.term.candidate.name} gains {gained:.1f}, {found.least_gain:.1f} is asked")
             return None

@@ -14,6 +14,9 @@ SEEN = 3.0
 _MEDIAN_CHI2 = 0.455
 INDIFFERENT = 0.08
 """Share of an effect's usual size that no model of a car is better than: less is not called a cause."""
+_ANYWAY = {"clock_drift": 0.5}
+"""The same where healthy parts differ by more: clocks of nodes."""
+_LEAST_INFLATION = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +57,16 @@ def score(candidate: Candidate, b: float, q: float, now: float = 0.0) -> Score:
     step = float(np.clip(now + step, parameter.low, parameter.high)) - now
     gain = 2.0 * b * step - q * step * step
     raw = gain
-    blunt = max(1.0 - INDIFFERENT * abs(parameter.typical) / max(abs(now + step), 1e-300), 0.0)
-    gain *= blunt * blunt
+    gain *= relevance(candidate, now + step)
     evidence = 0.5 * (gain - (step / tau) ** 2) - 0.5 * float(np.log1p(q * tau * tau)) - float(np.log(candidate.places))
     reach, usual = largest * float(np.sqrt(q)), tau / _USUAL * float(np.sqrt(q))
     return Score(candidate, now + step, gain, evidence, reach, usual, q, raw)
+
+
+def relevance(candidate: Candidate, value: float) -> float:
+    """Share of a gain that counts: that of the value beyond what no model is better than."""
+    least = _ANYWAY.get(candidate.effect.name, INDIFFERENT) * abs(candidate.parameter.typical)
+    return max(1.0 - least / max(abs(value), 1e-300), 0.0) ** 2
 
 
 def threshold(looks: int, alpha: float) -> float:
@@ -73,7 +81,7 @@ def inflation(found: Sequence[Score]) -> float:
     Devlin and Roeder 1999).
     """
     shown = [item.raw for item in found if item.reach > SEEN]
-    return float(np.clip(np.median(shown) / _MEDIAN_CHI2, 1.0, 6.0)) if shown else 1.0
+    return float(np.clip(np.median(shown) / _MEDIAN_CHI2, _LEAST_INFLATION, 6.0)) if shown else _LEAST_INFLATION
 
 
 def leaders(found: Sequence[Score], count: int) -> list[Score]:

@@ -35,7 +35,10 @@ def test_more_looks_ask_for_more() -> None:
 
 def test_the_models_own_error_raises_what_is_asked() -> None:
     quiet = [score(c, 0.3, 1e4) for c in CANDIDATES.values()]
-    assert inflation(quiet) == 1.0
+    loud = [score(c, 0.05 * c.parameter.typical * 1e6, 1e6) for c in CANDIDATES.values()]
+    assert inflation(quiet) == 2.0
+    assert inflation([]) == 2.0
+    assert inflation(loud) >= 2.0
 
 
 def test_a_nuisance_takes_only_what_its_tolerance_allows() -> None:

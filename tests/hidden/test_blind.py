@@ -1,0 +1,42 @@
+"""Something is hidden in logs of a car that shares no code with the plant; explain must find it, or find nothing.
+
+The families at full size are ``brakebench trials``; here are fixed cases and the control that must fail.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from hil.hide.cases import draw
+from hil.study.diagnose import Settings
+from hil.trials.run import run_case
+
+SEED = 7
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_nothing_hidden_is_nothing_found(index: int) -> None:
+    assert run_case(draw("null", index, SEED), SEED, None)["causes"] == []
+
+
+@pytest.mark.parametrize("index", [21, 22])
+def test_a_single_cause_is_named(index: int) -> None:
+    record = run_case(draw("single", index, SEED, 15.0), SEED, 15.0)
+    assert record["named"][:1] == [record["hidden"][0]["effect"]]
+
+
+def test_without_the_noise_model_nothing_hidden_raises_an_alarm() -> None:
+    record = run_case(draw("null", 0, SEED), SEED, None, Settings(noise_model=False))
+    assert record["causes"]
+
+
+def test_the_sealed_answer_is_never_opened(tmp_path: Path) -> None:
+    """With the answer gone the verdict is the same."""
+    from hil.hide.files import sealed_folder, write
+    from hil.study.explain import explain
+
+    write(draw("null", 0, SEED), tmp_path / "logs")
+    for file in sealed_folder(tmp_path / "logs").iterdir():
+        file.unlink()
+    assert explain(tmp_path / "logs", tmp_path / "logs" / "vehicle.toml").json["causes"] == []
