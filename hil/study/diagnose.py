@@ -19,6 +19,7 @@ Say = Callable[[str], None]
 ALPHA = 0.003
 MOST_CAUSES = 3
 LEADERS = 6
+_OF_SCREEN = 1.5
 TIED = 9.2
 
 
@@ -173,6 +174,8 @@ class _Search:
         fitted.sort(key=lambda c: c.cost - 2.0 * c.evidence)
         best = fitted[0]
         gained = (min(reference, loose) - best.cost) * relevance(best.term.candidate, best.term.value)
+        screened = next(item.gain for item in top if item.candidate is best.term.candidate)
+        gained = min(gained, _OF_SCREEN * screened)  # more than that is the nuisances' or the noise's doing
         if gained < found.least_gain:
             self.say(f"{best.term.candidate.name} gains {gained:.1f}, {found.least_gain:.1f} is asked")
             return None
