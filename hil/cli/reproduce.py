@@ -48,10 +48,9 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({"rows": [asdict(row) for row in rows]}, indent=2, allow_nan=False))
     else:
-        from hil.report.text import print_text
-        from hil.reproduce.summary import build_report
+        from hil.reproduce.summary import build_report, table_lines
 
-        print_text(build_report(rows, {}), sys.stdout)
+        print("\n".join([*table_lines(rows), build_report(rows, {}).reason]))
     return 0
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from hil.report.report import Number, Report, Section, Table, Verdict
-from hil.reproduce.conditions import NOMINAL
+from hil.reproduce.conditions import CONDITIONS, NOMINAL
 from hil.reproduce.study import DEGRADED, Row
 
 _COLUMNS = (
@@ -23,8 +23,9 @@ _COLUMNS = (
 
 def build_report(rows: list[Row], figures: Mapping[str, Report]) -> Report:
     """Put rows and figures into one report."""
-    base = [row for row in rows if row.degradation is None and row.conditions in (NOMINAL.name,)]
-    other = [row for row in rows if row.conditions not in (NOMINAL.name,)]
+    others = {condition.name for condition in CONDITIONS if condition is not NOMINAL}
+    base = [row for row in rows if row.conditions not in others]
+    other = [row for row in rows if row.conditions in others]
     missed = [row for row in base if not row.met]
     worse = [row for row in other if row.degradation is not None and row.degradation > DEGRADED]
     note = "Where more is better the percentile is the 5th."
@@ -70,3 +71,26 @@ def _degraded(name: str, rows: list[Row]) -> Table:
 
 def _short(value: float | None) -> float | None:
     return None if value is None else float(f"{value:.3g}")
+
+
+def table_lines(rows: list[Row]) -> list[str]:
+    """The whole table as lines of text, one row a line, condition by condition."""
+    lines = []
+    head = ("paper", "method", "median", "p95", "goal", "met", "x")
+    for name in dict.fromkeys(row.conditions for row in rows):
+        mine = [row for row in rows if row.conditions == name]
+        lines += ["", f"{name} ({mine[0].seeds} seed{'s' if mine[0].seeds > 1 else ''})"]
+        lines.append(f"{'fig':>4} {'claim':<84} {'unit':<5}" + "".join(f"{word:>9}" for word in head))
+        for r in mine:
+            cells = [_text(v) for v in (r.paper, r.paper_method, r.median, r.p95, r.goal)]
+            cells += ["yes" if r.met else "NO", "" if r.degradation is None else f"{r.degradation:.2f}"]
+            line = f"{r.figure:>4} {r.claim:<84.84} {r.unit:<5}" + "".join(f"{cell:>9}" for cell in cells)
+            lines.append(line.rstrip())
+    note = (
+        "method: the paper's method here; p95: the 5th percentile where more is better; x: median over the nominal one"
+    )
+    return [*lines, "", note]
+
+
+def _text(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"

@@ -32,7 +32,7 @@ def test_prints_the_table(quick, capsys):
     out = capsys.readouterr().out
     assert quick == [20]
     assert "torque" in out
-    assert "1 of 1" in out
+    assert "1 of 1 goals met" in out
 
 
 def test_refuses_no_seeds(quick, capsys):
