@@ -7,7 +7,7 @@ import sys
 import uuid
 
 import pytest
-from processes import RUN_LIMIT_S
+from processes import RUN_LIMIT_S, heed_interrupts
 
 COMMAND = [sys.executable, "-m", "hil.cli.main"]
 
@@ -68,6 +68,7 @@ def start(tmp_path):
             stderr=subprocess.PIPE,
             text=True,
             env=os.environ | (env or {}),
+            preexec_fn=heed_interrupts,
         )
         started.append(process)
         return process

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from processes import RUN_LIMIT_S, alive, children_of, wait_until
+from processes import RUN_LIMIT_S, alive, children_of, heed_interrupts, wait_until
 
 from hil.result import Signals
 
@@ -122,6 +122,7 @@ def run_pytest(tmp_path):
                 text=True,
                 env=environment,
                 start_new_session=True,
+                preexec_fn=heed_interrupts,
             )
         )
         return started[-1]

@@ -1,10 +1,16 @@
 """Helpers of tests that look at processes."""
 
 import json
+import signal
 import time
 from pathlib import Path
 
 RUN_LIMIT_S = 150  # a first start compiles the plant
+
+
+def heed_interrupts():
+    """In a child before it runs: take SIGINT, which a shell's background jobs are started to ignore."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def wait_until(condition, what, limit_s=60.0):
