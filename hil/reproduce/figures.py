@@ -213,7 +213,7 @@ def compensation() -> Report:
     panels = (Panel("Speed", KMH, tuple(speed)), Panel("Acceleration", "m/s2", tuple(a)), friction)
     numbers = tuple(
         Number(
-            f"torque error, {name}", round(torque_error(run, runs["ideal"]), 2), "%", note="after 0.8 s, of the mean"
+            f"error, {name}", round(torque_error(run, runs["ideal"]), 2), "%", note="torque, after 0.8 s, of the mean"
         )
         for name, run in runs.items()
         if name != "ideal"
