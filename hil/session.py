@@ -1,10 +1,12 @@
 """A bench to be driven step by step: what a test, or a person at a prompt, does with a run."""
 
+import contextlib
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import signal
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from threading import Condition, Thread
+from threading import Condition, Thread, current_thread, main_thread
 from typing import Any, TypeVar
 
 import numpy as np
@@ -35,6 +37,21 @@ speed_mps = {speed!r}
 duration_s = 3600.0
 after_standstill_s = false
 """
+
+
+@contextlib.contextmanager
+def _interrupts() -> Iterator[list[int]]:
+    """Note a Ctrl-C instead of raising it wherever it falls, so that a run ends between two ticks."""
+    asked: list[int] = []
+    before = signal.getsignal(signal.SIGINT)
+    if not callable(before) or current_thread() is not main_thread():
+        yield asked
+        return
+    signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
+    try:
+        yield asked
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 class SessionError(BrakebenchError):
@@ -239,23 +256,26 @@ class Session:
 
     def _advance(self, over: Callable[[], bool]) -> None:
         rig = self._begin()
-        while not over():
-            if self._clock_ns() > self._deadline_ns:
-                raise SessionError(
-                    f"wall-time limit of {self._limit_s:g} s reached at {self.time_s:.2f} s of the manoeuvre; "
-                    "raise it with --brakebench-limit"
-                )
-            if self._thread is None:
-                self._tick(rig)
-            else:
-                with self._ticked:
-                    self._ticked.wait(0.1)
-            if self._error is not None:
-                raise self._error
-            if rig.state is BenchState.BROKEN:
-                raise BenchError(rig.reason)
-            if rig.state is BenchState.FINISHED and not over():
-                raise SessionError(f"the scenario ended at {self.time_s:.2f} s, before what was waited for")
+        with _interrupts() as asked:
+            while not over():
+                if asked:
+                    raise KeyboardInterrupt
+                if self._clock_ns() > self._deadline_ns:
+                    raise SessionError(
+                        f"wall-time limit of {self._limit_s:g} s reached at {self.time_s:.2f} s of the manoeuvre; "
+                        "raise it with --brakebench-limit"
+                    )
+                if self._thread is None:
+                    self._tick(rig)
+                else:
+                    with self._ticked:
+                        self._ticked.wait(0.1)
+                if self._error is not None:
+                    raise self._error
+                if rig.state is BenchState.BROKEN:
+                    raise BenchError(rig.reason)
+                if rig.state is BenchState.FINISHED and not over():
+                    raise SessionError(f"the scenario ended at {self.time_s:.2f} s, before what was waited for")
 
     def _tick(self, rig: Rig) -> bool:
         going = rig.tick()
