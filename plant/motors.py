@@ -14,14 +14,15 @@ Vector = NDArray[np.float64]
 
 @equation
 def motors(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, y: Vector, wheels: int) -> None:
-    """Rates of torque and winding temperature; ``y.motor_torque_nm``, what is available, the charge limit.
+    """Rates of torque and winding temperature; ``y.motor_torque_nm``, what is available, the charge limit announced.
 
     A quarter of the charge power is promised to each motor; what the battery enforces is the total.
     """
-    limit = switch[S.battery_accepts] * charge_limit(
+    full = charge_limit(
         x[X.state_of_charge], p[P.battery_charge_power_w], p[P.battery_taper_start_soc], p[P.battery_taper_end_soc]
     )
-    y[Y.charge_power_limit_w] = limit
+    y[Y.charge_power_limit_w] = switch[S.battery_announces] * full
+    limit = switch[S.battery_accepts] * full
     for i in range(wheels):
         omega = x[X.wheel_speed_rad_s + i]
         hot = derating(x[X.winding_temperature_k + i], p[P.motor_derating_start_k], p[P.motor_derating_end_k])

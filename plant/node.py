@@ -86,6 +86,7 @@ class PlantNode:
         self._sensors = Sensors(parameters.sensor, parameters.motor.torque_constant_nm_a, seed, self._x, first_speed)
         self.manoeuvre_start_ns: int | None = None
         self._last_ns: int | None = None
+        self._notice_ends_ns = 0
         self._layout, self._terms, self._plugins = layout, terms, plugins
         self._theta = self._of_manoeuvre = theta
         self.switch_effects(theta)
@@ -107,6 +108,8 @@ class PlantNode:
         self._receiver.accept(now_ns, inbox)
         self._partners.receiver.accept(now_ns, inbox)
         self._take_faults(now_ns, inbox)
+        if now_ns >= self._notice_ends_ns:
+            self._switch[S.battery_accepts] = self._switch[S.battery_announces]
         pressure_pa, motor_nm = self._demands.update(self._receiver, now_ns, self._pedal)
         self._follow_manoeuvre(now_ns, elapsed_ns)
         self._drive(now_ns, pressure_pa, motor_nm)
@@ -159,8 +162,10 @@ class PlantNode:
                 for i in range(4):
                     if (command.wheels or 0) >> i & 1:
                         self._switch[S.motor_alive + i] = well
-            elif command.fault is PhysicalFault.BATTERY_REFUSES_CHARGE:
-                self._switch[S.battery_accepts] = well
+            elif command.fault is PhysicalFault.BATTERY_REFUSES_CHARGE and self._switch[S.battery_announces] != well:
+                self._switch[S.battery_announces] = well
+                notice_s = self._parameters.battery.notice_s if command.active else 0.0
+                self._notice_ends_ns = now_ns + round(notice_s * 1e9)
 
     def _follow_manoeuvre(self, now_ns: int, elapsed_ns: int) -> None:
         manoeuvre = self._manoeuvre

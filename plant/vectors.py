@@ -62,7 +62,7 @@ INPUTS = {
     "longitudinal_force_n": 4,
 }
 CUTS = {"pressure": 4, "motor_torque": 4, "wheel_torque": 4, "force": 4}
-SWITCHES = {"motor_alive": 4, "battery_accepts": 1}
+SWITCHES = {"motor_alive": 4, "battery_accepts": 1, "battery_announces": 1}
 BASE_RATES = Layout("BaseRates", CONTINUOUS)
 RATES = Layout("Rates", CONTINUOUS | EXTRA_STATES)
 OUTPUTS = {

@@ -21,8 +21,8 @@ class Memory(NamedTuple):
     """State of the law between two steps.
 
     ``deceleration_mps2``: last valid demand; ``without_pedal_s``: time since there was one; ``handed_over``: the brake
-    has been asked to follow its own pedal map. ``observer``: state of the chosen observer;
-    ``friction``: pad friction in use.
+    has been asked to follow its own pedal map. ``charge``: what the shares of motors and friction count on;
+    ``observer``: state of the chosen observer; ``friction``: pad friction in use.
     """
 
     modes: modes.ModeMemory
@@ -30,6 +30,7 @@ class Memory(NamedTuple):
     without_pedal_s: float
     handed_over: bool
     blending_factor: float
+    charge: blend.ChargePower
     observer: estimator.Vector
     since_sample_s: float
     estimates: estimator.Estimates
@@ -45,6 +46,7 @@ def initial_memory(parameters: EcuParameters) -> Memory:
         without_pedal_s=0.0,
         handed_over=False,
         blending_factor=parameters.blend.blending_factor,
+        charge=blend.ChargePower(0.0, 0.0, 0.0),
         observer=estimator.initial_state(parameters),
         since_sample_s=0.0,
         estimates=estimator.Estimates(0.0, UNKNOWN, (mu, mu, mu, mu), ZERO, 1.0),
@@ -99,17 +101,10 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     resistance *= min(deceleration / p.pedal.resistance_full_mps2, 1.0)
     torque = base_brake.brake_torque(deceleration, resistance, mass, p.vehicle)
     demand = base_brake.distribute(torque, p.friction_brake.front_share)
-    shares = blend.blend(
-        demand,
-        factor_now,
-        _usable_torque(inputs, lost, mode),
-        inputs.charge_power_w,
-        speed,
-        wheel_speed,
-        deceleration,
-        p.blend,
-        p.motor,
-    )
+    wanted = blend.wanted_torque(demand, factor_now, _usable_torque(inputs, lost, mode), p.motor)
+    power = sum(wanted) * max(wheel_speed, 0.0) * p.motor.charge_efficiency
+    charge = blend.hand_over(memory.charge, inputs.charge_power_w, power, p.blend, dt_s)
+    shares = blend.blend(demand, wanted, power, charge, speed, deceleration, p.blend)
 
     gain = friction.gains(p.friction_brake)
     q0, q1, q2, q3 = (
@@ -135,7 +130,7 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
         ),
     )
     memory = Memory(
-        mode_memory, deceleration, without_pedal_s, handed_over, factor, observer, since_sample_s, known, mu
+        mode_memory, deceleration, without_pedal_s, handed_over, factor, charge, observer, since_sample_s, known, mu
     )
     return memory, outputs
 

@@ -23,6 +23,7 @@ class BlendParameters:
     fade_start_mps: Annotated[float, "m/s", 0.1, 20.0]
     fade_end_mps: Annotated[float, "m/s", 0.0, 10.0]
     friction_lead_s: Annotated[float, "s", 0.0, 0.5]
+    charge_handover_s: Annotated[float, "s", 0.02, 2.0]
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,8 @@ from plant.parameters.plant import PlantParameters
 ALPHAS = (0.0, 0.3, 0.5, 0.7)
 ESTIMATION_ALPHAS = (0.0, 0.5, 0.7)
 PADS = {"pads -25 %": 0.75, "pads nominal": 1.0, "pads +25 %": 1.25}
+WEAK = 0.7
+SHIFT_ALPHA = 0.5
 SLOWEST_MPS = 1.5
 SETTLED_S = 0.8
 ADAPTED = 0.10
@@ -190,9 +192,11 @@ def failures(condition: Condition, seed: int) -> Numbers:
         fault = Fault(PhysicalFault.MOTOR_DEAD, wheels, at)
         run = drive(manoeuvres.stop(condition.road()), plant, method(), seed, 0.7, (fault,))
         out |= {f"{name} {key}": value for key, value in dips(run, at).items()}
+    at += 0.01 * (seed % 10)  # the battery speaks every 0.1 s: any moment between
     refuses = Fault(PhysicalFault.BATTERY_REFUSES_CHARGE, 0, at)
-    run = drive(manoeuvres.stop(condition.road()), plant, method(), seed, 0.7, (refuses,))
-    out["refuses depth"] = dips(run, at)["depth"]
+    for name, vehicle in (("announced", plant), ("at once", without_notice(plant))):
+        run = drive(manoeuvres.stop(condition.road()), vehicle, method(), seed, 0.7, (refuses,))
+        out |= {f"{name} {key}": value for key, value in dips(run, at).items()}
     run = drive(full_battery(condition), small_battery(plant), method(), seed, 0.7)
     out["full depth"] = dips(run, run.time_s[onset(run)] + SETTLED_S)["depth"]
     return out
@@ -203,6 +207,11 @@ def small_battery(plant: PlantParameters) -> PlantParameters:
     return replace(plant, battery=replace(plant.battery, capacity_j=2e6))
 
 
+def without_notice(plant: PlantParameters) -> PlantParameters:
+    """The plant with a battery that enforces its limits as it announces them."""
+    return replace(plant, battery=replace(plant.battery, notice_s=0.0))
+
+
 def full_battery(condition: Condition) -> Manoeuvre:
     """The stop that fills `small_battery`: charge power tapers off while the car brakes."""
     return manoeuvres.stop(condition.road(), state_of_charge=0.99)
@@ -210,7 +219,7 @@ def full_battery(condition: Condition) -> Manoeuvre:
 
 def weak_pads(condition: Condition, seed: int) -> Numbers:
     """Pads x0.7, two stops: error of the estimate in the first, deceleration of the second, with and without."""
-    plant = with_pads(condition.plant(plant_parameters(), seed), 0.7)
+    plant = with_pads(condition.plant(plant_parameters(), seed), WEAK)
     out: Numbers = {}
     true = np.repeat(condition.friction, 2)
     for name, ecu in (("with", method()), ("paper", method("paper")), ("without", method(enabled=False))):
@@ -228,6 +237,30 @@ def weak_pads(condition: Condition, seed: int) -> Numbers:
     return out
 
 
+def shift(condition: Condition, seed: int) -> Numbers:
+    """Work moved to the motors where the pads are weak: a series at alpha 0.5, pads x0.7, with and without it.
+
+    Without it the blending factor stays what was asked; the compensation works in both.
+    """
+    plant = with_pads(condition.plant(plant_parameters(), seed), WEAK)
+    manoeuvre = manoeuvres.series(condition.road())
+    best = slopes(ideal(manoeuvre, plant, seed, SHIFT_ALPHA))
+    fixed = override(method(), {"compensation": {"motor_preference": 0.0}}, "no shift")
+    runs = {name: drive(manoeuvre, plant, ecu, seed, SHIFT_ALPHA) for name, ecu in (("", method()), ("no ", fixed))}
+    out: Numbers = {}
+    for name, run in runs.items():
+        rise = run.disc_temperature_k[:, 0] - run.disc_temperature_k[0, 0]
+        out[f"{name}shift heat"] = float(run.friction_heat_j[-1] - run.friction_heat_j[0])
+        out[f"{name}shift recuperated"] = float(run.recuperated_j[-1] - run.recuperated_j[0])
+        out[f"{name}shift rise"] = float(rise.max())
+        out[f"{name}shift friction"] = float(run.pad_friction[:, 0].min())
+        off = np.abs(np.array(slopes(run)) / np.array(best) - 1.0)
+        out[f"{name}shift slope"] = 100.0 * float(off[1:].max())
+    for key in ("heat", "rise"):
+        out[f"{key} saved"] = 100.0 * (1.0 - out[f"shift {key}"] / out[f"no shift {key}"])
+    return out
+
+
 CASES: dict[str, Callable[[Condition, int], Numbers]] = {
     "estimation": estimation,
     "patch": patch,
@@ -235,4 +268,5 @@ CASES: dict[str, Callable[[Condition, int], Numbers]] = {
     "series": series,
     "failures": failures,
     "weak pads": weak_pads,
+    "shift": shift,
 }

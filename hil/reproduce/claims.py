@@ -56,7 +56,13 @@ def _failure(name: str, what: str, unit: str, key: str, goal: float) -> Claim:
     return Claim("-", f"{name} at alpha 0.7: {what}", unit, None, "failures", key, None, goal)
 
 
+def _shift(what: str, key: str) -> Claim:
+    claim = f"pads x0.7, alpha 0.5, series: {what} saved by moving work to the motors"
+    return Claim("-", claim, "%", None, "shift", key, None, 5.0, "median", True)
+
+
 _ALL, _AXLE = "all motors fail", "motors of the front axle fail"
+_TOLD, _AT_ONCE = "battery refuses, told 0.3 s ahead,", "battery refuses without notice"
 _BELOW = "time more than {} m/s2 below demand"
 
 CLAIMS: tuple[Claim, ...] = (
@@ -84,7 +90,14 @@ CLAIMS: tuple[Claim, ...] = (
     _failure(_ALL, _BELOW.format("0.3"), "ms", "all above 0.3", 150.0),
     _failure(_ALL, "speed lost by it", "m/s", "all lost", 0.2),
     _failure("battery becomes full in mid-stop", "depth of the dip", "m/s2", "full depth", 0.3),
-    _failure("battery refuses at once in mid-stop", "depth of the dip", "m/s2", "refuses depth", 0.3),
+    _failure(_TOLD, "depth of the dip", "m/s2", "announced depth", 0.3),
+    _failure(_AT_ONCE, "depth of the dip", "m/s2", "at once depth", 0.3),
+    _failure(_AT_ONCE, _BELOW.format("1.0"), "ms", "at once above 1.0", 100.0),
+    _failure(_AT_ONCE, _BELOW.format("0.3"), "ms", "at once above 0.3", 150.0),
+    _shift("friction heat", "heat saved"),
+    _shift("rise of the front disc's temperature", "rise saved"),
+    Claim("-", "pads x0.7, alpha 0.5, work moved to the motors: slope, later stops", "%", None, "shift", "shift slope",
+          None, 1.0),
     Claim("-", "pads x0.7: error of the friction estimate", "%", None, "weak pads", "with estimate", "paper estimate",
           5.0),
     Claim("-", "pads x0.7: second stop's deceleration off demand", "%", None, "weak pads", "with second",

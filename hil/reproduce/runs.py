@@ -11,6 +11,8 @@ from dbc.bench_messages import (
     ManoeuvreState,
     PhysicalFault,
     StimulusEcu,
+    TruthDiscTemperature,
+    TruthEnergy,
     TruthFrictionTorque,
     TruthLongitudinalForce,
     TruthMotion,
@@ -39,6 +41,8 @@ _RECORDED = (
     EhbPressureFront,
     EhbPressureRear,
     TruthLongitudinalForce,
+    TruthDiscTemperature,
+    TruthEnergy,
 )
 
 
@@ -66,6 +70,9 @@ class Run:
     pad_friction: Vector
     pressure_pa: Vector
     force_n: Vector
+    disc_temperature_k: Vector
+    recuperated_j: Vector
+    friction_heat_j: Vector
     demanded_mps2: Vector
     motor_demand_nm: Vector
     pressure_demand_pa: Vector
@@ -176,6 +183,9 @@ def drive(
         pad_friction=t[:, 12:16],
         pressure_pa=t[:, [16, 17, 19, 20]],
         force_n=t[:, 22:26],
+        disc_temperature_k=t[:, 26:30],
+        recuperated_j=t[:, 30],
+        friction_heat_j=t[:, 31],
         demanded_mps2=b[:, 0],
         motor_demand_nm=b[:, 1:5],
         pressure_demand_pa=b[:, 5:9],

@@ -32,3 +32,4 @@ class BatteryParameters:
     discharge_power_w: Annotated[float, "W", 0.0, 1e6]
     taper_start_soc: Annotated[float, "", 0.0, 1.0]  # full charge power up to here
     taper_end_soc: Annotated[float, "", 0.0, 1.0]  # none from here on
+    notice_s: Annotated[float, "s", 0.0, 60.0]  # a limit is announced this long before it is enforced

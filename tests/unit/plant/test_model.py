@@ -149,6 +149,13 @@ def test_dead_motor_and_refusing_battery(stop):
     switch[SWITCH.slice("battery_accepts")] = 0.0
     table = replay(start, inputs, p, ["motor_torque_nm_fl", "motor_available_nm_fl"], switch=switch)[0]
     assert np.abs(table).max() < 1e-9
+    switch = healthy()
+    switch[SWITCH.slice("battery_announces")] = 0.0
+    columns = ["motor_torque_nm_fl", "motor_available_nm_fl", "charge_power_limit_w"]
+    table = replay(start, inputs, p, columns, switch=switch)[0]
+    assert table[-1, 0] == pytest.approx(-80.0, abs=0.1)
+    assert table[-1, 1] > 80.0
+    assert table[-1, 2] == 0.0
 
 
 def test_dead_time_is_one(paper_car):

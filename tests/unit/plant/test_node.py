@@ -21,6 +21,7 @@ from dbc.contract import contract
 from dbc.exchange import Receiver, Transmitter
 from dbc.frame import BusName, Frame
 from dbc.messages import (
+    BatteryStatus,
     BodyMotion,
     BrakePedal,
     EhbDemandFront,
@@ -41,6 +42,7 @@ from plant.node import SENDERS, PlantNode
 TICK_NS = 10_000_000
 READ = (
     BrakePedal,
+    BatteryStatus,
     BodyMotion,
     WheelSpeedFront,
     EhbPressureFront,
@@ -177,6 +179,23 @@ def test_dead_motor(make):
     assert status.current_fr_a < -100.0
     rig.extra = [FaultCommand(PhysicalFault.MOTOR_DEAD, 0, 0b0001)]
     rig.for_seconds(0.15)
+    assert rig[MotorStatusFront].current_fl_a < -100.0
+
+
+def test_a_battery_announces_before_it_refuses(make):
+    rig = make(motor_nm=-200.0)
+    rig.for_seconds(1.0)
+    rig.extra = [FaultCommand(PhysicalFault.BATTERY_REFUSES_CHARGE, 1, 0)]
+    rig.for_seconds(0.25)
+    assert rig[BatteryStatus].charge_power_limit_w == 0.0
+    assert rig[MotorStatusFront].current_fl_a < -100.0
+    assert rig[MotorStatusFront].torque_available_fl_nm > 200.0
+    rig.for_seconds(0.2)
+    assert abs(rig[MotorStatusFront].current_fl_a) < 3.0
+    assert rig[MotorStatusFront].torque_available_fl_nm == 0.0
+    rig.extra = [FaultCommand(PhysicalFault.BATTERY_REFUSES_CHARGE, 0, 0)]
+    rig.for_seconds(0.15)
+    assert rig[BatteryStatus].charge_power_limit_w > 0.0
     assert rig[MotorStatusFront].current_fl_a < -100.0
 
 
