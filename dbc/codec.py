@@ -2,17 +2,22 @@
 
 The generated source performs the arithmetic of cantools in the same order (scaled = raw * factor + offset, raw
 rounded half to even), so that bytes and values agree bit for bit with cantools, the oracle of the tests; beside
-it stand the conversion to SI, clamping to the signal's range and the SNA value.
+it stand the conversion to SI, clamping to the signal's range, the SNA value, and the end-to-end protection of what is
+sent. Bits are moved by bitstruct, as in cantools.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from math import ceil, floor
+from operator import or_
 from typing import Any
 
+import bitstruct.c as bitstruct
 from cantools.database.can import Message as DbcMessage
 from cantools.database.can import Signal as DbcSignal
+
+from dbc import e2e
 
 CRC_SIGNAL = "CRC"
 COUNTER_SIGNAL = "ALIVE_COUNTER"
@@ -95,62 +100,87 @@ def field_of(signal: DbcSignal, enum: type[IntEnum] | None = None) -> Field:
     return Field(name, signal.name, si, max(signal.minimum, low), min(signal.maximum, high), sna_of(signal), enum)
 
 
-def _shift(signal: DbcSignal, length_bytes: int) -> int:
-    """Position of the least significant bit in the payload read as one integer of the signal's byte order."""
+def _position(signal: DbcSignal, length_bytes: int) -> int:
+    """First bit of a signal, counted from the most significant one; little-endian payloads are reversed for that."""
     if signal.byte_order == "little_endian":
-        return signal.start
-    return 8 * length_bytes - (8 * (signal.start // 8) + 7 - signal.start % 8) - signal.length
+        return 8 * length_bytes - signal.start - signal.length
+    return 8 * (signal.start // 8) + 7 - signal.start % 8
+
+
+class _Word:
+    """All signals of one byte order: how bitstruct packs them, and the names of their values in its order."""
+
+    def __init__(self, message: DbcMessage, byte_order: str, names: dict[str, str]) -> None:
+        mine = [s for s in message.signals if s.byte_order == byte_order and s.name in names]
+        mine.sort(key=lambda signal: _position(signal, message.length))
+        self.names = [names[signal.name] for signal in mine]
+        self.turn = "[reversed]" if byte_order == "little_endian" else ""
+        layout, end = "", 0
+        for signal in mine:
+            gap = _position(signal, message.length) - end
+            layout += (f"p{gap}" if gap else "") + f"{'s' if signal.is_signed else 'u'}{signal.length}"
+            end += gap + signal.length
+        gap = 8 * message.length - end
+        self.layout = bitstruct.compile(layout + (f"p{gap}" if gap else ""))
+
+
+def _words(message: DbcMessage, names: dict[str, str]) -> dict[str, _Word]:
+    """Its words by name: mostly one, two where a message mixes byte orders."""
+    both = {"little": _Word(message, "little_endian", names), "big": _Word(message, "big_endian", names)}
+    return {name: word for name, word in both.items() if word.names}
 
 
 def _compile(source: str, name: str, namespace: dict[str, Any]) -> Callable[..., Any]:
+    namespace["reversed"] = slice(None, None, -1)
     exec(compile(source, f"<codec {name}>", "exec"), namespace)  # noqa: S102 - our own generated arithmetic
     function: Callable[..., Any] = namespace[name]
     return function
 
 
-def _number(value: float) -> str:
-    return repr(int(value)) if isinstance(value, int) or float(value).is_integer() else repr(value)
+def _number(value: float, like: DbcSignal) -> str:
+    """A constant of the type that the values of a signal have: arithmetic and comparison of one type are faster."""
+    whole = all(float(number).is_integer() for number in (value, like.scale, like.offset))
+    return repr(int(value) if whole else float(value))
 
 
-def compile_encoder(message: DbcMessage, fields: list[Field]) -> Callable[[tuple[Any, ...]], bytearray]:
-    """Encoder of one message: SI values in field order -> payload with counter and check value left 0.
+def _listed(names: list[str]) -> str:
+    return ", ".join(names) + ("," if len(names) == 1 else "")
 
-    ``None`` and non-finite values become SNA; a signal without SNA refuses them with `CodecError`. Values outside
-    the range are clamped to it.
+
+def compile_encoder(message: DbcMessage, fields: list[Field], data_id: int | None = None) -> Callable[..., bytes]:
+    """Encoder of one message: SI values in field order, and the alive counter (0 by default) -> payload.
+
+    The payload is protected with ``data_id`` and the counter; None leaves both out. ``None`` and non-finite values
+    become SNA; a signal without SNA refuses them with `CodecError`. Values outside the range are clamped to it.
     """
     signals = payload_signals(message)
-    little = [f"v{i}" for i in range(len(fields))]
-    namespace: dict[str, Any] = {}
-    lines = ["def encode(values):", f" {', '.join(little)}{',' if len(fields) == 1 else ''} = values", " try:"]
-    words: dict[str, list[str]] = {"little_endian": [], "big_endian": []}
+    values = [f"v{i}" for i in range(len(fields))]
+    names = dict(zip([s.name for s in signals], values, strict=True))
+    namespace: dict[str, Any] = {"odd": [_odd_value(message, f, s) for f, s in zip(fields, signals, strict=True)]}
+    lines = ["def encode(values, counter=0):", f" {_listed(values)} = values", " try:"]
     for i, (field, signal) in enumerate(zip(fields, signals, strict=True)):
-        mask = (1 << signal.length) - 1
-        scaled = f"v{i}" if field.si_per_unit == 1.0 else f"v{i} / {field.si_per_unit!r}"
-        shifted = "x" if signal.offset == 0 else f"(x - {_number(signal.offset)})"
-        raw = f"round({shifted})" if signal.scale == 1 else f"round({shifted} / {_number(signal.scale)})"
-        signed = f" & {mask}" if signal.is_signed else ""
-        namespace[f"odd{i}"] = _odd_value(message, field, signal)
-        lines += [
-            f"  x = {scaled}",
-            f"  v{i} = {raw}{signed} if {_number(field.minimum)} <= x <= {_number(field.maximum)} else odd{i}(v{i})",
-        ]
-        shift = _shift(signal, message.length)
-        words[signal.byte_order].append(f"v{i} << {shift}" if shift else f"v{i}")
-    odd = ", ".join(f"odd{i}(w{i})" for i in range(len(fields)))
-    names = ", ".join(f"w{i}" for i in range(len(fields)))
-    comma = "," if len(fields) == 1 else ""
-    lines += [" except TypeError:", f"  {names}{comma} = values", f"  {', '.join(little)}{comma} = {odd}{comma}"]
-    word = " | ".join(words["little_endian"]) or "0"
-    if words["big_endian"]:
-        big = f"({' | '.join(words['big_endian'])}).to_bytes({message.length}, 'big')"
-        word = f"{word} | int.from_bytes({big}, 'little')"
-    lines.append(f" return bytearray(({word}).to_bytes({message.length}, 'little'))")
-    return _compile("\n".join(lines), "encode", namespace)
+        raw = f"v{i}" if signal.offset == 0 else f"(v{i} - {float(signal.offset)!r})"
+        raw = raw if signal.scale == 1 else f"({raw} / {float(signal.scale)!r})"
+        lines += [f"  v{i} /= {field.si_per_unit!r}"] if field.si_per_unit != 1.0 else []
+        inside = f"{_number(field.minimum, signal)} <= v{i} <= {_number(field.maximum, signal)}"
+        lines.append(f"  v{i} = {raw}.__round__() if {inside} else odd[{i}](values[{i}])")
+    lines += [" except TypeError:", f"  {_listed(values)} = [raw(value) for raw, value in zip(odd, values)]"]
+    words = _words(message, names if data_id is None else names | {COUNTER_SIGNAL: "counter"})
+    namespace |= {f"pack_{name}": word.layout.pack for name, word in words.items()} | {"or_": or_}
+    packed = [f"pack_{name}({', '.join(word.names)}){word.turn}" for name, word in words.items()]
+    lines.append(f" data = {packed[0]}" if len(packed) == 1 else f" data = bytes(map(or_, {', '.join(packed)}))")
+    if data_id is not None:
+        octets = [f"b{i}" for i in range(1, message.length)]
+        crc = str(e2e.start_value(data_id))
+        for octet in octets:
+            crc = f"t[{crc} ^ {octet}]"
+        namespace |= {"t": e2e.CRC_TABLE, "check": [bytes([crc ^ 0xFF]) for crc in range(256)]}
+        lines += [f" _, {', '.join(octets)} = data", f" data = check[{crc}] + data[1:]"]
+    return _compile("\n".join([*lines, " return data"]), "encode", namespace)
 
 
 def _odd_value(message: DbcMessage, field: Field, signal: DbcSignal) -> Callable[[float | None], int]:
     """Raw value of any value of a signal: SNA for what is none, the range's end for what is beyond."""
-    mask = (1 << signal.length) - 1
 
     def raw(value: float | None) -> int:
         if value is None or not -1e300 < value < 1e300:
@@ -158,9 +188,9 @@ def _odd_value(message: DbcMessage, field: Field, signal: DbcSignal) -> Callable
                 raise CodecError(
                     f"{message.name}.{field.signal}: expected a finite number, got {value!r}; it has no SNA value"
                 )
-            return field.sna & mask
+            return field.sna
         x = min(max(value / field.si_per_unit, field.minimum), field.maximum)
-        return round((x - signal.offset) / signal.scale) & mask
+        return round((x - signal.offset) / signal.scale)
 
     return raw
 
@@ -168,27 +198,22 @@ def _odd_value(message: DbcMessage, field: Field, signal: DbcSignal) -> Callable
 def compile_decoder(message: DbcMessage, fields: list[Field], make: Callable[..., Any]) -> Callable[[bytes], Any]:
     """Decoder of one message: payload -> typed message; SNA and values out of range become ``None``."""
     signals = payload_signals(message)
-    lines = ["def decode(data):", " little = int.from_bytes(data, 'little')"]
-    if any(s.byte_order == "big_endian" for s in signals):
-        lines.append(" big = int.from_bytes(data, 'big')")
-    namespace: dict[str, Any] = {"make": make}
+    words = _words(message, {signal.name: f"v{i}" for i, signal in enumerate(signals)})
+    namespace: dict[str, Any] = {f"unpack_{name}": word.layout.unpack for name, word in words.items()} | {"make": make}
+    lines = ["def decode(data):"]
+    lines += [f" {_listed(word.names)} = unpack_{name}(data{word.turn})" for name, word in words.items()]
     for i, (field, signal) in enumerate(zip(fields, signals, strict=True)):
-        word = "little" if signal.byte_order == "little_endian" else "big"
-        shift = _shift(signal, message.length)
-        moved = f"{word} >> {shift}" if shift else word
-        raw = f"{moved} & {(1 << signal.length) - 1}"
-        half = 1 << (signal.length - 1)
-        lines.append(f" r = ({raw} ^ {half}) - {half}" if signal.is_signed else f" r = {raw}")
         if field.enum is not None:
             namespace[f"enum{i}"] = {int(member): member for member in field.enum}
-            lines.append(f" v{i} = enum{i}.get(r)")
+            lines.append(f" v{i} = enum{i}.get(v{i})")
             continue
-        value = "r" if signal.scale == 1 else f"r * {_number(signal.scale)}"
-        value += "" if signal.offset == 0 else f" + {_number(signal.offset)}"
+        value = f"v{i}" if signal.scale == 1 else f"v{i} * {_number(signal.scale, signal)}"
+        value += "" if signal.offset == 0 else f" + {_number(signal.offset, signal)}"
         if field.si_per_unit != 1.0:
             value = f"({value}) * {field.si_per_unit!r}" if signal.offset else f"{value} * {field.si_per_unit!r}"
-        test = _raw_test(signal, field)
-        lines.append(f" v{i} = {value}" + (f" if {test} else None" if test else ""))
+        test = _raw_test(f"v{i}", signal, field)
+        if test or value != f"v{i}":
+            lines.append(f" v{i} = {value}" + (f" if {test} else None" if test else ""))
     values = ", ".join(f"v{i}" for i in range(len(fields)))
     if isinstance(make, type) and issubclass(make, tuple):  # spares a NamedTuple its own Python-made __new__
         namespace["new"] = tuple.__new__
@@ -198,15 +223,15 @@ def compile_decoder(message: DbcMessage, fields: list[Field], make: Callable[...
     return _compile("\n".join(lines), "decode", namespace)
 
 
-def _raw_test(signal: DbcSignal, field: Field) -> str:
-    """Condition on the raw value ``r`` for a usable value; empty where every raw value is one."""
+def _raw_test(raw: str, signal: DbcSignal, field: Field) -> str:
+    """Condition on the raw value, by name, for a usable value; empty where every raw value is one."""
     lowest, highest = _raw_range(signal)
     slack = abs(signal.scale) * 1e-6  # the clamped end of a range must survive its own rounding
     ends = sorted((end - signal.offset) / signal.scale for end in (field.minimum - slack, field.maximum + slack))
     first, last = max(lowest, ceil(ends[0])), min(highest, floor(ends[1]))
     parts = [str(first), "<="] if first > lowest else []
-    parts += ["r"] + (["<=", str(last)] if last < highest else [])
+    parts += [raw] + (["<=", str(last)] if last < highest else [])
     test = [" ".join(parts)] if len(parts) > 1 else []
     if field.sna is not None and first <= field.sna <= last:
-        test.append(f"r != {field.sna}")
+        test.append(f"{raw} != {field.sna}")
     return " and ".join(test)

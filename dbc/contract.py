@@ -13,7 +13,7 @@ import cantools
 from cantools.database import Database
 from cantools.database.can import Message as DbcMessage
 
-from dbc import bench_messages, e2e, messages
+from dbc import bench_messages, messages
 from dbc.codec import CRC_SIGNAL, CodecError, Field, compile_decoder, compile_encoder, field_of, payload_signals
 from dbc.frame import BusName
 
@@ -30,7 +30,7 @@ class MessageSpec:
     cycle_ns : cycle time, ns; 0 for a message that is sent on change.
     data_id : data id of its end-to-end protection, None where it has none.
     type : the typed message.  fields : its fields in order.
-    encode, decode : compiled codec; counter and check value are left 0 by ``encode``.
+    encode, decode : compiled codec; ``encode(message, counter)`` protects where the message is protected.
     """
 
     bus: BusName
@@ -43,7 +43,7 @@ class MessageSpec:
     data_id: int | None
     type: type[Message]
     fields: tuple[Field, ...]
-    encode: Callable[[Message], bytearray]
+    encode: Callable[..., bytes]
     decode: Callable[[bytes], Any]
 
 
@@ -100,7 +100,7 @@ def _spec(bus: BusName, message: DbcMessage, message_type: type[Message]) -> Mes
         data_id=data_id,
         type=message_type,
         fields=tuple(fields),
-        encode=compile_encoder(message, fields),
+        encode=compile_encoder(message, fields, data_id),
         decode=compile_decoder(message, fields, message_type),
     )
 
@@ -142,6 +142,4 @@ def spec_of(message_type: type[Message]) -> MessageSpec:
 
 def encode(message: Message, counter: int = 0) -> bytes:
     """Payload of a typed message, protected with ``counter`` where its message is protected."""
-    spec = spec_of(type(message))
-    payload = spec.encode(message)
-    return bytes(payload) if spec.data_id is None else e2e.protect(spec.data_id, payload, counter)
+    return spec_of(type(message)).encode(message, counter)

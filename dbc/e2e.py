@@ -11,30 +11,39 @@ from enum import StrEnum
 COUNTER_MODULUS = 15  # counts 0..14; 15 never occurs on the wire
 
 
-def _table(polynomial: int) -> bytes:
+def _table(polynomial: int) -> tuple[int, ...]:
     table = []
     for value in range(256):
         for _ in range(8):
             value = (value << 1) ^ polynomial if value & 0x80 else value << 1
         table.append(value & 0xFF)
-    return bytes(table)
+    return tuple(table)
 
 
-_CRC_TABLE = _table(0x1D)
+CRC_TABLE = _table(0x1D)
+"""CRC-8 of one byte, start and final XOR 0."""
 
 
 def crc8(data: bytes, start: int = 0xFF) -> int:
     """CRC-8 SAE J1850 of ``data``: polynomial 0x1D, start 0xFF, final XOR 0xFF; b"123456789" gives 0x4B."""
     crc = start
     for byte in data:
-        crc = _CRC_TABLE[crc ^ byte]
+        crc = CRC_TABLE[crc ^ byte]
     return crc ^ 0xFF
+
+
+def start_value(data_id: int) -> int:
+    """CRC over the data id, without the final XOR: where the payload's begins."""
+    return CRC_TABLE[CRC_TABLE[0xFF ^ (data_id & 0xFF)] ^ (data_id >> 8)]
 
 
 def check_value(data_id: int, payload: bytes | bytearray) -> int:
     """Check value of a payload whose first byte is left out (it holds the check value itself)."""
-    t = _CRC_TABLE
-    crc = t[t[0xFF ^ (data_id & 0xFF)] ^ (data_id >> 8)]
+    return _continued(start_value(data_id), payload)
+
+
+def _continued(crc: int, payload: bytes | bytearray) -> int:
+    t = CRC_TABLE
     if len(payload) == 8:  # most are; without the loop it takes two thirds of the time
         _, a, b, c, d, e, f, g = payload
         return t[t[t[t[t[t[t[crc ^ a] ^ b] ^ c] ^ d] ^ e] ^ f] ^ g] ^ 0xFF
@@ -67,6 +76,7 @@ class Status(StrEnum):
     NO_NEW_DATA = "NO_NEW_DATA"
 
 
+_OK = Status.OK  # found faster than the enum's attribute: the way of nearly every frame
 USABLE = frozenset({Status.OK, Status.OK_SOME_LOST})
 
 
@@ -82,7 +92,7 @@ class Checker:
     """
 
     def __init__(self, data_id: int, length: int, max_lost: int = 2, sync_frames: int = 1) -> None:
-        self.data_id = data_id
+        self._start = start_value(data_id)
         self.length = length
         self.max_lost = max_lost
         self.sync_frames = sync_frames
@@ -98,7 +108,7 @@ class Checker:
         frames cannot be seen by a counter 0..14; the receiver's time-out has to.
         """
         counter = COUNTER_MODULUS if len(payload) != self.length else payload[1] & 0x0F
-        if counter >= COUNTER_MODULUS or payload[0] != check_value(self.data_id, payload):
+        if counter >= COUNTER_MODULUS or payload[0] != _continued(self._start, payload):
             self.corrupt += 1
             return Status.WRONG_CRC
         if self.counter is None:
@@ -117,4 +127,4 @@ class Checker:
             self._to_sync -= 1
             if self._to_sync > 0:
                 return Status.SYNC
-        return Status.OK if delta == 1 else Status.OK_SOME_LOST
+        return _OK if delta == 1 else Status.OK_SOME_LOST

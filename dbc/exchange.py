@@ -3,12 +3,17 @@
 from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
-from dbc import e2e
 from dbc.contract import Message, MessageSpec, spec_of
-from dbc.e2e import Checker, Status
+from dbc.e2e import COUNTER_MODULUS, Checker, Status
 from dbc.frame import BusName, Frame, LinkEvent, Received
 
 M = TypeVar("M", bound=Message)
+LAST_COUNTER = COUNTER_MODULUS - 1
+# on the way of every frame: without the Python-made __new__ of a NamedTuple and the slow look-up of an enum's member
+_new = tuple.__new__
+_VEHICLE, _OK, _OK_SOME_LOST, _NO_NEW_DATA = (
+    BusName.VEHICLE, Status.OK, Status.OK_SOME_LOST, Status.NO_NEW_DATA,
+)  # fmt: skip
 
 
 class Reception:
@@ -25,7 +30,9 @@ class Reception:
 
     def __init__(self, spec: MessageSpec) -> None:
         self.spec = spec
-        self.checker = Checker(spec.data_id or 0, spec.length) if spec.data_id is not None else None
+        self.checker = None if spec.data_id is None else Checker(spec.data_id, spec.length)
+        self._check = self._check_length if self.checker is None else self.checker.check
+        self._decode = spec.decode
         self.message: Message | None = None
         self.status = Status.NO_NEW_DATA
         self.fresh = False
@@ -35,12 +42,9 @@ class Reception:
 
     def accept(self, now_ns: int, data: bytes) -> None:
         """Check one payload and keep its message when it is usable."""
-        if self.checker is not None:
-            self.status = self.checker.check(data)
-        else:
-            self.status = Status.OK if len(data) == self.spec.length else Status.WRONG_CRC
-        if self.status is Status.OK or self.status is Status.OK_SOME_LOST:
-            self.message = self.spec.decode(data)
+        status = self.status = self._check(data)
+        if status is _OK or status is _OK_SOME_LOST:
+            self.message = self._decode(data)
             self.fresh = True
             self.valid_in_row += 1
             self.bad_in_row = 0
@@ -48,6 +52,9 @@ class Reception:
         else:
             self.valid_in_row = 0
             self.bad_in_row += 1
+
+    def _check_length(self, data: bytes) -> Status:
+        return Status.OK if len(data) == self.spec.length else Status.WRONG_CRC
 
 
 class Receiver:
@@ -61,6 +68,7 @@ class Receiver:
     def __init__(self, types: Iterable[type[Message]]) -> None:
         self.receptions = {t: Reception(spec_of(t)) for t in types}
         self._all = list(self.receptions.values())
+        self._checkers = [reception.checker for reception in self._all if reception.checker is not None]
         # by bus and identifier, in two steps: hashing the name of a bus for each frame is slow
         self._vehicle, self._bench = (
             {r.spec.can_id: r for r in self._all if r.spec.bus is bus} for bus in (BusName.VEHICLE, BusName.BENCH)
@@ -69,17 +77,17 @@ class Receiver:
 
     def accept(self, now_ns: int, inbox: Sequence[Received]) -> None:
         """Take the inbox of the tick ``now_ns``; ``link_events`` then holds the tick's link events."""
-        self.link_events = []
         for reception in self._all:
             reception.fresh = False
-            reception.status = Status.NO_NEW_DATA
+            reception.status = _NO_NEW_DATA
+        self.link_events = []
         vehicle, bench = self._vehicle, self._bench
         for item in inbox:
             if isinstance(item, LinkEvent):
                 self.link_events.append(item)
                 continue
             bus, can_id, data, _, extended = item
-            known = (vehicle if bus is BusName.VEHICLE else bench).get(can_id)
+            known = (vehicle if bus is _VEHICLE else bench).get(can_id)
             if known is not None and not extended:
                 known.accept(now_ns, data)
 
@@ -100,12 +108,12 @@ class Receiver:
     @property
     def lost(self) -> int:
         """Frames missing by their counters, over all messages."""
-        return sum(r.checker.lost for r in self.receptions.values() if r.checker)
+        return sum([checker.lost for checker in self._checkers])
 
     @property
     def corrupt(self) -> int:
         """Frames with wrong check value or length, over all messages."""
-        return sum(r.checker.corrupt for r in self.receptions.values() if r.checker)
+        return sum([checker.corrupt for checker in self._checkers])
 
 
 class Transmitter:
@@ -141,23 +149,19 @@ class Transmitter:
                 if slot == state.slot:
                     continue
                 state.slot = slot
-            payload = state.encode(message)
-            if state.data_id is None:
-                data = bytes(payload)
-            else:
-                data = e2e.protect(state.data_id, payload, state.counter)
-                state.counter = (state.counter + 1) % e2e.COUNTER_MODULUS
-            frames.append(Frame(state.bus, state.can_id, data))
+            counter = state.counter
+            state.counter = counter + 1 if counter < LAST_COUNTER else 0
+            frames.append(_new(Frame, (state.bus, state.can_id, state.encode(message, counter), 0, False)))
         return frames
 
 
 class _Sending:
     """State of one sent message."""
 
-    __slots__ = ("bus", "can_id", "counter", "cycle_ns", "data_id", "encode", "slot")
+    __slots__ = ("bus", "can_id", "counter", "cycle_ns", "encode", "slot")
 
     def __init__(self, spec: MessageSpec) -> None:
-        self.bus, self.can_id, self.data_id, self.encode = spec.bus, spec.can_id, spec.data_id, spec.encode
+        self.bus, self.can_id, self.encode = spec.bus, spec.can_id, spec.encode
         self.cycle_ns = spec.cycle_ns
         self.slot: int | None = None
         self.counter = 0

@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from dbc.bench_messages import EcuReception, StimulusEcu
-from dbc.exchange import Receiver, Transmitter
+from dbc.exchange import Receiver, Reception, Transmitter
 from dbc.frame import BusName, Frame, LinkState, Received
 from dbc.messages import (
     BatteryStatus,
@@ -44,6 +44,7 @@ SOURCES: tuple[type[tuple[Any, ...]], ...] = (  # in the order of law.types.Sour
     BatteryStatus,
 )
 _NO_COUNTER = 15
+_WELL = Health(0.0, True, 0)
 _LINK_DOWN = {LinkState.BUS_OFF: True, LinkState.DISCONNECTED: True, LinkState.RESTARTED: False}
 _LINK_DOWN[LinkState.ERROR_ACTIVE] = False
 _BRAKE = {EhbState.DEMAND: Brake.DEMAND, EhbState.OWN_PEDAL_MAP: Brake.OWN_MAP, EhbState.FAILED: Brake.FAILED}
@@ -63,6 +64,14 @@ def _four(front: Any, rear: Any, first: int, second: int) -> tuple[float, float,
 def _brake(message: Any) -> Brake:
     """State of an axle's brake; one that does not say what it follows is not taken for one that follows us."""
     return Brake.OWN_MAP if message is None or message[2] is None else _BRAKE[message[2]]
+
+
+def _health(reception: Reception, now_ns: int) -> Health:
+    if reception.fresh and not reception.bad_in_row:  # mostly
+        return _WELL
+    last_ns = reception.last_valid_ns
+    age_s = math.inf if last_ns is None else (now_ns - last_ns) * 1e-9
+    return Health(age_s, reception.fresh, reception.bad_in_row)
 
 
 class EcuNode:
@@ -122,12 +131,7 @@ class EcuNode:
             charge_power_w=math.nan if battery is None else _number(battery[1]),
             blending_factor=math.nan if stimulus is None else _number(stimulus[0]),
             link_down=self._link_down,
-            health=tuple(
-                Health(
-                    math.inf if r.last_valid_ns is None else (now_ns - r.last_valid_ns) * 1e-9, r.fresh, r.bad_in_row
-                )
-                for r in self._receptions
-            ),
+            health=tuple([_health(reception, now_ns) for reception in self._receptions]),
         )
 
     def _outgoing(self, o: Outputs) -> tuple[tuple[Any, ...], ...]:

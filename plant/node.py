@@ -92,6 +92,7 @@ class PlantNode:
         self.switch_effects(theta)
         self._receiver = Receiver((*DEMANDS, StimulusDriver, StimulusRoad))
         self._faults = Receiver((FaultCommand,))
+        self._fault_id = spec_of(FaultCommand).can_id
         self._transmitter = Transmitter()
         self._demands = Demands(parameters.ehb)
         self._pedal = 0.0
@@ -106,7 +107,7 @@ class PlantNode:
         self._last_ns = now_ns
         self._advance(elapsed_ns)
         self._receiver.accept(now_ns, inbox)
-        self._partners.receiver.accept(now_ns, inbox)
+        self._partners.accept(now_ns, inbox)
         self._take_faults(now_ns, inbox)
         if now_ns >= self._notice_ends_ns:
             self._switch[S.battery_accepts] = self._switch[S.battery_announces]
@@ -149,9 +150,8 @@ class PlantNode:
 
     def _take_faults(self, now_ns: int, inbox: Sequence[Received]) -> None:
         """Fault commands one by one: two may come in one tick."""
-        spec = spec_of(FaultCommand)
         for item in inbox:
-            if not isinstance(item, Frame) or (item.can_id, item.bus) != (spec.can_id, spec.bus):
+            if item[1] != self._fault_id:  # of few frames
                 continue
             self._faults.accept(now_ns, [item])
             command = self._faults.latest(FaultCommand)

@@ -1,7 +1,10 @@
 """Real nodes beside the plant: where it does not play a node, that node's frames enter at the joint it belongs to."""
 
+from collections.abc import Sequence
+
 from dbc.contract import Message
 from dbc.exchange import Receiver
+from dbc.frame import Received
 from dbc.messages import BrakePedal, EhbPressureFront, EhbPressureRear, MotorStatusFront, MotorStatusRear, Steering
 from plant.demands import DEMAND_TIMEOUT_NS
 from plant.layout import Vector
@@ -24,7 +27,7 @@ class Partners:
     def __init__(self, play: frozenset[str], torque_constant_nm_a: float) -> None:
         self._away = [node for node in FRAMES_OF if node not in play]
         self._torque_constant = torque_constant_nm_a
-        self.receiver = Receiver([kind for node in self._away for kind in FRAMES_OF[node]])
+        self._receiver = Receiver([kind for node in self._away for kind in FRAMES_OF[node]])
 
     def cut(self) -> Vector:
         """Cut points of the model (``CUT``)."""
@@ -34,18 +37,23 @@ class Partners:
                 cut[part : part + 4] = 1.0
         return cut
 
+    def accept(self, now_ns: int, inbox: Sequence[Received]) -> None:
+        """Take the inbox of a tick."""
+        if self._away:
+            self._receiver.accept(now_ns, inbox)
+
     def enter(self, now_ns: int, u: Vector) -> None:
         """Write the measured values into the inputs (``INPUT``)."""
         if "EHB" in self._away:
             for axle, kind in enumerate((EhbPressureFront, EhbPressureRear)):
-                measured = self.receiver.latest(kind)
+                measured = self._receiver.latest(kind)
                 for side in (0, 1):
                     if measured is not None and measured[side] is not None:
                         u[U.pressure_pa + 2 * axle + side] = max(float(measured[side] or 0.0), 0.0)
         if "IWM" in self._away:
             for axle, status in enumerate((MotorStatusFront, MotorStatusRear)):
-                age = self.receiver.age_ns(status, now_ns)
-                message = self.receiver.latest(status) if age is not None and age < DEMAND_TIMEOUT_NS else None
+                age = self._receiver.age_ns(status, now_ns)
+                message = self._receiver.latest(status) if age is not None and age < DEMAND_TIMEOUT_NS else None
                 for side in (0, 1):
                     current = None if message is None else message[3 * side]
                     u[U.motor_torque_nm + 2 * axle + side] = self._torque_constant * float(current or 0.0)
@@ -54,7 +62,7 @@ class Partners:
         """Travel a real driver node reports (the mean of its channels), None where the plant plays the driver."""
         if "DRIVER" not in self._away:
             return None
-        pedal = self.receiver.latest(BrakePedal)
+        pedal = self._receiver.latest(BrakePedal)
         channels = [] if pedal is None else [value for value in pedal if value is not None]
         return sum(channels) / len(channels) if channels else 0.0
 
@@ -62,5 +70,5 @@ class Partners:
         """Angle a real driver node reports, None where the plant plays the driver."""
         if "DRIVER" not in self._away:
             return None
-        steering = self.receiver.latest(Steering)
+        steering = self._receiver.latest(Steering)
         return 0.0 if steering is None else steering.steering_wheel_angle_rad or 0.0

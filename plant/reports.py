@@ -1,5 +1,7 @@
 """What the plant tells: the frames of the car's nodes, and the truth."""
 
+import numpy as np
+
 from dbc.bench_messages import (
     ManoeuvreState,
     PlantReception,
@@ -31,16 +33,25 @@ from dbc.messages import (
 from plant.demands import DEMANDS
 from plant.layout import Vector
 from plant.sensors import Sensors
-from plant.vectors import RATES, X, Y
+from plant.vectors import OUTPUT, STATE, X, Y
 
 NO_COUNTER = 15  # none yet
 COUNT_LIMIT = 4095
+_FAILED, _OK, _DERATED = MotorState.FAILED, MotorState.OK, MotorState.DERATED
+_TRUE_STATES = np.r_[
+    STATE.slice("speed_mps"), STATE.slice("distance_m"), STATE.slice("recuperated_j"), STATE.slice("friction_heat_j"),
+    STATE.slice("pad_friction"), STATE.slice("disc_temperature_k"),
+]  # fmt: skip
+_TRUE_OUTPUTS = np.r_[
+    OUTPUT.slice("acceleration_mps2"), OUTPUT.slice("wheel_torque_nm"), OUTPUT.slice("friction_torque_nm"),
+    OUTPUT.slice("longitudinal_force_n"), OUTPUT.slice("wheel_load_n"),
+]  # fmt: skip
 
 
 def _motor_state(alive: float, derating: float) -> MotorState:
     if alive == 0.0:
-        return MotorState.FAILED
-    return MotorState.OK if derating >= 1.0 else MotorState.DERATED
+        return _FAILED
+    return _OK if derating >= 1.0 else _DERATED
 
 
 def driver_messages(sensors: Sensors, travel: float, steering_wheel_rad: float) -> list[Message]:
@@ -65,8 +76,11 @@ def motor_messages(sensors: Sensors, y: Vector, alive: list[float]) -> list[Mess
     current = sensors.current_a(y)
     able = y[Y.motor_available_nm : Y.motor_available_nm + 4].tolist()
     derating = y[Y.motor_derating : Y.motor_derating + 4].tolist()
-    fl, fr, rl, rr = ((current[i], able[i], _motor_state(alive[i], derating[i])) for i in range(4))
-    return [MotorStatusFront(*fl, *fr), MotorStatusRear(*rl, *rr)]
+    state = list(map(_motor_state, alive, derating))
+    return [
+        MotorStatusFront(current[0], able[0], state[0], current[1], able[1], state[1]),
+        MotorStatusRear(current[2], able[2], state[2], current[3], able[3], state[3]),
+    ]
 
 
 def battery_message(x: Vector, y: Vector) -> BatteryStatus:
@@ -76,31 +90,24 @@ def battery_message(x: Vector, y: Vector) -> BatteryStatus:
 
 def truth_messages(x: Vector, y: Vector, state: ManoeuvreState) -> list[Message]:
     """What no car can measure, for the bench."""
-    s, o = x[: RATES.size].tolist(), y.tolist()
-
-    def four(values: list[float], first: int) -> list[float]:
-        return values[first : first + 4]
-
+    states: list[float] = x[_TRUE_STATES].tolist()
+    outputs: list[float] = y[_TRUE_OUTPUTS].tolist()
+    speed, distance, recuperated, heat, *wheels = states
+    acceleration, *forces = outputs
     return [
-        TruthMotion(s[X.speed_mps], o[Y.acceleration_mps2], s[X.distance_m], state),
-        TruthWheelTorque(*four(o, Y.wheel_torque_nm)),
-        TruthFrictionTorque(*four(o, Y.friction_torque_nm)),
-        TruthPadFriction(*four(s, X.pad_friction)),
-        TruthDiscTemperature(*four(s, X.disc_temperature_k)),
-        TruthLongitudinalForce(*four(o, Y.longitudinal_force_n)),
-        TruthWheelLoad(*four(o, Y.wheel_load_n)),
-        TruthEnergy(s[X.recuperated_j], s[X.friction_heat_j]),
+        TruthMotion(speed, acceleration, distance, state),
+        TruthWheelTorque(*forces[:4]),
+        TruthFrictionTorque(*forces[4:8]),
+        TruthPadFriction(*wheels[:4]),
+        TruthDiscTemperature(*wheels[4:]),
+        TruthLongitudinalForce(*forces[8:12]),
+        TruthWheelLoad(*forces[12:]),
+        TruthEnergy(recuperated, heat),
     ]
 
 
 def reception_message(receiver: Receiver) -> PlantReception:
     """Which demands this tick was computed from."""
-    front_p, rear_p, front_m, rear_m = (receiver.counter(kind) for kind in DEMANDS)
-    return PlantReception(
-        NO_COUNTER if front_p is None else front_p,
-        NO_COUNTER if rear_p is None else rear_p,
-        NO_COUNTER if front_m is None else front_m,
-        NO_COUNTER if rear_m is None else rear_m,
-        min(receiver.lost, COUNT_LIMIT),
-        min(receiver.corrupt, COUNT_LIMIT),
-    )
+    front_p, rear_p, front_m, rear_m = [NO_COUNTER if (n := receiver.counter(kind)) is None else n for kind in DEMANDS]
+    lost, corrupt = min(receiver.lost, COUNT_LIMIT), min(receiver.corrupt, COUNT_LIMIT)
+    return PlantReception(front_p, rear_p, front_m, rear_m, lost, corrupt)

@@ -12,7 +12,7 @@ from cantools.database import Database
 from cantools.database.can import Message as DbcMessage
 from cantools.database.namedsignalvalue import NamedSignalValue
 
-from dbc import exchange
+from dbc import e2e, exchange
 from dbc.codec import SNA
 from dbc.contract import Message, MessageSpec, database_text, spec_of
 from dbc.frame import BusName
@@ -37,9 +37,18 @@ def dbc_values(spec: MessageSpec, message: Message) -> dict[str, float | str]:
     return values
 
 
-def encoder(spec: MessageSpec, message: DbcMessage) -> Callable[[Message], bytearray]:
+def encoder(spec: MessageSpec, message: DbcMessage) -> Callable[..., bytes]:
     """`MessageSpec.encode` by cantools."""
-    return lambda values: bytearray(message.encode(dbc_values(spec, values)))
+
+    def encode(values: Message, counter: int = 0) -> bytes:
+        return protected(spec, message.encode(dbc_values(spec, values)), counter)
+
+    return encode
+
+
+def protected(spec: MessageSpec, payload: bytes, counter: int) -> bytes:
+    """A payload of cantools with the contract's protection."""
+    return payload if spec.data_id is None else e2e.protect(spec.data_id, bytearray(payload), counter)
 
 
 def decoder(spec: MessageSpec, message: DbcMessage) -> Callable[[bytes], Any]:

@@ -5,7 +5,7 @@ from typing import Any
 
 from dbc.contract import Message, contract
 from dbc.frame import BusName
-from hil.perf.cantools_codec import database, dbc_values
+from hil.perf.cantools_codec import database, dbc_values, protected
 from hil.perf.row import Row, paired
 from hil.rt.clock import cpu_time_ns
 from hil.scenario import load_scenario
@@ -49,10 +49,10 @@ def measure() -> list[Row]:
         return timed
 
     encode = paired(
-        "encode a frame",
-        each(lambda spec, _theirs, message, _values, _data: spec.encode(message)),
-        each(lambda _spec, theirs, _message, values, _data: theirs.encode(values)),
-        "cantools",
+        "encode and protect a frame",
+        each(lambda spec, _theirs, message, _values, _data: spec.encode(message, 7)),
+        each(lambda spec, theirs, _message, values, _data: protected(spec, theirs.encode(values), 7)),
+        "cantools, then protected",
         "us",
         pairs=PAIRS,
     )
