@@ -9,35 +9,68 @@ submodel or a changed layout would leave a stale entry point behind; `entry` sta
 import hashlib
 import os
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property, update_wrapper
 from importlib import resources
 from typing import Any, TypeVar, cast
 
-from numba import njit
+import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
 EFFECTS = os.environ.get("BRAKEBENCH_EFFECTS", "1") != "0"
 """False compiles the effects out: the build that the neutral one is compared with."""
+_nb: Any = numba  # whose options are declared in part
+INTERPRETED = bool(_nb.config.DISABLE_JIT)
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+
+
+class Equation:
+    """A function for other compiled functions: made without what only Python needs.
+
+    Python may call it all the same, in tests and for starting values; then it is compiled once more, alone.
+    """
+
+    def __init__(self, function: Callable[..., Any], **how: Any) -> None:
+        self.py_func = function
+        self._how = _OPTIONS | how
+        self._lean = _nb.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **self._how)(function)
+        self._numba_type_ = self._lean._numba_type_  # what the compiler takes this object for
+
+    @cached_property
+    def _alone(self) -> Callable[..., Any]:
+        return cast(Callable[..., Any], _nb.njit(**self._how)(self.py_func))
+
+    def __call__(self, *values: Any) -> Any:
+        """The function's value, compiled."""
+        return self._alone(*values)
+
+
+def _equation(function: F, **how: Any) -> F:
+    return function if INTERPRETED else cast(F, update_wrapper(Equation(function, **how), function))
 
 
 def equation(function: F) -> F:
     """Compile a function into whatever calls it, when an entry point first needs it."""
-    return cast(F, njit(error_model="numpy", fastmath={"contract"}, forceinline=True)(function))
+    return _equation(function, forceinline=True)
+
+
+def joint(function: F) -> F:
+    """As `equation`, but no product of the function is fused with what stands before or behind it."""
+    return _equation(function, forceinline=True, fastmath=False)
 
 
 def section(function: F) -> F:
-    """Paste a function into its caller before compiling: for long functions with one caller."""
-    return cast(F, njit(error_model="numpy", fastmath={"contract"}, inline="always")(function))
+    """Paste a function into its caller before compiling: for functions with one caller."""
+    return cast(F, _nb.njit(inline="always", **_OPTIONS)(function))
 
 
 def block(function: F) -> F:
     """Compile a function that stays one piece of code however many call it."""
-    return cast(F, njit(error_model="numpy", fastmath={"contract"})(function))
+    return _equation(function)
 
 
 def entry(function: F) -> F:
     """Compile a function that Python calls: cached on disk, without the global interpreter lock."""
-    compiled = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})(function)
+    compiled = _nb.njit(cache=True, nogil=True, **_OPTIONS)(function)
     disk_cache = getattr(compiled, "_cache", None)  # absent when numba is switched off
     if disk_cache is not None:
         disk_cache._cache_file._source_stamp = _source_stamp()

@@ -1,9 +1,9 @@
 """Named places in flat vectors, so that no equation reads ``x[3]``."""
 
 import typing
-from collections import namedtuple
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -12,25 +12,29 @@ from numpy.typing import NDArray
 Vector = NDArray[np.float64]
 
 
+def constants(name: str, sizes: Mapping[str, int]) -> ModuleType:
+    """First index of each part, as a module: the numbers of one are plain constants to the compiler."""
+    module, start = ModuleType(name), 0
+    for part, size in sizes.items():
+        setattr(module, part, start)
+        start += size
+    return module
+
+
 class Layout:
     """Names, sizes and offsets of the parts of a flat vector.
 
     Attributes
     ----------
     sizes : part name -> number of elements, in order.
-    at : named tuple of the first index of each part, a constant to compiled code (``x[X.speed_mps]``).
+    at : first index of each part by name, a constant to compiled code (``x[X.speed_mps]``).
     size : total length.
     """
 
     def __init__(self, name: str, sizes: Mapping[str, int]) -> None:
         self.sizes = dict(sizes)
-        offsets, total = [], 0
-        for size in self.sizes.values():
-            offsets.append(total)
-            total += size
-        make: Any = namedtuple
-        self.at: Any = make(name, list(self.sizes))(*offsets)
-        self.size = total
+        self.at: Any = constants(name, self.sizes)
+        self.size = sum(self.sizes.values())
 
     def slice(self, part: str) -> slice:
         """Where a part lies."""

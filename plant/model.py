@@ -207,10 +207,10 @@ def replay(
     indices = column_indices(columns)
     table = np.empty((len(cars), len(rows), len(indices)))
 
-    def one(k: int) -> None:
+    def one(k: int) -> None:  # copies, because for read-only vectors the model would be compiled once more
         simulate(
-            starts[k].copy(), rows, cut, switch, np.ascontiguousarray(cars[k]), road, step_s, steps, method, indices,
-            table[k], OUTPUT.zeros(), np.ascontiguousarray(thetas[k]), terms, plugins,
+            starts[k].copy(), rows, cut, switch, cars[k].copy(), road, step_s, steps, method, indices,
+            table[k], OUTPUT.zeros(), thetas[k].copy(), terms, plugins,
         )  # fmt: skip
 
     if workers == 1:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from plant.compiled import EFFECTS, block, equation
+from plant.compiled import EFFECTS, block, equation, section
 from plant.effects import bank, plugin
 from plant.effects.catalogue import BUILT_IN
 from plant.effects.joints import COUNT, FIRST, neutral_joints
@@ -62,38 +62,21 @@ _STATEFUL = np.array([e.dynamic is not None or e.rates is not None for e in BUIL
 _MOVING = np.array([e.rates is not None for e in BUILT_IN if not e.sensing])
 
 
-def _sequence(functions: Sequence[tuple[Callable[..., None], int, int]], *, static: bool) -> Callable[..., None]:
-    """One function that calls those whose effect is on."""
+def _sequence(functions: Sequence[tuple[Callable[..., None], int, int]]) -> Callable[..., None]:
+    """One function that calls those whose effect is on.
+
+    Each comes with the places in ``q`` where it says whether its effect is on, and where its numbers begin.
+    """
     if len(functions) > _BRANCHES:
         few = -(-len(functions) // _BRANCHES)
-        parts = [_sequence(functions[k : k + few], static=static) for k in range(0, len(functions), few)]
+        parts = [_sequence(functions[k : k + few]) for k in range(0, len(functions), few)]
         return _all_of((*parts, *[_nothing] * (_BRANCHES - len(parts))))
-    nothing: Any = _nothing_static if static else _nothing_dynamic
-    padded: list[tuple[Any, int, int]] = [*functions, *[(nothing, 0, 0)] * (_BRANCHES - len(functions))]
+    padded: list[tuple[Any, int, int]] = [*functions, *[(_no_equation, 0, 0)] * (_BRANCHES - len(functions))]
     (f0, s0, k0), (f1, s1, k1), (f2, s2, k2), (f3, s3, k3) = padded[:4]
     (f4, s4, k4), (f5, s5, k5), (f6, s6, k6), (f7, s7, k7) = padded[4:]
 
     @equation
-    def of_theta(x: Vector, u: Vector, q: Vector, y: Vector) -> None:
-        if q[s0] > 0.5:
-            f0(q, k0, y)
-        if q[s1] > 0.5:
-            f1(q, k1, y)
-        if q[s2] > 0.5:
-            f2(q, k2, y)
-        if q[s3] > 0.5:
-            f3(q, k3, y)
-        if q[s4] > 0.5:
-            f4(q, k4, y)
-        if q[s5] > 0.5:
-            f5(q, k5, y)
-        if q[s6] > 0.5:
-            f6(q, k6, y)
-        if q[s7] > 0.5:
-            f7(q, k7, y)
-
-    @equation
-    def of_state(x: Vector, u: Vector, q: Vector, y: Vector) -> None:
+    def run(x: Vector, u: Vector, q: Vector, y: Vector) -> None:
         if q[s0] > 0.5:
             f0(x, u, q, k0, y)
         if q[s1] > 0.5:
@@ -111,7 +94,7 @@ def _sequence(functions: Sequence[tuple[Callable[..., None], int, int]], *, stat
         if q[s7] > 0.5:
             f7(x, u, q, k7, y)
 
-    return of_theta if static else of_state
+    return run
 
 
 @equation
@@ -120,12 +103,7 @@ def _nothing(_x: Vector, _u: Vector, _q: Vector, _y: Vector) -> None:
 
 
 @equation
-def _nothing_static(_q: Vector, _k: int, _y: Vector) -> None:
-    return
-
-
-@equation
-def _nothing_dynamic(_x: Vector, _u: Vector, _q: Vector, _k: int, _y: Vector) -> None:
+def _no_equation(_x: Vector, _u: Vector, _q: Vector, _k: int, _y: Vector) -> None:
     return
 
 
@@ -146,20 +124,29 @@ def _all_of(parts: Sequence[Callable[..., None]]) -> Callable[..., None]:
     return run
 
 
+def _of_theta_alone(static: Callable[..., None]) -> Callable[..., None]:
+    @section
+    def equation_of_state(_x: Vector, _u: Vector, q: Vector, k: int, y: Vector) -> None:
+        static(q, k, y)
+
+    return equation_of_state
+
+
 def _stage(name: str) -> Callable[..., None]:
     found = []
     for effect in BUILT_IN:
         function = getattr(effect, name)
         if function is not None:
             first = THETA.slice(effect.name, effect.parameters[0].name).start
-            found.append((function, _AT.on + ON_OFF.index(effect.name), _AT.theta + first))
-    return _sequence(found, static=name == "static")
+            of_state = _of_theta_alone(function) if name == "static" else function
+            found.append((of_state, _AT.on + ON_OFF.index(effect.name), _AT.theta + first))
+    return _sequence(found)
 
 
 _static, _dynamic, _rates = _stage("static"), _stage("dynamic"), _stage("rates")
 
 
-@equation
+@section
 def _load(p: Vector, theta: Vector, terms: Vector, plugins: Vector, q: Vector, y: Vector, stage: Vector) -> None:
     """Fill ``q`` for a call: parameters, neutral joints, which effects are on at any time.
 
@@ -248,27 +235,27 @@ def _move(x: Vector, u: Vector, q: Vector, y: Vector) -> None:
     plugin.call(x, u, q, y, _AT.plugins, _AT.plugin_rows, _AT.theta, 1)
 
 
-@equation
+@section
 def _before(x: Vector, u: Vector, cut: Vector, q: Vector, y: Vector) -> None:
     """What the state decides at the joints."""
     if q[_AT.dynamic] > 0.5:
         _decide(x, u, cut, q, y)
 
 
-@equation
+@section
 def _after(x: Vector, u: Vector, q: Vector, y: Vector) -> None:
     """Rates of the extra states."""
     if q[_AT.rates] > 0.5:
         _move(x, u, q, y)
 
 
-@equation
+@section
 def _moving(q: Vector) -> bool:
     """Whether extra states move."""
     return q[_AT.rates] > 0.5
 
 
-@equation
+@section
 def _row(
     x: Vector, u: Vector, p: Vector, theta: Vector, begin_s: float, end_s: float, q: Vector, y: Vector, stage: Vector
 ) -> None:
@@ -277,28 +264,28 @@ def _row(
         turn(x, u, p, theta, begin_s, end_s, q, y, stage)
 
 
-@equation
+@section
 def _no_before(_x: Vector, _u: Vector, _cut: Vector, _q: Vector, _y: Vector) -> None:
     return
 
 
-@equation
+@section
 def _no_after(_x: Vector, _u: Vector, _q: Vector, _y: Vector) -> None:
     return
 
 
-@equation
+@section
 def _never(_q: Vector) -> bool:
     return False
 
 
-@equation
+@section
 def _copy(p: Vector, _theta: Vector, _terms: Vector, _plugins: Vector, q: Vector, _y: Vector, _stage: Vector) -> None:
     for k in range(_PARAMETERS):
         q[k] = p[k]
 
 
-@equation
+@section
 def _no_row(
     _x: Vector,
     _u: Vector,

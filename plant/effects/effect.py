@@ -1,10 +1,11 @@
 """An effect as a value: what it is called, where it acts, how large it may be, and its equations."""
 
-from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
+
+from plant.layout import constants
 
 NODES = ("wheel", "imu", "pressure", "motor", "driver")
 
@@ -123,9 +124,4 @@ class Effect:
 
 def slots(scope: Scope, parameters: tuple[Parameter, ...]) -> Any:
     """Where each parameter begins, counted from the effect's first number: constants to compiled code."""
-    starts, total = [], 0
-    for parameter in parameters:
-        starts.append(total)
-        total += parameter.size(scope)
-    make: Any = namedtuple
-    return make("Slots", [p.name for p in parameters])(*starts)
+    return constants("Slots", {p.name: p.size(scope) for p in parameters})

@@ -8,9 +8,8 @@ The neutral addend is -0.0, the only number that changes nothing when it is adde
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from plant.compiled import EFFECTS
+from plant.compiled import EFFECTS, joint
 from plant.effects.places import FIELDS, JOINTS, field
 from plant.layout import Layout, Vector
 from plant.vectors import OUTPUTS
@@ -51,5 +50,5 @@ def _untouched_car(value: float, _y: Vector, _joint: int) -> float:
 
 
 # No fused products here: what lies before and behind a joint is computed alike in both builds.
-at_wheel = njit(error_model="numpy", forceinline=True)(_at_wheel if EFFECTS else _untouched_wheel)
-at_car = njit(error_model="numpy", forceinline=True)(_at_car if EFFECTS else _untouched_car)
+at_wheel = joint(_at_wheel if EFFECTS else _untouched_wheel)
+at_car = joint(_at_car if EFFECTS else _untouched_car)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from plant.integrate import RUNGE_KUTTA_4
-from plant.model import advance, column_indices, compile_model, healthy, initial_state, pack, replay
+from plant.model import NEUTRAL, advance, column_indices, compile_model, healthy, initial_state, pack, replay, simulate
 from plant.road import DRY, RoadSegment, road_table
 from plant.vectors import CUT, INPUT, OUTPUT, STATE, SWITCH, U, X, Y
 
@@ -23,8 +23,15 @@ def stop(paper_car):
     return initial_state(paper_car, 25.0, 423.15, 0.7), inputs, pack(paper_car)
 
 
-def test_compiles():
+def test_is_compiled_once_for_all_its_uses(stop):
+    """A second kind of argument (a read-only vector, say) would double the first start."""
+    if not hasattr(simulate, "signatures"):
+        pytest.skip("numba is switched off: nothing is compiled")
+    start, inputs, p = stop
     compile_model()
+    replay(start, inputs[:3], p, ["speed_mps"])
+    replay(start, inputs[:3], np.tile(p, (2, 1)), ["speed_mps"], theta=np.tile(NEUTRAL, (2, 1)))
+    assert len(simulate.signatures) == 1
 
 
 def test_own_pressure_at_the_pressure_cut_gives_the_same_stop(stop):
