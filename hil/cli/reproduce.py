@@ -22,11 +22,13 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="regenerate the paper's numbers and figures",
         description="Drive the paper's manoeuvres in virtual time with the paper's observer and with ours, under the "
         "nominal and nine other conditions, and print every number beside the paper's and its goal.",
-        epilog="Conditions other than the nominal one take a fifth of the seeds. --json prints {rows: [{figure, claim, "
-        "unit, paper, paper_method, median, p95, goal, statistic, met, conditions, seeds, degradation}]}.",
+        epilog="20 seeds are two hours of processor time; --keep lets it be stopped and gone on with. --json prints "
+        "{rows: [{figure, claim, unit, paper, paper_method, median, p95, goal, statistic, met, conditions, seeds, "
+        "degradation}]}.",
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="write the report and the figures")
     parser.add_argument("--seeds", type=int, default=20, metavar="N", help="seeds of the noise (default: 20)")
+    parser.add_argument("--keep", type=Path, metavar="FILE", help="keep what is measured, go on from what is there")
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -36,13 +38,15 @@ def run(args: argparse.Namespace) -> int:
     if args.seeds < 1:
         raise BrakebenchError(f"--seeds: expected at least 1, got {args.seeds}")
     from hil.reproduce.identification import identification_rows, shipped_study
+    from hil.reproduce.store import Store
     from hil.reproduce.study import measure
 
     def say(line: str) -> None:
         print(line, file=sys.stderr, flush=True)
 
+    store = Store(args.keep)
     say("identifying the pad friction (Figures 3 to 5) ...")
-    rows = identification_rows(shipped_study()) + measure(args.seeds, len(os.sched_getaffinity(0)), say)
+    rows = identification_rows(shipped_study()) + measure(args.seeds, len(os.sched_getaffinity(0)), say, store)
     if args.out is not None:
         _write(args.out, rows)
     if args.json:

@@ -1,6 +1,6 @@
 """All claims under all conditions over many seeds, on all cores, as rows."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -9,9 +9,9 @@ import numpy as np
 from hil.process import worker_pool
 from hil.reproduce.cases import CASES, Numbers
 from hil.reproduce.claims import CLAIMS, Claim
-from hil.reproduce.conditions import CONDITIONS, NOMINAL, Condition
+from hil.reproduce.conditions import CONDITIONS, Condition
+from hil.reproduce.store import Job, Store
 
-SEEDS_SHARE = 5  # a condition other than the nominal one takes this share of the seeds
 DEGRADED = 2.0
 
 
@@ -38,38 +38,43 @@ class Row:
     degradation: float | None
 
 
-def job(what: tuple[str, int, int]) -> Numbers:
+def job(what: Job) -> Numbers:
     """Measure one case under one condition with one seed (by its number: workers take plain values)."""
     case, condition, seed = what
     return CASES[case](CONDITIONS[condition], seed)
 
 
-def measure(seeds: int, workers: int, say: Callable[[str], None]) -> list[Row]:
+def measure(seeds: int, workers: int, say: Callable[[str], None], store: Store) -> list[Row]:
     """Drive everything and return the rows, nominal condition first.
 
     Parameters
     ----------
-    seeds : of the nominal condition; the others take a fifth of them, at least one.
+    seeds : of every condition.
     workers : processes.
     say : takes lines of progress.
+    store : numbers that need not be measured again; takes each as it is found.
     """
-    counts = [seeds if c is NOMINAL else max(1, seeds // SEEDS_SHARE) for c in CONDITIONS]
-    jobs = [(case, k, seed) for k, n in enumerate(counts) for case in CASES for seed in range(1, n + 1)]
-    found: dict[tuple[str, int], list[Numbers]] = {}
+    jobs = [(case, k, seed) for seed in range(1, seeds + 1) for k in range(len(CONDITIONS)) for case in CASES]
+    missing = [what for what in jobs if what not in store.numbers]
+    if len(missing) < len(jobs):
+        say(f"{len(jobs) - len(missing)} of {len(jobs)} cases were driven before")
     with worker_pool(workers) as pool:
-        for done, ((case, k, _), numbers) in enumerate(zip(jobs, pool.map(job, jobs), strict=True), 1):
-            found.setdefault((case, k), []).append(numbers)
-            if done % 20 == 0 or done == len(jobs):
-                say(f"{done} of {len(jobs)} cases driven ({CONDITIONS[k].name})")
-    return rows(found, counts)
+        for done, (what, numbers) in enumerate(zip(missing, pool.map(job, missing), strict=True), 1):
+            store.add(what, numbers)
+            if done % 20 == 0 or done == len(missing):
+                say(f"{done} of {len(missing)} cases driven (seed {what[2]}, {CONDITIONS[what[1]].name})")
+    found: dict[tuple[str, int], list[Numbers]] = {}
+    for what in jobs:
+        found.setdefault(what[:2], []).append(store.numbers[what])
+    return rows(found, seeds)
 
 
-def rows(found: dict[tuple[str, int], list[Numbers]], counts: Sequence[int]) -> list[Row]:
+def rows(found: Mapping[tuple[str, int], Sequence[Numbers]], seeds: int) -> list[Row]:
     """Rows from what was measured: (case, number of the condition) -> numbers of each seed."""
     pick = partial(_row, found)
-    nominal = [pick(claim, 0, CONDITIONS[0], counts[0], None) for claim in CLAIMS]
+    nominal = [pick(claim, 0, CONDITIONS[0], seeds, None) for claim in CLAIMS]
     others = [
-        pick(claim, k, condition, counts[k], base.median)
+        pick(claim, k, condition, seeds, base.median)
         for k, condition in enumerate(CONDITIONS)
         if k > 0
         for claim, base in zip(CLAIMS, nominal, strict=True)
@@ -78,7 +83,7 @@ def rows(found: dict[tuple[str, int], list[Numbers]], counts: Sequence[int]) -> 
 
 
 def _row(
-    found: dict[tuple[str, int], list[Numbers]],
+    found: Mapping[tuple[str, int], Sequence[Numbers]],
     claim: Claim,
     k: int,
     condition: Condition,

@@ -41,7 +41,7 @@ def test_rows_judge_by_the_goals_own_statistic_and_direction():
     for i in range(3):
         found["patch", 0][i][cut.key] = values["large is good"][i]
         found["patch", 0][i][torque.key] = 10.0 * values["small is good"][i]
-    table = {(r.claim, r.conditions): r for r in rows(found, [3] * len(CONDITIONS))}
+    table = {(r.claim, r.conditions): r for r in rows(found, 3)}
     row = table[cut.claim, "nominal"]
     assert (row.median, row.met, row.paper_method) == (99.0, True, 10.0)
     assert row.p95 < 30.0
@@ -55,7 +55,7 @@ def test_rows_judge_by_the_goals_own_statistic_and_direction():
 
 def test_the_report_shows_every_row_misses_included():
     found = {(case, k): [n] for case, n in measured(1e6).items() for k in range(len(CONDITIONS))}
-    table = rows(found, [1] * len(CONDITIONS))
+    table = rows(found, 1)
     report = build_report(table, {})
     shown = sum(len(t.rows) for s in report.sections for t in s.tables)
     assert shown == len(table)
@@ -157,7 +157,7 @@ def test_goals_are_numbers():
 def test_one_seed_meets_the_goals_but_for_the_known_misses():
     found = {(name, 0): [case(NOMINAL, 1)] for name, case in cases.CASES.items()}
     found |= {(name, k): found[name, 0] for name in cases.CASES for k in range(1, len(CONDITIONS))}
-    missed = {r.claim for r in rows(found, [1] * len(CONDITIONS)) if r.conditions == "nominal" and not r.met}
+    missed = {r.claim for r in rows(found, 1) if r.conditions == "nominal" and not r.met}
     assert missed == {
         "the same, road correction off",
         "battery refuses without notice at alpha 0.7: depth of the dip",
