@@ -14,10 +14,9 @@ from operator import or_
 from typing import Any
 
 import bitstruct.c as bitstruct
-from cantools.database.can import Message as DbcMessage
-from cantools.database.can import Signal as DbcSignal
 
 from dbc import e2e
+from dbc.lean_cantools import DbcMessage, DbcSignal
 
 CRC_SIGNAL = "CRC"
 COUNTER_SIGNAL = "ALIVE_COUNTER"

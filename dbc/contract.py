@@ -9,13 +9,10 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-import cantools
-from cantools.database import Database
-from cantools.database.can import Message as DbcMessage
-
 from dbc import bench_messages, messages
 from dbc.codec import CRC_SIGNAL, CodecError, Field, compile_decoder, compile_encoder, field_of, payload_signals
 from dbc.frame import BusName
+from dbc.lean_cantools import Database, DbcMessage, cantools
 
 Message = tuple[Any, ...]  # a typed message: one of the NamedTuples of messages.py and bench_messages.py
 

@@ -7,8 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-import cantools
-
+from dbc.lean_cantools import cantools
 from dbc.sieve import Sieved, sieve
 
 MAX_TEXT_BYTES = 16 * 1024 * 1024

@@ -9,7 +9,7 @@ from hil.bus.bus import Bus
 from hil.bus.channel import bench_channel, claim_channel
 from hil.bus.open import open_bus
 from hil.node_process import NODE_PERIOD_NS
-from hil.process import Child, StopSignal, wait_for_end
+from hil.process import Child, StopSignal, interrupts_held, wait_for_end
 from hil.rig import BenchError, BenchState, Rig, Say, silent
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop, Tick
@@ -93,7 +93,8 @@ class Bench(Rig):
 
     def _spawn(self, name: str, arguments: list[str]) -> None:
         words = self.out / f"{name}.txt"
-        self._children.append(Child(name, [*arguments, "--bus", self.spec], words))
+        with interrupts_held():  # else a process could be started that nobody ends
+            self._children.append(Child(name, [*arguments, "--bus", self.spec], words))
 
     def _await_ready(self, children: Sequence[Child]) -> None:
         for child in children:

@@ -60,12 +60,14 @@ class Rig(ABC):
     director : the bench's own node.
     state, reason : where the run is, and why it is broken.
     spec, note : what carries it, and why that.
+    real_time : whether time passes by itself; else only in `tick`.
     log : the recording.
     processes, alive_at_end : recorder and nodes where they are processes; nodes that lived until asked to stop.
     """
 
     spec = ""
     note = ""
+    real_time = True
 
     def __init__(self, scenario: Scenario, out: Path, seed: int, say: Say, stop: StopSignal | None) -> None:
         self.scenario = scenario
@@ -87,6 +89,9 @@ class Rig(ABC):
     def processes(self) -> tuple[Child, ...]:
         """The processes started so far."""
         return ()
+
+    def flush(self) -> None:  # noqa: B027 - a recorder of its own process does so by itself
+        """Bring the recording up to now."""
 
     @abstractmethod
     def _begin(self) -> None:

@@ -138,6 +138,7 @@ class VirtualBench(Rig):
 
     spec = SPEC
     note = "as fast as it goes"
+    real_time = False
 
     def __init__(
         self,
