@@ -1,9 +1,13 @@
-"""How the numeric kernels are compiled: cached on disk; ``NUMBA_DISABLE_JIT=1`` runs the same source uncompiled.
+"""How the numeric kernels are compiled: helpers into a few entry points, which are cached on disk.
 
-Each kernel keeps its constants and helpers in one file, because numba's cache looks at the age of one file only.
+``NUMBA_DISABLE_JIT=1`` runs the same source uncompiled. Numba's cache looks at the age of one file only, so an edited
+helper or layout would leave a stale entry point behind; `entry` stamps the cache with all sources instead.
 """
 
+import hashlib
 from collections.abc import Callable
+from functools import cache
+from importlib import resources
 from typing import Any, TypeVar, cast
 
 from numba import njit
@@ -11,6 +15,26 @@ from numba import njit
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def compiled(function: F) -> F:
-    """Compile a function of scalars and arrays when it is first called."""
-    return cast(F, njit(cache=True, nogil=True, error_model="numpy")(function))
+def helper(function: F) -> F:
+    """Compile a function of scalars and arrays into whatever calls it, when an entry point first needs it."""
+    return cast(F, njit(nogil=True, error_model="numpy")(function))
+
+
+def entry(function: F) -> F:
+    """Compile a function that Python calls: cached on disk, without the global interpreter lock."""
+    compiled = njit(cache=True, nogil=True, error_model="numpy")(function)
+    disk_cache = getattr(compiled, "_cache", None)  # absent when numba is switched off
+    if disk_cache is not None:
+        disk_cache._cache_file._source_stamp = _source_stamp()
+    return cast(F, compiled)
+
+
+@cache
+def _source_stamp() -> str:
+    """Digest of every source file of the control law."""
+    digest = hashlib.sha256()
+    for folder in ("ecu.law", "ecu.law.joint"):
+        for file in sorted(resources.files(folder).iterdir(), key=lambda f: f.name):
+            if file.name.endswith(".py"):
+                digest.update(file.read_bytes())
+    return digest.hexdigest()

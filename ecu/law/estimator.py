@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.law import friction
-from ecu.law import joint_filter as joint
 from ecu.law import paper_observer as paper
+from ecu.law.joint import layout as joint
+from ecu.law.joint.filter import joint_step
 from ecu.law.types import UNKNOWN, ZERO, Four, Inputs, Source
 from ecu.parameters.ecu import EcuParameters
 
@@ -38,7 +39,7 @@ def _four(values: Vector, start: int) -> Four:
 
 
 def measured(inputs: Inputs, lost: tuple[bool, ...], demand_mps2: float, torque_per_current_nm_a: float) -> Vector:
-    """Inputs of the observers (layout of `joint_filter`), NaN where a source is lost."""
+    """Inputs of the observers (`joint.layout`), NaN where a source is lost."""
     nan = math.nan
     body = not lost[Source.BODY_MOTION]
     w, q, i = inputs.wheel_speed_rad_s, inputs.pressure_pa, inputs.motor_current_a
@@ -148,7 +149,7 @@ def estimate(state: Vector, z: Vector, parameters: EcuParameters, dt_s: float) -
     """
     nominal = parameters.friction_brake.pad_friction
     if parameters.compensation.method == "joint":
-        state = joint.joint_step(state, z, joint_parameters(parameters), dt_s)
+        state = joint_step(state, z, joint_parameters(parameters), dt_s)
         if state[joint.STARTED] == 0.0:
             return state, Estimates(0.0, UNKNOWN, (nominal, nominal, nominal, nominal), ZERO, 1.0)
         mu = _four(state, joint.FRICTION)

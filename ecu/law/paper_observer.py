@@ -16,7 +16,7 @@ from math import exp, isnan, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.law.compiled import compiled
+from ecu.law.compiled import entry, helper
 
 Vector = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ MU_TORQUE = K_SENSOR + MAX_WINDOW  # per wheel
 MU_PRESSURE = MU_TORQUE + 4 * MAX_WINDOW
 SIZE = MU_PRESSURE + 4 * MAX_WINDOW
 
-# inputs as in joint_filter
+# inputs as in joint.layout
 AX, AY, YAW_RATE, STEER, DEMAND, WHEEL, PRESSURE, MOTOR = 0, 1, 2, 3, 4, 5, 9, 13
 
 # parameters
@@ -55,7 +55,7 @@ G0 = 9.80665
 SPEED_GAIN, OFFSET_GAIN = 5.0, 5.0  # reference speed while the wheels roll free: 1/s, 1/s2
 
 
-@compiled
+@helper
 def burckhardt(slip: float, side_slip: float, load_n: float, c1: float, c2: float, c3: float) -> tuple[float, float]:
     """Tyre force in the wheel's axes, N (Kiencke/Nielsen): mu(s) Fz along the slip, mu = c1 (1 - exp(-c2 s)) - c3 s."""
     s = sqrt(slip * slip + side_slip * side_slip)
@@ -65,7 +65,7 @@ def burckhardt(slip: float, side_slip: float, load_n: float, c1: float, c2: floa
     return mu * load_n * slip / s, mu * load_n * side_slip / s
 
 
-@compiled
+@entry
 def kalman_step(x: Vector, covariance: Vector, z: Vector, force_rate: Vector, q: Vector, r: Vector, radius: float,
                 inertia: float, dt: float) -> None:  # fmt: skip
     """One step of the 16-state filter, in place: prediction (8a)-(8d), update with `z` (eq. 6).
@@ -127,7 +127,7 @@ def kalman_step(x: Vector, covariance: Vector, z: Vector, force_rate: Vector, q:
                     covariance[c + 4 * j + i] = value_ij
 
 
-@compiled
+@entry
 def kalman_run(x: Vector, covariance: Vector, z: Vector, force_rate: Vector, q: Vector, r: Vector, radius: float,
                inertia: float, dt: float, out: Vector) -> None:  # fmt: skip
     """`kalman_step` over the rows of ``z`` (n, 8) and ``force_rate`` (n, 4); the states go into ``out`` (n, 16)."""
@@ -137,13 +137,13 @@ def kalman_run(x: Vector, covariance: Vector, z: Vector, force_rate: Vector, q: 
             out[n, i] = x[i]
 
 
-@compiled
+@entry
 def paper_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     """Advance observer and friction estimation by one sample.
 
     Parameters
     ----------
-    s : state of the last sample (layout of this file); not changed.  z : inputs as of `joint_filter`, NaN where not
+    s : state of the last sample (layout of this file); not changed.  z : inputs as of `joint.layout`, NaN where not
         available.  p : parameters, `estimator.paper_parameters`.  dt : s.
     """
     s = s.copy()

@@ -28,8 +28,9 @@ from dbc.messages import (
     WheelSpeedFront,
     WheelSpeedRear,
 )
-from ecu.law import joint_filter
 from ecu.law.estimator import joint_parameters
+from ecu.law.joint import layout
+from ecu.law.joint.filter import joint_step
 from ecu.law.paper_observer import kalman_run, kalman_step
 from ecu.node import EcuNode
 from ecu.parameters.ecu import EcuParameters
@@ -126,14 +127,14 @@ def _against_filterpy() -> list[Row]:
 def _joint(parameters: EcuParameters) -> Row:
     """The joint filter's step against the whole tick's budget."""
     p = joint_parameters(parameters)
-    z = np.zeros(joint_filter.INPUTS)
-    z[joint_filter.WHEEL : joint_filter.WHEEL + 4] = 60.0
-    z[joint_filter.AX], z[joint_filter.DEMAND] = -3.2, 3.2
-    z[joint_filter.PRESSURE : joint_filter.PRESSURE + 4] = 25e5
-    state = joint_filter.joint_step(np.zeros(joint_filter.SIZE), z, p, STEP_S)
+    z = np.zeros(layout.INPUTS)
+    z[layout.WHEEL : layout.WHEEL + 4] = 60.0
+    z[layout.AX], z[layout.DEMAND] = -3.2, 3.2
+    z[layout.PRESSURE : layout.PRESSURE + 4] = 25e5
+    state = joint_step(np.zeros(layout.SIZE), z, p, STEP_S)
 
     def step() -> float:
-        return _cpu_us(lambda: joint_filter.joint_step(state, z, p, STEP_S), STEPS)
+        return _cpu_us(lambda: joint_step(state, z, p, STEP_S), STEPS)
 
     return paired(
         "joint filter step",

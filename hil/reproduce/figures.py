@@ -3,8 +3,9 @@
 import numpy as np
 
 from dbc.bench_messages import PhysicalFault
-from ecu.law import joint_filter, paper_observer
+from ecu.law import paper_observer
 from ecu.law.base_brake import reference_deceleration
+from ecu.law.joint import layout
 from hil.identify.summary import figures as identified
 from hil.report.report import Chart, Curve, Number, Panel, Report, Section, Style, Trace
 from hil.report.units import KMH, KN
@@ -155,7 +156,7 @@ def slippery_patch() -> Report:
 
 def _wheel_share(run: Run) -> Vector:
     radius = ecu_parameters().vehicle.rolling_radius_m
-    return np.asarray(run.observer[:, joint_filter.LAST_WHEEL] * radius / np.maximum(run.speed_mps, 0.5))
+    return np.asarray(run.observer[:, layout.LAST_WHEEL] * radius / np.maximum(run.speed_mps, 0.5))
 
 
 def pad_friction() -> Report:

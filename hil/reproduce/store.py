@@ -60,7 +60,17 @@ class Store:
 def sources() -> str:
     """Digest of all that decides the numbers: contract, controller, plant, and the cases here."""
     digest = hashlib.sha256()
-    for package in ("dbc", "ecu", "ecu.law", "ecu.parameters", "plant", "plant.parameters", "hil.rt", "hil.reproduce"):
+    for package in (
+        "dbc",
+        "ecu",
+        "ecu.law",
+        "ecu.law.joint",
+        "ecu.parameters",
+        "plant",
+        "plant.parameters",
+        "hil.rt",
+        "hil.reproduce",
+    ):
         for file in sorted(resources.files(package).iterdir(), key=lambda f: f.name):
             if file.name.endswith((".py", ".toml", ".dbc")):
                 digest.update(file.read_bytes())

@@ -7,7 +7,8 @@ import pytest
 
 from dbc.bench_messages import PhysicalFault
 from dbc.messages import BrakeMode
-from ecu.law import estimator, joint_filter
+from ecu.law import estimator
+from ecu.law.joint import layout
 from hil.parameters import override
 from hil.reproduce import runs
 from plant.manoeuvre import Manoeuvre, SpeedPhase
@@ -85,7 +86,7 @@ def test_a_wheel_that_does_not_turn_as_the_car_moves_is_left_out_and_reported(ca
 
     def broken(*arguments):
         z = whole(*arguments)
-        z[joint_filter.WHEEL + 2] *= factor
+        z[layout.WHEEL + 2] *= factor
         return z
 
     monkeypatch.setattr(estimator, "measured", broken)

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from ecu.law import joint_filter as joint
 from ecu.law.estimator import joint_parameters
+from ecu.law.joint import layout as joint
+from ecu.law.joint.filter import joint_step
 
 DT, RADIUS, INERTIA, MASS = 0.01, 0.308, 1.5, 1463.0
 FRICTION = slice(joint.FRICTION, joint.FRICTION + 4)
@@ -54,7 +55,7 @@ class SmallCar:
             z[joint.WHEEL : joint.WHEEL + 4] = omega * (1 + noise * 1e-3 * self.rng.normal(size=4))
             z[joint.PRESSURE : joint.PRESSURE + 4] = pressure_pa + self.zero_pa + noise * 1e4 * self.rng.normal(size=4)
             z[joint.MOTOR : joint.MOTOR + 4] = motor_nm
-            self.state = joint.joint_step(self.state, z, self.p, DT)
+            self.state = joint_step(self.state, z, self.p, DT)
             self.true_torque = torque
         return self.state
 
@@ -148,7 +149,7 @@ def test_missing_signals_leave_the_friction_alone(parameters, lost):
     z[lost] = math.nan
     state = car.state
     for _ in range(5):
-        state = joint.joint_step(state, z, car.p, DT)
+        state = joint_step(state, z, car.p, DT)
     assert np.all(np.isfinite(state))
     assert state[FRICTION] == pytest.approx(friction, rel=0.1)
 
@@ -166,7 +167,7 @@ def test_a_locked_wheel_gives_what_the_road_gives(parameters):
         z[joint.AX], z[joint.DEMAND] = -1.6 + 9.80665 * 0.00231 * -1.6, 3.2
         z[joint.WHEEL : joint.WHEEL + 4] = [omega, omega, speed / RADIUS * 0.99, speed / RADIUS * 0.99]
         z[joint.PRESSURE : joint.PRESSURE + 4] = 25e5
-        state = joint.joint_step(state, z, car.p, DT)
+        state = joint_step(state, z, car.p, DT)
         if k == 10:
             assert state[TORQUE][0] == pytest.approx(car.true_torque[0], rel=0.05)
     assert -260.0 < state[TORQUE][0] < -80.0
@@ -178,5 +179,5 @@ def test_the_same_source_runs_uncompiled(parameters):
     car.run(0.5)
     z = np.zeros(17)
     z[joint.WHEEL : joint.WHEEL + 4] = car.v / RADIUS
-    plain = getattr(joint.joint_step, "py_func", joint.joint_step)
-    assert plain(car.state, z, car.p, DT) == pytest.approx(joint.joint_step(car.state, z, car.p, DT), rel=1e-9)
+    plain = getattr(joint_step, "py_func", joint_step)
+    assert plain(car.state, z, car.p, DT) == pytest.approx(joint_step(car.state, z, car.p, DT), rel=1e-9)

@@ -1,0 +1,124 @@
+"""One step of the joint filter."""
+
+from math import isnan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ecu.law.compiled import entry
+from ecu.law.joint.kalman import keep_in_bounds, predict, start
+from ecu.law.joint.layout import (
+    AX,
+    AY,
+    BIAS,
+    FORCE_LAG,
+    G0,
+    GRADE,
+    LAST_WHEEL,
+    LOCKED,
+    MASS,
+    MOTOR,
+    MOTOR_LAG,
+    P_BASE,
+    P_CORNER,
+    P_FRONT,
+    P_MASS,
+    P_RADIUS,
+    P_SPEED_MIN,
+    P_STEER_RATIO,
+    P_STIFF,
+    ROAD,
+    SLID_S,
+    SLIDING,
+    SPEED,
+    STARTED,
+    STEER,
+    STIFFNESS,
+    WHEEL,
+    YAW_RATE,
+)
+from ecu.law.joint.measurements import balance_forces, compare_wheel_speed
+from ecu.law.joint.motion import level_acceleration, stand, wheel_states
+from ecu.law.joint.sliding import LOST_S, find_speed_again, torque_of_standing_wheels, watch_wheel
+from ecu.law.joint.torque import track_pressure_zero, update_torques, wheel_force
+
+Vector = NDArray[np.float64]
+
+
+@entry
+def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
+    """Advance the filter by one sample.
+
+    Parameters
+    ----------
+    s : state of the last step (`layout`); not changed.  z : inputs, NaN where not available; pressures Pa,
+        motor torques Nm negative braking, ``DEMAND`` the demanded deceleration.  p : parameters,
+        `estimator.joint_parameters`.  dt : time since the last sample, s.
+
+    Returns
+    -------
+    new state; ``TORQUE`` holds the wheel torques, Nm, negative braking.
+    """
+    s = s.copy()
+    fastest = -1.0
+    for i in range(4):
+        if z[WHEEL + i] > fastest:
+            fastest = z[WHEEL + i]
+    body = not isnan(z[AX])
+    if s[STARTED] == 0.0:
+        if fastest < 0.0 or not body:
+            return s
+        start(s, p, np.nanmedian(z[WHEEL : WHEEL + 4]) * p[P_RADIUS])
+        for i in range(4):
+            s[MOTOR_LAG + i] = 0.0 if isnan(z[MOTOR + i]) else z[MOTOR + i]
+    yaw_rate = 0.0 if isnan(z[YAW_RATE]) else z[YAW_RATE]
+    ay = 0.0 if isnan(z[AY]) else z[AY]
+    steer = 0.0 if isnan(z[STEER]) else z[STEER] / p[P_STEER_RATIO]
+
+    pressures = track_pressure_zero(s, z, p, dt)
+    force, applied = update_torques(s, z, p, dt)
+    force_rate = (force - s[FORCE_LAG]) / dt
+    s[FORCE_LAG] = force
+    if fastest <= 0.0 and s[SPEED] < 1.0:
+        stand(s, p)
+        return s
+
+    ax = level_acceleration(s, z, p, dt)
+    rear_m = p[P_BASE] - p[P_FRONT]
+    lateral = rear_m * yaw_rate - s[SPEED] * ay / (G0 * p[P_CORNER])
+    acceleration = ax - s[BIAS] - G0 * s[GRADE] + yaw_rate * lateral
+    predict(s, p, acceleration, dt)
+    speed = s[SPEED]
+    loads, along, spin = np.empty(4), np.empty(4), np.zeros(4)
+    wheel_states(s, p, ay, yaw_rate, steer, lateral, loads, along)
+
+    sliding = False
+    for i in range(4):
+        s[SLIDING + i] = max(s[SLIDING + i] - dt, 0.0)
+        omega = z[WHEEL + i]
+        if p[ROAD] > 0.5 and not isnan(omega) and speed > 1.0:
+            expected = wheel_force(s, p, i, loads[i], acceleration) / (loads[i] * p[P_STIFF] * s[STIFFNESS])
+            spin[i] = watch_wheel(s, p, i, omega, along[i], expected, dt)
+        else:
+            s[LOCKED + i] = 0.0
+        s[LAST_WHEEL + i] = 0.0 if isnan(omega) else omega
+        s[SLID_S + i] = s[SLID_S + i] + dt if s[SLIDING + i] > 0.0 else 0.0
+        sliding = sliding or s[SLIDING + i] > 0.0
+
+    if min(min(s[SLID_S], s[SLID_S + 1]), min(s[SLID_S + 2], s[SLID_S + 3])) > LOST_S:
+        find_speed_again(s, z, p)
+    fast = speed > p[P_SPEED_MIN]
+    if body and pressures and fast and not sliding:
+        side_n = (rear_m / p[P_BASE]) * p[P_MASS] * s[MASS] * ay * np.sin(steer)
+        balance_forces(s, p, ax, ay, side_n, force, force_rate, applied, dt)
+    for i in range(4):
+        if isnan(z[WHEEL + i]) or s[SLIDING + i] > 0.0 or along[i] < 1.0:
+            continue
+        ground = along[i] + s[SPEED] - speed  # what the measurements so far have changed
+        compare_wheel_speed(
+            s, p, i, z[WHEEL + i], ground, loads[i], acceleration, force_rate, fast and pressures, applied
+        )
+    keep_in_bounds(s)
+    if body and s[LOCKED] + s[LOCKED + 1] + s[LOCKED + 2] + s[LOCKED + 3] > 0.0:
+        torque_of_standing_wheels(s, p, ax, acceleration, loads, spin)
+    return s

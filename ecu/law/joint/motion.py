@@ -1,0 +1,77 @@
+"""The body's motion: levelled acceleration, wheel loads, the ground's speed under each wheel, standstill."""
+
+from math import isnan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ecu.law.compiled import helper
+from ecu.law.joint.layout import (
+    AX,
+    BIAS,
+    G0,
+    GRADE,
+    LOAD_ACCELERATION,
+    MASS,
+    P_ARM,
+    P_BASE,
+    P_DIVE,
+    P_FRONT,
+    P_HEIGHT,
+    P_MASS,
+    P_PITCH_D,
+    P_PITCH_W,
+    P_TRACK,
+    PITCH,
+    PITCH_RATE,
+    SPEED,
+    TORQUE,
+)
+
+Vector = NDArray[np.float64]
+
+
+@helper
+def level_acceleration(s: Vector, z: Vector, p: Vector, dt: float) -> float:
+    """Measured longitudinal acceleration with the body's pitch taken out (the sensor pitches with it), m/s2."""
+    if isnan(z[AX]):
+        return float(s[LOAD_ACCELERATION] + s[BIAS])
+    w, d = p[P_PITCH_W], p[P_PITCH_D]
+    level = (z[AX] - s[BIAS]) / (1.0 + G0 * p[P_DIVE])
+    s[PITCH_RATE] += dt * (w * w * (-p[P_DIVE] * level - s[PITCH]) - 2.0 * d * w * s[PITCH_RATE])
+    s[PITCH] += dt * s[PITCH_RATE]
+    ax = z[AX] + G0 * s[PITCH]
+    s[LOAD_ACCELERATION] += min(dt / 0.05, 1.0) * (ax - s[BIAS] - s[LOAD_ACCELERATION])
+    return float(ax)
+
+
+@helper
+def wheel_states(
+    s: Vector, p: Vector, ay: float, yaw_rate: float, steer: float, lateral: float, loads: Vector, along: Vector
+) -> None:
+    """Fill vertical loads, N, and the ground's speed along each wheel, m/s."""
+    base = p[P_BASE]
+    rear_m = base - p[P_FRONT]
+    mass = p[P_MASS] * s[MASS]
+    shift_x = mass * p[P_HEIGHT] * s[LOAD_ACCELERATION] / (2.0 * base)
+    for i in range(4):
+        axle = 0 if i < 2 else 1
+        arm_m = rear_m if axle == 0 else p[P_FRONT]
+        left = 1.0 if i % 2 == 0 else -1.0
+        share_y = arm_m / base * mass * ay * p[P_HEIGHT] / p[P_TRACK + axle]
+        load = 0.5 * mass * G0 * arm_m / base - (shift_x if axle == 0 else -shift_x) - left * share_y
+        loads[i] = max(load, 200.0)
+        ground = s[SPEED] - yaw_rate * left * 0.5 * p[P_TRACK + axle]
+        if axle == 0:
+            ground = ground * np.cos(steer) + (lateral + yaw_rate * p[P_FRONT]) * np.sin(steer)
+        along[i] = ground
+
+
+@helper
+def stand(s: Vector, p: Vector) -> None:
+    """The car stands: nothing to learn; a standing brake gives what holds the car, and no more than it can."""
+    s[SPEED] = 0.0
+    holding = 0.25 * p[P_MASS] * s[MASS] * G0 * s[GRADE] * p[P_ARM]
+    for i in range(4):
+        most = abs(s[TORQUE + i])
+        s[TORQUE + i] = min(max(holding, -most), most)
