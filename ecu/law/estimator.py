@@ -22,7 +22,8 @@ IMPLAUSIBLE_S = 1.0
 class Estimates(NamedTuple):
     """Speed over ground, wheel torques (negative braking), pad friction with confidence 0..1, mass over nominal.
 
-    ``implausible`` wheels have not turned as the car moves for longer than a wheel slides.
+    ``implausible`` wheels have not turned as the car moves for longer than a wheel slides; ``stuck``: the acceleration
+    sensor repeats itself while the wheels tell of another acceleration.
     """
 
     speed_mps: float
@@ -31,6 +32,7 @@ class Estimates(NamedTuple):
     confidence: Four
     mass_factor: float
     implausible: tuple[bool, bool, bool, bool] = PLAUSIBLE
+    stuck: bool = False
 
 
 def _four(values: Vector, start: int) -> Four:
@@ -165,6 +167,7 @@ def estimate(state: Vector, z: Vector, parameters: EcuParameters, dt_s: float) -
             (a, b, c, d),
             float(state[joint.MASS]),
             (e, f, g, h),
+            bool(state[joint.STUCK]),
         )
     state = paper.paper_step(state, z, paper_parameters(parameters), dt_s)
     return state, Estimates(

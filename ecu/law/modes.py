@@ -110,6 +110,7 @@ def supervise(
     lost: tuple[bool, ...],
     pedal: PedalReading,
     implausible: tuple[bool, bool, bool, bool],
+    stuck: bool,
     p: SupervisionParameters,
     dt_s: float,
 ) -> tuple[ModeMemory, Fault]:
@@ -119,7 +120,7 @@ def supervise(
     ----------
     lost : sources that have timed out, from `lost_sources`.
     pedal : what the two channels say.
-    implausible : wheels that do not turn as the car moves.
+    implausible : wheels that do not turn as the car moves.  stuck : the acceleration sensor shows what is not.
     """
     faults = _missing(inputs)
     for source, fault in _SOURCE_FAULT:
@@ -129,6 +130,8 @@ def supervise(
         faults |= Fault.WHEEL_SPEED_FRONT
     if implausible[2] or implausible[3]:
         faults |= Fault.WHEEL_SPEED_REAR
+    if stuck:
+        faults |= Fault.BODY_MOTION
     if pedal.channel_1_lost:
         faults |= Fault.PEDAL_1
     if pedal.channel_2_lost:

@@ -66,8 +66,9 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     p = parameters
     lost = modes.lost_sources(inputs, p.supervision)
     pedal = base_brake.read_pedal(inputs, lost[Source.PEDAL], p.supervision.pedal_disagreement)
+    known = memory.estimates
     mode_memory, faults = modes.supervise(
-        memory.modes, inputs, lost, pedal, memory.estimates.implausible, p.supervision, dt_s
+        memory.modes, inputs, lost, pedal, known.implausible, known.stuck, p.supervision, dt_s
     )
     mode = mode_memory.mode
 
@@ -82,7 +83,7 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     )
     factor = inputs.blending_factor if math.isfinite(inputs.blending_factor) else memory.blending_factor
 
-    observer, known, since_sample_s = memory.observer, memory.estimates, memory.since_sample_s + dt_s
+    observer, since_sample_s = memory.observer, memory.since_sample_s + dt_s
     if since_sample_s > 0.95 * SAMPLE_S:
         z = estimator.measured(inputs, lost, deceleration, p.motor.torque_per_current_nm_a)
         observer, known = estimator.estimate(observer, z, p, since_sample_s)

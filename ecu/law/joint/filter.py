@@ -15,6 +15,7 @@ from ecu.law.joint.layout import (
     G0,
     GRADE,
     LAST_WHEEL,
+    LOAD_ACCELERATION,
     LOCKED,
     MASS,
     MOTOR,
@@ -27,6 +28,8 @@ from ecu.law.joint.layout import (
     P_SPEED_MIN,
     P_STEER_RATIO,
     P_STIFF,
+    R_ACC,
+    REPEATED_S,
     ROAD,
     SLID_S,
     SLIDING,
@@ -38,11 +41,14 @@ from ecu.law.joint.layout import (
     YAW_RATE,
 )
 from ecu.law.joint.measurements import balance_forces, compare_wheel_speed
-from ecu.law.joint.motion import level_acceleration, stand, wheel_states
+from ecu.law.joint.motion import expected_acceleration, level_acceleration, stand, watch_accelerometer, wheel_states
 from ecu.law.joint.sliding import LOST_S, find_speed_again, torque_of_standing_wheels, watch_wheel
 from ecu.law.joint.torque import track_pressure_zero, update_torques, wheel_force
 
 Vector = NDArray[np.float64]
+
+FRESH_S = 0.05
+EXPECTED_MPS2 = 1.0  # what the acceleration out of the force balance can be off
 
 
 @entry
@@ -58,19 +64,21 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     Returns
     -------
     new state; ``TORQUE`` holds the wheel torques, Nm, negative braking.
+
+    Without a believable acceleration the speed comes from the wheels and the force balance, and nothing is learned.
     """
     s = s.copy()
     fastest = -1.0
     for i in range(4):
         if z[WHEEL + i] > fastest:
             fastest = z[WHEEL + i]
-    body = not isnan(z[AX])
     if s[STARTED] == 0.0:
-        if fastest < 0.0 or not body:
+        if fastest < 0.0 or isnan(z[AX]):
             return s
         start(s, p, np.nanmedian(z[WHEEL : WHEEL + 4]) * p[P_RADIUS])
         for i in range(4):
             s[MOTOR_LAG + i] = 0.0 if isnan(z[MOTOR + i]) else z[MOTOR + i]
+    body = watch_accelerometer(s, z, p, dt)
     yaw_rate = 0.0 if isnan(z[YAW_RATE]) else z[YAW_RATE]
     ay = 0.0 if isnan(z[AY]) else z[AY]
     steer = 0.0 if isnan(z[STEER]) else z[STEER] / p[P_STEER_RATIO]
@@ -83,11 +91,16 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
         stand(s, p)
         return s
 
-    ax = level_acceleration(s, z, p, dt)
     rear_m = p[P_BASE] - p[P_FRONT]
+    side_n = (rear_m / p[P_BASE]) * p[P_MASS] * s[MASS] * ay * np.sin(steer)
+    if body:
+        ax, uncertainty = level_acceleration(s, z, p, dt), p[R_ACC]
+    else:
+        ax, uncertainty = expected_acceleration(s, p, force, side_n) + s[BIAS], EXPECTED_MPS2
+        s[LOAD_ACCELERATION] += min(dt / 0.05, 1.0) * (ax - s[BIAS] - s[LOAD_ACCELERATION])
     lateral = rear_m * yaw_rate - s[SPEED] * ay / (G0 * p[P_CORNER])
     acceleration = ax - s[BIAS] - G0 * s[GRADE] + yaw_rate * lateral
-    predict(s, p, acceleration, dt)
+    predict(s, p, acceleration, uncertainty, dt)
     speed = s[SPEED]
     loads, along, spin = np.empty(4), np.empty(4), np.zeros(4)
     wheel_states(s, p, ay, yaw_rate, steer, lateral, loads, along)
@@ -108,16 +121,17 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     if min(min(s[SLID_S], s[SLID_S + 1]), min(s[SLID_S + 2], s[SLID_S + 3])) > LOST_S:
         find_speed_again(s, z, p)
     fast = speed > p[P_SPEED_MIN]
-    if body and pressures and fast and not sliding:
-        side_n = (rear_m / p[P_BASE]) * p[P_MASS] * s[MASS] * ay * np.sin(steer)
+    learning = body and s[REPEATED_S] < FRESH_S
+    if learning and pressures and fast and not sliding:
         balance_forces(s, p, ax, ay, side_n, force, force_rate, applied, dt)
     for i in range(4):
         if isnan(z[WHEEL + i]) or s[SLIDING + i] > 0.0 or along[i] < 1.0:
             continue
         ground = along[i] + s[SPEED] - speed  # what the measurements so far have changed
         compare_wheel_speed(
-            s, p, i, z[WHEEL + i], ground, loads[i], acceleration, force_rate, fast and pressures, applied
-        )
+            s, p, i, z[WHEEL + i], ground, loads[i], acceleration, force_rate, learning and fast and pressures,
+            applied, not learning,
+        )  # fmt: skip
     keep_in_bounds(s)
     if body and s[LOCKED] + s[LOCKED + 1] + s[LOCKED + 2] + s[LOCKED + 3] > 0.0:
         torque_of_standing_wheels(s, p, ax, acceleration, loads, spin)

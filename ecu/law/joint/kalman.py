@@ -21,7 +21,6 @@ from ecu.law.joint.layout import (
     Q_RELEASED,
     Q_SINGLE,
     Q_STIFF,
-    R_ACC,
     RADIUS,
     SPEED,
     START,
@@ -58,15 +57,18 @@ def start(s: Vector, p: Vector, speed_mps: float) -> None:
 
 
 @helper
-def predict(s: Vector, p: Vector, acceleration: float, dt: float) -> None:
-    """Speed by the acceleration; every other state drifts. Pads drift fast while pressed, slowly while they cool."""
+def predict(s: Vector, p: Vector, acceleration: float, uncertainty: float, dt: float) -> None:
+    """Speed by the acceleration, known to ``uncertainty``; every other state drifts.
+
+    Pads drift fast while pressed, slowly while they cool.
+    """
     c = COVARIANCE
     s[SPEED] = max(s[SPEED] + dt * acceleration, 0.0)
     for j in range(N):
         s[c + SPEED * N + j] -= dt * (s[c + BIAS * N + j] + G0 * s[c + GRADE * N + j])
     for j in range(N):
         s[c + j * N + SPEED] -= dt * (s[c + j * N + BIAS] + G0 * s[c + j * N + GRADE])
-    s[c] += p[R_ACC] ** 2 * dt * dt + 1e-8
+    s[c] += uncertainty**2 * dt * dt + 1e-8
     s[c + BIAS * N + BIAS] += p[Q_BIAS] * dt
     s[c + GRADE * N + GRADE] += p[Q_GRADE] * dt
     s[c + STIFFNESS * N + STIFFNESS] += p[Q_STIFF] * dt
@@ -82,8 +84,9 @@ def predict(s: Vector, p: Vector, acceleration: float, dt: float) -> None:
 
 @helper
 def correct(
-    s: Vector, h: Vector, residual: float, variance: float, gate: float, hold_mass: bool, hold_pads: bool
-) -> bool:
+    s: Vector, h: Vector, residual: float, variance: float, gate: float, hold_mass: bool, hold_pads: bool,
+    speed_only: bool,
+) -> bool:  # fmt: skip
     """One scalar measurement: gain, gate, symmetric covariance. Held states keep their value and their uncertainty.
 
     With a gain K that is zero in the held rows, P' = P - K (P h)^T - (P h) K^T + S K K^T (Schmidt's consider states).
@@ -106,6 +109,8 @@ def correct(
     if hold_pads:
         for i in range(4):
             k[FRICTION + i] = 0.0
+    if speed_only:
+        k[1:] = 0.0
     for i in range(N):
         s[i] += k[i] * residual
     for i in range(N):

@@ -17,7 +17,9 @@ SPIN = LAST_WHEEL + 4  # speed and rate with which a wheel spins down
 SPIN_RATE = SPIN + 4
 SLID_S = SPIN_RATE + 4  # how long a wheel has been sliding by now
 PITCH, PITCH_RATE, LOAD_ACCELERATION, FORCE_LAG, RELEASED_S, STARTED, REJECTED_S = (SLID_S + 4 + i for i in range(7))
-SIZE = SLID_S + 11
+LAST_AX = SLID_S + 11  # for how long it has repeated itself, when that was last looked at and the wheels' speed then
+REPEATED_S, LOOKED_S, SPEED_THEN, STUCK = LAST_AX + 1, LAST_AX + 2, LAST_AX + 3, LAST_AX + 4
+SIZE = LAST_AX + 5
 
 # inputs
 AX, AY, YAW_RATE, STEER, DEMAND = 0, 1, 2, 3, 4

@@ -14,7 +14,6 @@ from ecu.law.joint.layout import (
     GRADE,
     MASS,
     P_ARM,
-    P_DRAG,
     P_GAIN,
     P_INERTIA,
     P_MASS,
@@ -37,6 +36,7 @@ from ecu.law.joint.layout import (
     STIFFNESS,
     N,
 )
+from ecu.law.joint.motion import expected_acceleration
 from ecu.law.joint.torque import wheel_force
 
 Vector = NDArray[np.float64]
@@ -51,15 +51,13 @@ def balance_forces(
     s: Vector, p: Vector, ax: float, ay: float, side_n: float, force: float, force_rate: float, applied: bool,
     dt: float,
 ) -> None:  # fmt: skip
-    """Force balance: what the body feels against what the wheels give.
+    """Force balance: what the body feels against what the wheels give (`expected_acceleration`).
 
-    (m + J) (a - b) = sum(T) / r - F_R + J g theta with J = 4 I / r^2. A sudden change is the road's before it is the
-    pads': it is believed only after `REJECT_S`.
+    A sudden change is the road's before it is the pads': it is believed only after `REJECT_S`.
     """
     mass = p[P_MASS] * s[MASS]
     turn = 4.0 * p[P_INERTIA] / (p[P_RADIUS] * p[P_ARM])
-    resistance = 0.5 * p[P_DRAG] * s[SPEED] * s[SPEED] + mass * G0 * p[P_ROLL]
-    predicted = (force - resistance - side_n + turn * G0 * s[GRADE]) / (mass + turn) + s[BIAS]
+    predicted = expected_acceleration(s, p, force, side_n) + s[BIAS]
     change = abs(p[R_ALIGN] * force_rate / mass)
     drive = not applied and abs(force) > MASS_FORCE_SHARE * mass and change < p[R_ACC]
     h = np.zeros(N)
@@ -72,7 +70,7 @@ def balance_forces(
         h[FRICTION + i] = -gain * s[PRESSURE_LAG + i] / p[P_ARM] / (mass + turn)
     variance = p[R_ACC] ** 2 + change * change + (0.05 * ay) ** 2
     gate = p[GATE] if p[ROAD] > 0.5 and s[REJECTED_S] < REJECT_S else 1e6
-    if correct(s, h, ax - predicted, variance, gate, not drive, not applied):
+    if correct(s, h, ax - predicted, variance, gate, not drive, not applied, False):
         s[REJECTED_S] = 0.0
     else:
         s[REJECTED_S] += dt
@@ -81,7 +79,7 @@ def balance_forces(
 @helper
 def compare_wheel_speed(
     s: Vector, p: Vector, i: int, omega: float, ground: float, load: float, acceleration: float, force_rate: float,
-    learn: bool, applied: bool,
+    learn: bool, applied: bool, speed_only: bool,
 ) -> None:  # fmt: skip
     """Wheel speed and its slip: omega = v (1 + kappa) / (R delta), kappa = F / C (1 + 0.38 (F / D)^2).
 
@@ -108,4 +106,4 @@ def compare_wheel_speed(
     slow = 0.0 if s[SPEED] > p[P_SPEED_MIN] else 0.1
     sigma = (p[R_WHEEL] * ground + 0.01 + 0.002 * abs(acceleration) + slow) / rolling
     sigma += p[R_ALIGN] * abs(force_rate) * 0.25 * per_force * seen / rolling
-    correct(s, h, omega - predicted, sigma * sigma, p[GATE], True, not applied)
+    correct(s, h, omega - predicted, sigma * sigma, p[GATE], True, not applied, speed_only)

@@ -11,31 +11,71 @@ from ecu.law.joint.layout import (
     BIAS,
     G0,
     GRADE,
+    LAST_AX,
     LOAD_ACCELERATION,
+    LOOKED_S,
     MASS,
     P_ARM,
     P_BASE,
     P_DIVE,
+    P_DRAG,
     P_FRONT,
     P_HEIGHT,
+    P_INERTIA,
     P_MASS,
     P_PITCH_D,
     P_PITCH_W,
+    P_RADIUS,
+    P_ROLL,
     P_TRACK,
     PITCH,
     PITCH_RATE,
+    REPEATED_S,
     SPEED,
+    SPEED_THEN,
+    STUCK,
     TORQUE,
+    WHEEL,
 )
 
 Vector = NDArray[np.float64]
+
+REPEAT_S = 0.2
+CONTRADICTION_MPS2 = 0.5
+
+
+@helper
+def watch_accelerometer(s: Vector, z: Vector, p: Vector, dt: float) -> bool:
+    """Whether the accelerometer can be believed.
+
+    A living one never repeats itself for long while the car moves. One that does, while the wheels tell of another
+    acceleration, is stuck until its value changes; what repeats itself (`REPEATED_S`) teaches nothing meanwhile.
+    """
+    wheels, number = 0.0, 0
+    for i in range(4):
+        if not isnan(z[WHEEL + i]):
+            wheels += z[WHEEL + i]
+            number += 1
+    if isnan(z[AX]) or number == 0:
+        s[REPEATED_S], s[STUCK] = 0.0, 0.0
+        return not isnan(z[AX])
+    speed = wheels / number * p[P_RADIUS]
+    if z[AX] != s[LAST_AX]:
+        s[LAST_AX], s[REPEATED_S], s[LOOKED_S], s[SPEED_THEN], s[STUCK] = z[AX], 0.0, 0.0, speed, 0.0
+        return True
+    s[REPEATED_S] += dt
+    since = s[REPEATED_S] - s[LOOKED_S]
+    if since > REPEAT_S:
+        told = (z[AX] - s[BIAS]) / (1.0 + G0 * p[P_DIVE]) - G0 * s[GRADE]
+        if abs((speed - s[SPEED_THEN]) / since - told) > CONTRADICTION_MPS2:
+            s[STUCK] = 1.0
+        s[LOOKED_S], s[SPEED_THEN] = s[REPEATED_S], speed
+    return bool(s[STUCK] == 0.0)
 
 
 @helper
 def level_acceleration(s: Vector, z: Vector, p: Vector, dt: float) -> float:
     """Measured longitudinal acceleration with the body's pitch taken out (the sensor pitches with it), m/s2."""
-    if isnan(z[AX]):
-        return float(s[LOAD_ACCELERATION] + s[BIAS])
     w, d = p[P_PITCH_W], p[P_PITCH_D]
     level = (z[AX] - s[BIAS]) / (1.0 + G0 * p[P_DIVE])
     s[PITCH_RATE] += dt * (w * w * (-p[P_DIVE] * level - s[PITCH]) - 2.0 * d * w * s[PITCH_RATE])
@@ -43,6 +83,18 @@ def level_acceleration(s: Vector, z: Vector, p: Vector, dt: float) -> float:
     ax = z[AX] + G0 * s[PITCH]
     s[LOAD_ACCELERATION] += min(dt / 0.05, 1.0) * (ax - s[BIAS] - s[LOAD_ACCELERATION])
     return float(ax)
+
+
+@helper
+def expected_acceleration(s: Vector, p: Vector, force: float, side_n: float) -> float:
+    """What the accelerometer should show for the force of the wheels, N, without its offset, m/s2.
+
+    (m + J) a = sum(T) / r - F_R + J g theta with J = 4 I / r^2.
+    """
+    mass = p[P_MASS] * s[MASS]
+    turn = 4.0 * p[P_INERTIA] / (p[P_RADIUS] * p[P_ARM])
+    resistance = 0.5 * p[P_DRAG] * s[SPEED] * s[SPEED] + mass * G0 * p[P_ROLL]
+    return float((force - resistance - side_n + turn * G0 * s[GRADE]) / (mass + turn))
 
 
 @helper

@@ -1,6 +1,7 @@
 """The controller against the vehicle, in virtual time: what the driver gets."""
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -116,3 +117,31 @@ def test_finds_its_speed_after_driving_off_and_keeps_it_on_ice(car, parameters):
     )  # fmt: skip
     run = runs.drive(ice, car, parameters, seed=6)
     assert run.estimated_speed_mps == pytest.approx(run.speed_mps, abs=1.0)
+
+
+@pytest.mark.parametrize(("from_s", "learned"), [(0.5, 1.0 / 0.7), (4.0, 1.0)])
+@pytest.mark.parametrize("lost", [False, True])
+def test_without_a_believable_acceleration_the_wheels_are_followed_and_nothing_is_learned(
+    car, parameters, monkeypatch, from_s, learned, lost
+):
+    """A sensor that sticks while coasting (nothing known of the pads yet) or in the first of two stops, or is lost."""
+    weak = override(car, {"pad": {"a_1_ks": 0.7 * car.pad.a_1_ks}}, "weak pads")
+    whole, stuck_at, ticks = estimator.measured, [], [0]
+
+    def broken(*arguments):
+        z = whole(*arguments)
+        ticks[0] += 1
+        if ticks[0] * 0.01 - 1.1 > from_s:  # the first second finds the demands followed
+            stuck_at.append(z[layout.AX])
+            z[layout.AX] = math.nan if lost else stuck_at[0]
+        return z
+
+    monkeypatch.setattr(estimator, "measured", broken)
+    run = runs.drive(two_stops(), weak, parameters, seed=1)
+    assert run.estimated_speed_mps == pytest.approx(run.speed_mps, abs=0.25)
+    second = steady(run, 13.9, 15.9)
+    error = run.estimated_friction[second] / (learned * run.pad_friction[second]) - 1.0
+    assert np.abs(error).max() < 0.15
+    assert np.ptp(run.estimated_friction[run.time_s > 7.0], axis=0).max() == 0.0
+    if not lost:
+        assert run.mode[-1] == BrakeMode.DEGRADED

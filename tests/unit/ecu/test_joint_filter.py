@@ -164,7 +164,7 @@ def test_a_locked_wheel_gives_what_the_road_gives(parameters):
         speed -= 1.6 * DT
         omega = max(omega - 2.4, 0.0)
         z = np.zeros(17)
-        z[joint.AX], z[joint.DEMAND] = -1.6 + 9.80665 * 0.00231 * -1.6, 3.2
+        z[joint.AX], z[joint.DEMAND] = -1.6 + 9.80665 * 0.00231 * -1.6 + 0.001 * (k % 2), 3.2
         z[joint.WHEEL : joint.WHEEL + 4] = [omega, omega, speed / RADIUS * 0.99, speed / RADIUS * 0.99]
         z[joint.PRESSURE : joint.PRESSURE + 4] = 25e5
         state = joint_step(state, z, car.p, DT)
@@ -181,3 +181,30 @@ def test_the_same_source_runs_uncompiled(parameters):
     z[joint.WHEEL : joint.WHEEL + 4] = car.v / RADIUS
     plain = getattr(joint_step, "py_func", joint_step)
     assert plain(car.state, z, car.p, DT) == pytest.approx(joint_step(car.state, z, car.p, DT), rel=1e-9)
+
+
+def samples(car, ax, speeds):
+    z = np.zeros(17)
+    states = []
+    for value, speed in zip(ax, speeds, strict=True):
+        z[joint.AX] = value
+        z[joint.WHEEL : joint.WHEEL + 4] = speed / RADIUS
+        car.state = joint_step(car.state, z, car.p, DT)
+        states.append(car.state[joint.STUCK])
+    return states
+
+
+def test_a_value_that_repeats_itself_against_the_wheels_is_stuck_until_it_changes(parameters):
+    car = SmallCar(parameters)
+    car.run(0.5)
+    falling = car.v - 2.0 * DT * np.arange(50)
+    states = samples(car, [-0.1] * 50, falling)
+    assert states[:20] == [0.0] * 20
+    assert states[25:] == [1.0] * 25
+    assert samples(car, [-2.0, -2.01], falling[-1] - np.array([0.02, 0.04])) == [0.0, 0.0]
+
+
+def test_a_quiet_sensor_at_steady_speed_is_not_stuck(parameters):
+    car = SmallCar(parameters)
+    car.run(0.5, noise=0.0)
+    assert max(samples(car, [0.0] * 200, [car.v] * 200)) == 0.0
