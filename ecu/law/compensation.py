@@ -25,15 +25,14 @@ def friction_in_use(
         return (nominal, nominal, nominal, nominal)
     low = max(nominal * (1.0 - p.authority), p.friction_lowest)
     high = min(nominal * (1.0 + p.authority), p.friction_highest)
-    a, b, c, d = (
-        _toward(u, min(max(e, low), high), p.rate_1_s * nominal * k * dt_s)
-        for u, e, k in zip(used, estimate, confidence, strict=True)
-    )
+    rate = p.rate_1_s * nominal
+    result = []
+    for u, e, k in zip(used, estimate, confidence, strict=True):
+        most = rate * k * dt_s
+        change = min(max(e, low), high) - u
+        result.append(u + (most if change > most else -most if change < -most else change))
+    a, b, c, d = result
     return (a, b, c, d)
-
-
-def _toward(value: float, target: float, most: float) -> float:
-    return value + min(max(target - value, -most), most)
 
 
 def motor_factor(factor: float, friction: Four, nominal: float, p: CompensationParameters) -> float:

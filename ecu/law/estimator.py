@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from ecu.law import friction
 from ecu.law import paper_observer as paper
 from ecu.law.joint import layout as joint
+from ecu.law.joint.belief import believed
 from ecu.law.joint.filter import joint_step
 from ecu.law.types import UNKNOWN, ZERO, Four, Inputs, Source
 from ecu.parameters.ecu import EcuParameters
 
 Vector = NDArray[np.float64]
 PLAUSIBLE = (False, False, False, False)
-IMPLAUSIBLE_S = 1.0
 
 
 class Estimates(NamedTuple):
@@ -152,23 +152,12 @@ def estimate(state: Vector, z: Vector, parameters: EcuParameters, dt_s: float) -
     nominal = parameters.friction_brake.pad_friction
     if parameters.compensation.method == "joint":
         state = joint_step(state, z, joint_parameters(parameters), dt_s)
-        if state[joint.STARTED] == 0.0:
-            return state, Estimates(0.0, UNKNOWN, (nominal, nominal, nominal, nominal), ZERO, 1.0)
-        mu = _four(state, joint.FRICTION)
-        at = joint.COVARIANCE + joint.FRICTION * (joint.N + 1)
-        variance = state[at : at + 3 * (joint.N + 1) + 1 : joint.N + 1].tolist()
-        full = parameters.compensation.confidence_full
-        a, b, c, d = (1.0 - min(math.sqrt(max(v, 0.0)) / (full * m), 1.0) for v, m in zip(variance, mu, strict=True))
-        e, f, g, h = (slid > IMPLAUSIBLE_S for slid in _four(state, joint.SLID_S))
-        return state, Estimates(
-            float(state[joint.SPEED]),
-            _four(state, joint.TORQUE),
-            mu,
-            (a, b, c, d),
-            float(state[joint.MASS]),
-            (e, f, g, h),
-            bool(state[joint.STUCK]),
+        started, speed, torque, mu, confidence, mass, implausible, stuck = believed(
+            state, parameters.compensation.confidence_full
         )
+        if not started:
+            return state, Estimates(0.0, UNKNOWN, (nominal, nominal, nominal, nominal), ZERO, 1.0)
+        return state, Estimates(speed, torque, mu, confidence, mass, implausible, stuck)
     state = paper.paper_step(state, z, paper_parameters(parameters), dt_s)
     return state, Estimates(
         float(state[paper.SPEED]),

@@ -13,6 +13,17 @@ def gains(p: FrictionBrakeParameters) -> Four:
     return (front, front, rear, rear)
 
 
+def pressure_demands(torque_nm: Four, pad_friction: Four, gain_m3: Four, p: FrictionBrakeParameters) -> Four:
+    """`pressure_demand` of each wheel."""
+    (t0, t1, t2, t3), (m0, m1, m2, m3), (g0, g1, g2, g3) = torque_nm, pad_friction, gain_m3
+    return (
+        pressure_demand(t0, m0, g0, p),
+        pressure_demand(t1, m1, g1, p),
+        pressure_demand(t2, m2, g2, p),
+        pressure_demand(t3, m3, g3, p),
+    )
+
+
 def pressure_demand(torque_nm: float, pad_friction: float, gain_m3: float, p: FrictionBrakeParameters) -> float:
     """Pressure for a friction torque, Pa (paper eq. 16 solved for p): p = T / (2 mu r_b A_cyl) + p_0.
 

@@ -49,14 +49,26 @@ def initial_modes() -> ModeMemory:
 
 def lost_sources(inputs: Inputs, p: SupervisionParameters) -> tuple[bool, ...]:
     """Whether each source has timed out (never received counts as lost)."""
-    return tuple(
-        not h.age_s < (p.battery_timeout_s if s == Source.BATTERY else p.timeout_s) for s, h in enumerate(inputs.health)
-    )
+    limit_s = p.timeout_s
+    lost = [not h.age_s < limit_s for h in inputs.health]
+    lost[Source.BATTERY] = not inputs.health[Source.BATTERY].age_s < p.battery_timeout_s
+    return tuple(lost)
+
+
+def _all_there(inputs: Inputs) -> bool:
+    """Whether every actuator works and every value is available: a sum is finite only where all its parts are."""
+    total = inputs.acceleration_x_mps2 + inputs.acceleration_y_mps2 + inputs.yaw_rate_rad_s
+    total += inputs.steering_wheel_angle_rad + inputs.charge_power_w
+    total += sum(inputs.wheel_speed_rad_s) + sum(inputs.pressure_pa)
+    total += sum(inputs.motor_current_a) + sum(inputs.motor_available_nm)
+    return math.isfinite(total) and True not in inputs.motor_failed and Brake.FAILED not in inputs.brake
 
 
 def _missing(inputs: Inputs) -> Fault:
     """Sources whose message arrives but says that its values are not available."""
     faults = Fault.NONE
+    if _all_there(inputs):
+        return faults
     finite = math.isfinite
     for axle, bits in enumerate(
         (
@@ -89,8 +101,12 @@ def _missing(inputs: Inputs) -> Fault:
     return faults
 
 
-def _allowed(inputs: Inputs, lost: tuple[bool, ...], faults: Fault, p: SupervisionParameters) -> BrakeMode:
-    """Best mode that the faults allow."""
+def _allowed(inputs: Inputs, lost: tuple[bool, ...], bad: int, faults: Fault, p: SupervisionParameters) -> BrakeMode:
+    """Best mode that the faults allow; ``bad``: most unusable frames in a row."""
+    if bad >= p.bad_frames_to_downgrade:
+        return BrakeMode.SAFE_STOP if faults & _PEDALS == _PEDALS else BrakeMode.FRICTION_ONLY
+    if not faults:
+        return BrakeMode.NORMAL
     if faults & _PEDALS == _PEDALS:
         return BrakeMode.SAFE_STOP
     if (
@@ -98,10 +114,9 @@ def _allowed(inputs: Inputs, lost: tuple[bool, ...], faults: Fault, p: Supervisi
         or faults & _BOTH_WHEEL_SPEEDS == _BOTH_WHEEL_SPEEDS
         or (lost[Source.MOTOR_FRONT] and lost[Source.MOTOR_REAR])
         or all(inputs.motor_failed)
-        or any(h.bad_in_row >= p.bad_frames_to_downgrade for h in inputs.health)
     ):
         return BrakeMode.FRICTION_ONLY
-    return BrakeMode.DEGRADED if faults else BrakeMode.NORMAL
+    return BrakeMode.DEGRADED
 
 
 def supervise(
@@ -123,9 +138,10 @@ def supervise(
     implausible : wheels that do not turn as the car moves.  stuck : the acceleration sensor shows what is not.
     """
     faults = _missing(inputs)
-    for source, fault in _SOURCE_FAULT:
-        if lost[source]:
-            faults |= fault
+    if True in lost:
+        for source, fault in _SOURCE_FAULT:
+            if lost[source]:
+                faults |= fault
     if implausible[0] or implausible[1]:
         faults |= Fault.WHEEL_SPEED_FRONT
     if implausible[2] or implausible[3]:
@@ -145,13 +161,16 @@ def supervise(
         faults |= Fault.EHB_OWN_MAP
     if inputs.link_down:
         faults |= Fault.LINK
-    runs = tuple(
-        0 if gone or h.bad_in_row else min(run + h.fresh, p.frames_to_upgrade)
-        for run, h, gone in zip(memory.runs, inputs.health, lost, strict=True)
-    )
+    runs, most = memory.runs, p.frames_to_upgrade
+    bad = max([h.bad_in_row for h in inputs.health])
+    if bad or True in lost or min(runs) < most:
+        runs = tuple(
+            0 if gone or h.bad_in_row else min(run + h.fresh, most)
+            for run, h, gone in zip(runs, inputs.health, lost, strict=True)
+        )
     since_upgrade_s = memory.since_upgrade_s + dt_s
     mode = memory.mode
-    allowed = _allowed(inputs, lost, faults, p)
+    allowed = _allowed(inputs, lost, bad, faults, p)
     if mode == BrakeMode.INIT:
         if min(runs) >= p.frames_to_upgrade:
             mode = allowed

@@ -6,6 +6,7 @@ brake, and without any pedal the last demand stands until the brake is asked to 
 """
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 from dbc.messages import BrakeMode
@@ -52,6 +53,12 @@ def initial_memory(parameters: EcuParameters) -> Memory:
         estimates=estimator.Estimates(0.0, UNKNOWN, (mu, mu, mu, mu), ZERO, 1.0),
         friction=(mu, mu, mu, mu),
     )
+
+
+@lru_cache(maxsize=16)
+def brake_gains(parameters: EcuParameters) -> Four:
+    """`friction.gains`, kept beside the parameter set."""
+    return friction.gains(parameters.friction_brake)
 
 
 def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float) -> tuple[Memory, Outputs]:
@@ -107,15 +114,12 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     charge = blend.hand_over(memory.charge, inputs.charge_power_w, power, p.blend, dt_s)
     shares = blend.blend(demand, wanted, power, charge, speed, deceleration, p.blend)
 
-    gain = friction.gains(p.friction_brake)
-    q0, q1, q2, q3 = (
-        friction.pressure_demand(t, m, g, p.friction_brake)
-        for t, m, g in zip(shares.friction_nm, mu, gain, strict=True)
-    )
+    pressure = friction.pressure_demands(shares.friction_nm, mu, brake_gains(p), p.friction_brake)
     m0, m1, m2, m3 = shares.motor_nm
+    c0, c1, c2, c3 = known.confidence
     silent = mode == BrakeMode.INIT or handed_over
     outputs = Outputs(
-        pressure_demand_pa=UNKNOWN if silent else (q0, q1, q2, q3),
+        pressure_demand_pa=UNKNOWN if silent else pressure,
         motor_demand_nm=UNKNOWN if mode == BrakeMode.INIT else (-m0, -m1, -m2, -m3),
         mode=mode,
         faults=faults,
@@ -124,10 +128,10 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
         wheel_torque_nm=known.wheel_torque_nm,
         pad_friction=known.pad_friction,
         confidence=(
-            round(CONFIDENCE_STEPS * known.confidence[0]),
-            round(CONFIDENCE_STEPS * known.confidence[1]),
-            round(CONFIDENCE_STEPS * known.confidence[2]),
-            round(CONFIDENCE_STEPS * known.confidence[3]),
+            round(CONFIDENCE_STEPS * c0),
+            round(CONFIDENCE_STEPS * c1),
+            round(CONFIDENCE_STEPS * c2),
+            round(CONFIDENCE_STEPS * c3),
         ),
     )
     memory = Memory(
@@ -140,6 +144,8 @@ def _usable_wheel_speeds(
     inputs: Inputs, lost: tuple[bool, ...], implausible: tuple[bool, bool, bool, bool]
 ) -> list[float]:
     """Wheel speeds that are present, not timed out and plausible (or all that are there where none is), rad/s."""
+    if True not in lost and implausible == estimator.PLAUSIBLE and math.isfinite(sum(inputs.wheel_speed_rad_s)):
+        return list(inputs.wheel_speed_rad_s)
     gone = (lost[Source.WHEEL_SPEED_FRONT],) * 2 + (lost[Source.WHEEL_SPEED_REAR],) * 2
     wheels = zip(inputs.wheel_speed_rad_s, gone, implausible, strict=True)
     present = [(w, odd) for w, missing, odd in wheels if math.isfinite(w) and not missing]
@@ -150,6 +156,10 @@ def _usable_torque(inputs: Inputs, lost: tuple[bool, ...], mode: BrakeMode) -> F
     """Torque that may be asked of each motor, Nm, positive: none beside a brake that follows its own pedal map."""
     if mode not in (BrakeMode.NORMAL, BrakeMode.DEGRADED) or Brake.OWN_MAP in inputs.brake:
         return ZERO
+    if True not in lost and True not in inputs.motor_failed:
+        values = inputs.motor_available_nm
+        if math.isfinite(sum(values) + sum(inputs.motor_current_a)):
+            return values
     gone = (lost[Source.MOTOR_FRONT], lost[Source.MOTOR_FRONT], lost[Source.MOTOR_REAR], lost[Source.MOTOR_REAR])
     a, b, c, d = (
         0.0 if missing or failed or not (math.isfinite(t) and math.isfinite(i)) else t

@@ -186,7 +186,7 @@ def _car(period_ns: int) -> list[list[Frame]]:
             BrakePedal(0.6, 0.6),
             WheelSpeedFront(w, w),
             WheelSpeedRear(w, w),
-            BodyMotion(-3.2, 0.0, 0.0),
+            BodyMotion(-3.2 + 0.01 * (n % 3), 0.0, 0.0),  # a living sensor never repeats itself for long
             EhbPressureFront(8e5, 8e5, EhbState.DEMAND),
             EhbPressureRear(8e5, 8e5, EhbState.DEMAND),
             *(kind(-180.0, 600.0, MotorState.OK, -180.0, 600.0, MotorState.OK) for kind in motor),
