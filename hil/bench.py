@@ -76,13 +76,12 @@ class Bench(Rig):
         self._children[0].release()
         self.state = BenchState.RECORDING
         self._say("starting plant and ECU (the first start on a machine compiles the plant: about half a minute)")
-        arguments = {"plant": ["--seed", str(self._seed)], "ecu": []}
         order = {"plant": self.scenario.start_order.plant_s, "ecu": self.scenario.start_order.ecu_s}
         for name in NODES:
             if name in self._without:
                 self._say(f"waiting for somebody's {name} on {self.spec}")
                 continue
-            self._spawn(name, [name, self.scenario.source, *arguments[name], *self._node_options])
+            self._spawn(name, [name, self.scenario.source, "--seed", str(self._seed), *self._node_options])
             self._waiting.append((round(order[name] * 1e9), self._children[-1]))
         self._await_ready(self._children[1:])
         self._release(0)

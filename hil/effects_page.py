@@ -8,8 +8,8 @@ from plant.effects.manoeuvres import MANOEUVRES
 from plant.effects.places import JOINTS
 
 NOT_HERE = {
-    67: ("jitter", "random latency of frames: `hil/faults/frames.py`, on every bus"),
-    68: ("frame_drop", "lost, doubled and stale frames: `hil/faults/frames.py`, on every bus"),
+    67: ("jitter", "random latency of frames: `late` of a scenario's `[[frame_faults]]`"),
+    68: ("frame_drop", "lost, doubled and stale frames: `drop`, `duplicate`, `stale` of `[[frame_faults]]`"),
 }
 """Rows of the catalogue that are no effect of the plant, and where they are."""
 

@@ -9,7 +9,6 @@ from dbc.frame import BusName, Frame, Received
 from hil.bus.bus import Bus
 from hil.bus.channel import bench_channel
 from hil.bus.open import open_bus
-from hil.faults.frames import FrameLine
 
 Owned = dict[tuple[BusName, int], int]
 
@@ -36,16 +35,11 @@ class Port:
     ----------
     vehicle, bench : the two buses, open; the port closes them.
     senders : DBC nodes the role plays; empty for one that only listens.
-
-    Attributes
-    ----------
-    line : faults that the frames meet on their way, None without any.
     """
 
     def __init__(self, vehicle: Bus, bench: Bus, senders: Iterable[str]) -> None:
         self._buses = {BusName.VEHICLE: vehicle, BusName.BENCH: bench}
         self._owned = owned_by(senders)
-        self.line: FrameLine | None = None
 
     @classmethod
     def open(cls, vehicle_spec: str, senders: Iterable[str]) -> Self:
@@ -71,8 +65,6 @@ class Port:
             A frame whose identifier or length the role does not own in the DBC: a mistake of the node.
         """
         check_owned(frames, self._owned)
-        if self.line is not None:
-            frames = self.line.pass_on(frames)
         for bus, out in self._buses.items():
             mine = [frame for frame in frames if frame.bus is bus]
             if mine:

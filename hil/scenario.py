@@ -15,6 +15,7 @@ from dbc.contract import contract
 from dbc.frame import BusName
 from ecu.parameters.ecu import EcuParameters
 from hil.effects import Effects, read_effects
+from hil.faults.frames import FrameFaults
 from hil.parameters import load_set, override
 from hil.scenario_table import Files, ScenarioError, Table, as_number
 from hil.stimulus import ALL_WHEELS, WHEELS, FaultEvent
@@ -84,6 +85,7 @@ class Scenario:
     start_order : which node joins when.
     blending : blending factor over time that the bench sends; empty leaves it to the controller.
     faults : what breaks when.
+    frame_faults : what befalls frames on their way.
     effects : what this car has and the baseline has not.
     expectations, signal_expectations : what decides between exit code 0 and 1.
     """
@@ -100,6 +102,7 @@ class Scenario:
     start_order: StartOrder
     blending: Trace
     faults: tuple[FaultEvent, ...]
+    frame_faults: tuple[FrameFaults, ...]
     effects: Effects
     expectations: tuple[Expectation, ...]
     signal_expectations: tuple[SignalExpectation, ...]
@@ -147,6 +150,7 @@ def load_scenario(name: str) -> Scenario:
         start_order=order,
         blending=_blending(top),
         faults=tuple(event for table in top.tables("faults") for event in _faults(table)),
+        frame_faults=tuple(_frame_faults(table) for table in top.tables("frame_faults")),
         effects=read_effects(top.table("effects").rest(), f"{source.name}: effects"),
         expectations=tuple(_expectations(top.table("expect"))),
         signal_expectations=tuple(_signal_expectation(table) for table in top.tables("expect_signal")),
@@ -232,6 +236,21 @@ def _faults(table: Table) -> Iterator[FaultEvent]:
     if table.has("until_s"):
         yield FaultEvent(table.number("until_s", None, at_s, LONGEST_S), fault, wheels, active=False)
     table.done()
+
+
+def _frame_faults(table: Table) -> FrameFaults:
+    """Shares of some messages of the vehicle bus, or of all, between two times of the manoeuvre."""
+    known = {spec.name: spec.can_id for spec in contract(BusName.VEHICLE).by_id.values()}
+    from_s = table.number("from_s", -math.inf, 0.0, LONGEST_S)
+    faults = FrameFaults(
+        **{name: table.number(name, 0.0, 0.0, 1.0) for name in ("drop", "duplicate", "stale", "late")},
+        longest_ticks=int(table.number("longest_ticks", 2, 1, 100)),
+        can_ids=frozenset(known[name] for name in table.names("messages", sorted(known))),
+        from_s=from_s,
+        until_s=table.number("until_s", math.inf, max(from_s, 0.0), LONGEST_S),
+    )
+    table.done()
+    return faults
 
 
 def _segment(table: Table) -> RoadSegment:

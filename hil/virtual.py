@@ -8,6 +8,7 @@ import numpy as np
 from dbc.exchange import Transmitter
 from dbc.frame import BusName, Frame, Node, Received
 from ecu.node import EcuNode
+from hil.faults.frames import on_faulty_line
 from hil.log.frames import FrameTable, Recording
 from hil.node_process import ECU, NODE_PERIOD_NS, PLANT, Role
 from hil.port import check_owned, owned_by
@@ -31,9 +32,10 @@ def own_nodes(scenario: Scenario, seed: int) -> tuple[Node, Node]:
     return plant, EcuNode(scenario.ecu, NODE_PERIOD_NS)
 
 
-def members(scenario: Scenario, plant: Node, ecu: Node, director: Director) -> list[Member]:
-    """Plant, controller and bench, each at the phase it has in real time."""
+def members(scenario: Scenario, plant: Node, ecu: Node, director: Director, seed: int = 1) -> list[Member]:
+    """Plant, controller and bench, each at the phase it has in real time; their frames meet the scenario's faults."""
     order = scenario.start_order
+    plant, ecu = (on_faulty_line(node, scenario.frame_faults, seed) for node in (plant, ecu))
     return [
         Member(plant, NODE_PERIOD_NS, PLANT.phase_ns + round(order.plant_s * 1e9)),
         Member(ecu, NODE_PERIOD_NS, ECU.phase_ns + round(order.ecu_s * 1e9)),
@@ -66,7 +68,7 @@ def simulate(
     director = Director(scenario.blending, scenario.faults)
     frames: list[Frame] = []
     times: list[int] = []
-    for step in lockstep(members(scenario, plant or own_plant, ecu or own_ecu, director)):
+    for step in lockstep(members(scenario, plant or own_plant, ecu or own_ecu, director, seed)):
         frames += step.frames
         times += [step.now_ns] * len(step.frames)
         if each_tick is not None:
@@ -163,7 +165,9 @@ class VirtualBench(Rig):
         plant, ecu = (
             given or own for given, own in zip(self._nodes, own_nodes(self.scenario, self._seed), strict=True)
         )
-        self._steps = lockstep(members(self.scenario, _Process(PLANT, plant), _Process(ECU, ecu), self.director))
+        self._steps = lockstep(
+            members(self.scenario, _Process(PLANT, plant), _Process(ECU, ecu), self.director, self._seed)
+        )
         self.alive_at_end = 2
 
     def _pass_period(self) -> int:

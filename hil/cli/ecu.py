@@ -3,13 +3,14 @@
 import argparse
 import sys
 
-from hil.cli.options import add_node_options
+from hil.cli.options import add_node_options, add_seed
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
     parser = subparsers.add_parser("ecu", help="run the controller alone on a bus, until Ctrl-C")
     add_node_options(parser)
+    add_seed(parser)
     parser.set_defaults(run=run)
 
 
@@ -17,6 +18,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the controller until it is told to stop."""
     from dbc.frame import Node
     from ecu.node import EcuNode
+    from hil.faults.frames import on_faulty_line
     from hil.node_process import ECU, NODE_PERIOD_NS, serve
     from hil.scenario import load_scenario
 
@@ -24,7 +26,7 @@ def run(args: argparse.Namespace) -> int:
 
     def make() -> Node:
         EcuNode(scenario.ecu, NODE_PERIOD_NS).step(0, [])  # compiles what the first tick would compile
-        return EcuNode(scenario.ecu, NODE_PERIOD_NS)
+        return on_faulty_line(EcuNode(scenario.ecu, NODE_PERIOD_NS), scenario.frame_faults, args.seed)
 
     serve(ECU, make, args.bus, ready_fd=args.ready_fd, realtime=args.realtime, say=lambda s: print(s, file=sys.stderr))
     return 0

@@ -17,6 +17,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 def run(args: argparse.Namespace) -> int:
     """Run the vehicle until it is told to stop; it drives the scenario once, when a controller is there."""
     from dbc.frame import Node
+    from hil.faults.frames import on_faulty_line
     from hil.node_process import NODE_PERIOD_NS, PLANT, serve
     from hil.scenario import load_scenario
     from plant.model import compile_model
@@ -26,7 +27,8 @@ def run(args: argparse.Namespace) -> int:
 
     def make() -> Node:
         compile_model()
-        return PlantNode(scenario.plant, scenario.manoeuvre, args.seed, NODE_PERIOD_NS, **scenario.effects.for_node())
+        node = PlantNode(scenario.plant, scenario.manoeuvre, args.seed, NODE_PERIOD_NS, **scenario.effects.for_node())
+        return on_faulty_line(node, scenario.frame_faults, args.seed)
 
     serve(
         PLANT, make, args.bus, ready_fd=args.ready_fd, realtime=args.realtime, say=lambda s: print(s, file=sys.stderr)

@@ -234,3 +234,19 @@ def test_a_failed_expectation_is_exit_code_1(brakebench, channel, tmp_path, shor
     result = json.loads(done.stdout)
     assert result["verdict"] == "failed"
     assert "stop_distance_m: expected -inf to 1" in result["reason"]
+
+
+def test_frames_of_either_node_are_lost_where_the_scenario_says_so(brakebench, channel, tmp_path, short):
+    lost = [("WHEEL_SPEED_FRONT", 0.5, 0.55), ("EHB_DEMAND_REAR", 0.7, 0.75)]
+    text = "".join(
+        f'[[frame_faults]]\nmessages = ["{name}"]\ndrop = 1.0\nfrom_s = {a}\nuntil_s = {b}\n' for name, a, b in lost
+    )
+    (tmp_path / "lost.toml").write_text((tmp_path / short).read_text() + text)
+    result = json.loads(brakebench("run", "lost.toml", "--bus", channel, "--json").stdout)
+    signals = Signals(tmp_path / result["log"])
+    for name, from_s, _ in lost:
+        sent_s, counter = signals.decoded.series(f"{name}.ALIVE_COUNTER")
+        (gap,) = np.flatnonzero(np.diff(counter) % 15 != 1)  # by the counter: a busy machine makes gaps in time
+        assert (counter[gap + 1] - counter[gap]) % 15 == 6
+        assert sent_s[gap] - signals.start_s == pytest.approx(from_s, abs=0.1)
+    assert result["frames_lost"] == 10

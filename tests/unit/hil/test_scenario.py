@@ -58,6 +58,13 @@ at_s = 1.0
 fault = "motor_dead"
 wheels = ["fl", "rr"]
 until_s = 2.0
+[[frame_faults]]
+messages = ["WHEEL_SPEED_FRONT"]
+drop = 0.02
+late = 0.1
+longest_ticks = 3
+from_s = 1.5
+until_s = 3.5
 [end]
 duration_s = 5.0
 after_standstill_s = false
@@ -128,6 +135,9 @@ def test_every_field_arrives(write):
     assert [value_at(s.blending, t) for t in (0.5, 1.5, 2.5, 4.0)] == [0.0, 0.35, 0.7, 0.0]
     dead = PhysicalFault.MOTOR_DEAD
     assert s.faults == (FaultEvent(1.0, dead, 0b1001), FaultEvent(2.0, dead, 0b1001, active=False))
+    (lost,) = s.frame_faults
+    assert (lost.drop, lost.late, lost.longest_ticks, lost.from_s, lost.until_s) == (0.02, 0.1, 3, 1.5, 3.5)
+    assert lost.can_ids == {0xC0}
     assert s.signal_expectations[0].name == "TRUTH_MOTION.SPEED from 1 s to 2 s"
     assert load_scenario(write(FULL, "b.toml")).sha256 == s.sha256
 
@@ -167,6 +177,9 @@ WRONG = [
     ('["fl", "rr"]', '["fl", "fl"]', "faults[0].wheels: expected a list out of fl, fr, rl, rr"),
     ('["fl", "rr"]', "[[1], {}]", "faults[0].wheels: expected a list out of fl, fr, rl, rr"),
     ("until_s = 2.0", "until_s = 0.5", "faults[0].until_s: expected a number from 1 to 3600"),
+    ('["WHEEL_SPEED_FRONT"]', '["TRUTH_MOTION"]', "frame_faults[0].messages: expected a list out of BATTERY_STATUS, "),
+    ("drop = 0.02", "drop = 1.02", "frame_faults[0].drop: expected a number from 0 to 1, got 1.02"),
+    ("until_s = 3.5", "until_s = 1.0", "frame_faults[0].until_s: expected a number from 1.5 to 3600"),
     ("[1.0, 0.2]", "[1.0, 20.0]", "driver.steering_wheel_rad: expected values from -15 to 15, got 20 at 1 s"),
     ("[1.0, 0.2]", "[-1.0, 0.2]", "driver.steering_wheel_rad: times must not decrease, but -1 s follows 0 s"),
     ("[1.0, 0.2]", "[1.0]", "driver.steering_wheel_rad: expected a list of [time_s, value] pairs"),

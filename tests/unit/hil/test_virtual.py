@@ -138,3 +138,22 @@ def test_frames_as_columns():
     assert list(table.length) == [2, 8]
     assert table.data[0].tobytes() == b"\x01\x02" + bytes(6)
     assert (list(table.can_id), list(table.time_ns)) == ([0x20, 0x30], [5, 7])
+
+
+def test_frames_of_a_scenario_are_lost_in_their_time(tmp_path):
+    """Wheel speeds for 100 ms: gone from the recording, and counted by their receiver (its counter: up to 14)."""
+    path = tmp_path / "lost.toml"
+    path.write_text(
+        SHORT + '[[frame_faults]]\nmessages = ["WHEEL_SPEED_FRONT"]\ndrop = 1.0\nfrom_s = 0.5\nuntil_s = 0.6\n'
+    )
+    lost, whole = (simulate(load_scenario(str(p))) for p in (path, _written(tmp_path / "whole.toml", SHORT)))
+    sent, still = (signals.get("WHEEL_SPEED_FRONT.WHEEL_SPEED_FL")[0] for signals in (whole, lost))
+    gone = np.setdiff1d(np.round(sent, 3), np.round(still, 3))
+    assert gone == pytest.approx(np.arange(0.5, 0.595, 0.01), abs=1e-6)
+    assert measure(lost).frames_lost == len(gone)
+    assert measure(whole).frames_lost == 0
+
+
+def _written(path, text):
+    path.write_text(text)
+    return path
