@@ -59,10 +59,14 @@ def measure(seeds: int, workers: int, say: Callable[[str], None], store: Store) 
     if len(missing) < len(jobs):
         say(f"{len(jobs) - len(missing)} of {len(jobs)} cases were driven before")
     with worker_pool(workers) as pool:
-        for done, (what, numbers) in enumerate(zip(missing, pool.map(job, missing), strict=True), 1):
-            store.add(what, numbers)
-            if done % 20 == 0 or done == len(missing):
-                say(f"{done} of {len(missing)} cases driven (seed {what[2]}, {CONDITIONS[what[1]].name})")
+        try:
+            for done, (what, numbers) in enumerate(zip(missing, pool.map(job, missing), strict=True), 1):
+                store.add(what, numbers)
+                if done % 20 == 0 or done == len(missing):
+                    say(f"{done} of {len(missing)} cases driven (seed {what[2]}, {CONDITIONS[what[1]].name})")
+        except BaseException:  # a Ctrl-C must not wait for hours of work that nobody will see
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
     found: dict[tuple[str, int], list[Numbers]] = {}
     for what in jobs:
         found.setdefault(what[:2], []).append(store.numbers[what])
