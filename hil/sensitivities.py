@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ecu.node import EcuNode
-from hil.effects import EffectError
+from hil.effects import EffectError, layout, plugin_table, plugins
 from hil.node_process import NODE_PERIOD_NS
 from hil.rt.lockstep import Step
 from hil.scenario import Scenario
@@ -14,8 +14,8 @@ from hil.virtual import simulate as run
 from plant.effects.catalogue import BUILT_IN
 from plant.effects.effect import NODES, Effect, Scope
 from plant.effects.manoeuvres import Drive
+from plant.effects.plugin import NO_PLUGINS
 from plant.effects.signals import NAMES, noise, simulate
-from plant.effects.theta import THETA
 from plant.layout import Vector
 from plant.model import pack
 from plant.node import PlantNode
@@ -87,18 +87,23 @@ def _members(effect: Effect) -> list[tuple[str, int | None]]:
 
 
 def signatures(drive: Drive) -> list[Signature]:
-    """Signature of every effect at its typical size, in the order of the catalogue; of wheels and axles the first."""
-    cases = [(e, name, k) for e in sorted(BUILT_IN, key=lambda e: e.row) for name, k in _members(e)]
-    thetas = np.array([THETA.neutral(), *[THETA.typical(effect.name, k) for effect, _, k in cases]])
-    signals = simulate(drive, thetas)
-    sigma = noise(signals[0])
-    result = []
-    for (effect, member, _), changed in zip(cases, signals[1:], strict=True):
-        white = (changed - signals[0]) / sigma
-        total = float(np.sqrt((white**2).sum()))
-        shape = white.ravel() / total if total > 0.0 else white.ravel()
-        result.append(Signature(effect, member, np.sqrt((white**2).mean(axis=0)), total, shape))
-    return result
+    """Signature of every effect at its typical size, in the order of the catalogue, then those from outside.
+
+    Of wheels and axles the first.
+    """
+    neutral = layout().neutral()
+    found = []
+    for effects, table in ((sorted(BUILT_IN, key=lambda e: e.row), NO_PLUGINS), (plugins(), plugin_table(layout()))):
+        cases = [(effect, name, k) for effect in effects for name, k in _members(effect)]
+        thetas = np.array([neutral, *[layout().typical(effect.name, k) for effect, _, k in cases]])
+        signals = simulate(drive, thetas, plugins=table)
+        sigma = noise(signals[0])
+        for (effect, member, _), changed in zip(cases, signals[1:], strict=True):
+            white = (changed - signals[0]) / sigma
+            total = float(np.sqrt((white**2).sum()))
+            shape = white.ravel() / total if total > 0.0 else white.ravel()
+            found.append(Signature(effect, member, np.sqrt((white**2).mean(axis=0)), total, shape))
+    return found
 
 
 def alike(found: list[Signature]) -> list[tuple[str, str, float]]:

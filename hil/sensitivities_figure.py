@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from hil.effects_page import PARTS
 from hil.report.palette import INK, NEUTRAL
 from hil.sensitivities import SHOWN, Signature
+from plant.effects.catalogue import BUILT_IN
 from plant.effects.signals import CHANNELS, NAMES
 
 LEAST, MOST = 0.1, 100.0  # sigma; smaller is left white, larger saturates
@@ -22,7 +23,9 @@ _SHORT = ("fl", "fr", "rl", "rr", "ax", "ay", "yaw rate", *("fl", "fr", "rl", "r
 
 def draw(title: str, found: list[Signature], path: Path) -> None:
     """Write the figure as PNG."""
-    order = [s for rows, _ in PARTS for s in found if s.effect.row in rows]
+    parts = [([s for s in found if s.effect in BUILT_IN and s.effect.row in rows], part) for rows, part in PARTS]
+    parts.append(([s for s in found if s.effect not in BUILT_IN], "From outside"))
+    order = [s for signatures, _ in parts for s in signatures]
     sizes = np.array([s.sizes for s in order])
     height = 1.9 + 0.172 * len(order)
     figure = Figure(figsize=(10.5, height), dpi=120, facecolor="white")
@@ -49,8 +52,10 @@ def draw(title: str, found: list[Signature], path: Path) -> None:
         at += len(names)
         axes.axvline(at - 0.5, color="#9AA3AC", linewidth=0.7)
     at = 0
-    for rows, part in PARTS:
-        number = sum(s.effect.row in rows for s in order)
+    for signatures, part in parts:
+        number = len(signatures)
+        if not number:
+            continue
         axes.axhline(at + number - 0.5, color="#9AA3AC", linewidth=0.7)
         figure_y = at + number / 2 - 0.5
         axes.text(-6.35, figure_y, part, rotation=90, ha="center", va="center", fontsize=7.5, color=NEUTRAL)

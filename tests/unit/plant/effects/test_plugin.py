@@ -7,6 +7,8 @@ import pytest
 
 import hil.effects
 from hil.effects import EffectError, plugin_table, read_effects
+from hil.sensitivities import SHOWN, signatures
+from hil.sensitivities_figure import draw
 from plant.effects.manoeuvres import MANOEUVRES, drive
 from plant.effects.signals import NAMES, simulate
 from plant.effects.theta import THETA, Theta
@@ -77,3 +79,16 @@ def test_what_is_no_effect_is_refused(monkeypatch):
 
 def test_no_plugin_no_table():
     assert plugin_table(THETA).shape[0] == 0
+
+
+def test_an_effect_from_outside_has_a_signature(installed, paper_car, tmp_path):
+    found = signatures(drive(MANOEUVRES["coast_down"], paper_car))
+    assert [s.name for s in found].count("parking_brake") == 1
+    mine, drag = (next(s for s in found if s.effect.name == name) for name in ("parking_brake", "residual_drag"))
+    assert found[-1] is mine
+    # 60 N m at each rear wheel, mostly in the wheel speeds: as residual drag, in both rear wheels and larger
+    assert mine.total > 10.0 * SHOWN
+    assert set(np.array(NAMES)[np.argsort(mine.sizes)[-5:]]) >= {f"wheel_speed_{w}_rad_s" for w in ("rl", "rr")}
+    assert mine.total > drag.total
+    draw("with a parking brake", found, tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 20_000
