@@ -40,6 +40,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Explain and print."""
+    from hil.study.consistency.check import Consistency
+    from hil.study.consistency.summary import build_report as sensor_report
     from hil.study.explain import explain
     from hil.study.summary import build_report
 
@@ -56,7 +58,8 @@ def run(args: argparse.Namespace) -> int:
             raise
         print(json.dumps(_unusable(str(error)), indent=2))
         return error.exit_code
-    report = build_report(found, [str(path) for path in args.logs])
+    sources = [str(path) for path in args.logs]
+    report = sensor_report(found, sources) if isinstance(found, Consistency) else build_report(found, sources)
     if args.out is not None:
         from hil.report.figure import write_figure
         from hil.report.html import write_html

@@ -1,12 +1,14 @@
 """`explain`: measured logs in, an answer out. The library call behind ``brakebench explain``."""
 
 from collections.abc import Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from dbc.database import parse_database
 from hil.study.answer import Answer, answer
 from hil.study.channel_map import load_map
+from hil.study.consistency.check import Consistency, check, unforced
 from hil.study.diagnose import Say, Settings, diagnose
 from hil.study.extension import load_extension, write_extension
 from hil.study.measure import gains
@@ -22,8 +24,11 @@ def explain(
     logs: Any, vehicle: Path | str | Mapping[str, Any] | None = None, *, channel_map: Path | None = None,
     database: Path | None = None, about: Path | None = None, extend: Path | None = None, out: Path | None = None,
     settings: Settings | None = None, say: Say | None = None,
-) -> Answer:  # fmt: skip
+) -> Answer | Consistency:  # fmt: skip
     """Explain what measured data have and the simulation has not.
+
+    Where no force was measured, or none that pulls the car, the sensors are compared with the car's own motion
+    (`hil.study.consistency`) instead of replaying it; the remarks say so.
 
     Parameters
     ----------
@@ -39,8 +44,11 @@ def explain(
     hil.study.table.UnusableError
         Data or files that nothing can be concluded from: the message says why.
     """
-    car = load_vehicle(Path(vehicle) if isinstance(vehicle, str) else vehicle)
+    car = load_vehicle(shipped(Path(vehicle), "vehicle") if isinstance(vehicle, str | Path) else vehicle)
     read = _logs(logs, car, channel_map, database, about)
+    why = unforced(read, float(car.parameters.wheel.rolling_radius_m))
+    if why:
+        return check(read, car, why, extend, out, say or (lambda _: None))
     case = prepare(read, float(car.parameters.wheel.rolling_radius_m))
     handed_in = nominal(car)
     base = handed_in if extend is None else load_extension(Path(extend)).applied(handed_in)
@@ -58,11 +66,17 @@ def explain(
     return answer(found, gained, missed, written, remarks)
 
 
+def shipped(path: Path, kind: str) -> Path:
+    """A file, or by the name of a car the one that comes with brakebench; ``kind`` is ``map`` or ``vehicle``."""
+    ours = Path(str(resources.files("hil.study") / "cars" / f"{path.name}.{kind}.toml"))
+    return ours if not path.suffix and not path.exists() and ours.exists() else path
+
+
 def _logs(
     logs: Any, car: Vehicle, channel_map: Path | None, database: Path | None, about: Path | None
 ) -> Sequence[Log]:
     items = list(logs) if isinstance(logs, list | tuple) else [logs]
-    mapped = None if channel_map is None else load_map(Path(channel_map))
+    mapped = None if channel_map is None else load_map(shipped(Path(channel_map), "map"))
     dbc = None
     if database is not None:
         dbc = parse_database(Path(database).read_bytes(), str(database))

@@ -23,7 +23,7 @@ PRESSURE = four("pressure", "pa")
 PRESSURE_DEMAND = four("pressure_demand", "pa")
 MOTOR_TORQUE = four("motor_torque", "nm")
 MOTOR_DEMAND = four("motor_torque_demand", "nm")
-SINGLE = ("ax_mps2", "ay_mps2", "yaw_rate_rad_s", "steer_rad", "pedal", "soc", "speed_mps")
+SINGLE = ("ax_mps2", "ay_mps2", "yaw_rate_rad_s", "steer_rad", "pedal", "throttle", "soc", "speed_mps")
 CHANNELS = (*WHEEL_SPEED, *PRESSURE, *PRESSURE_DEMAND, *MOTOR_TORQUE, *MOTOR_DEMAND, *SINGLE)
 """Every channel a table may have beside ``t_s``; all are optional."""
 
@@ -36,6 +36,7 @@ PLAUSIBLE = {
     "yaw_rate": (-5.0, 5.0),
     "steer": (-20.0, 20.0),
     "pedal": (-0.2, 1.2),
+    "throttle": (-0.2, 1.2),
     "soc": (-0.05, 1.05),
     "speed": (-10.0, 120.0),
 }

@@ -1,0 +1,1 @@
+"""Sensors against the car's own motion: what is wrong between channels where no force was measured."""

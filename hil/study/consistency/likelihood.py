@@ -1,0 +1,120 @@
+"""Largest likelihood of sensor numbers and noise together, and what the data say of each number."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from scipy.optimize import minimize
+
+from hil.study.consistency.model import Model, Number
+from hil.study.table import Floats
+
+Values = dict[str, float]
+_STEP = 1e-3
+NOTHING: Mapping[str, float] = MappingProxyType({})
+_WIDEST = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Numbers of largest likelihood; ``cost`` is minus twice its logarithm, priors of the noise included."""
+
+    sensor: Values
+    noise: Values
+    cost: float
+
+
+def usual(model: Model) -> Values:
+    """Noise to begin with."""
+    return {name: number.usual for name, number in model.noise.items()}
+
+
+def fit(
+    model: Model, sensor: Mapping[str, float], noise: Mapping[str, float], *, fixed: Mapping[str, float] = NOTHING,
+    weights: Floats | None = None, rounds: int = 40, only_sensor: bool = False,
+) -> Fit:  # fmt: skip
+    """Move the numbers ``sensor`` and all noise to the largest likelihood.
+
+    Parameters
+    ----------
+    fixed : numbers that stay.  weights : (cells,) what counts, for held-out manoeuvres.
+    only_sensor : leave the noise as it is.
+    """
+    names = [*sensor, *([] if only_sensor else noise)]
+    numbers = [model.numbers[n] if n in sensor else model.noise[n] for n in names]
+
+    def split(z: Floats) -> tuple[Values, Values]:
+        values = {n: _value(number, v) for n, number, v in zip(names, numbers, z, strict=True)}
+        return {n: values[n] for n in sensor}, dict(noise) | {n: v for n, v in values.items() if n not in sensor}
+
+    def cost(z: Floats) -> float:
+        moved, noisy = split(z)
+        _, score = model.score({**fixed, **moved}, noisy)
+        total = float(score.sum() if weights is None else score @ weights)
+        value = -2.0 * total + _prior(model, noisy)
+        return value if np.isfinite(value) else 1e12
+
+    start = {**noise, **sensor}
+    z0 = np.array([_scaled(number, start[n]) for n, number in zip(names, numbers, strict=True)])
+    if not names:
+        return Fit({}, dict(noise), cost(z0))
+    bounds = [(_scaled(number, number.low), _scaled(number, number.high)) for number in numbers]
+    options = {"maxiter": rounds, "eps": _STEP, "ftol": 1e-9, "maxls": 15}
+    found = minimize(cost, z0, method="L-BFGS-B", bounds=bounds, options=options)
+    moved, noisy = split(found.x)
+    return Fit(moved, noisy, float(found.fun))
+
+
+def _scaled(number: Number, value: float) -> float:
+    return float(np.log(value)) / number.step if number.log else value / number.step
+
+
+def _value(number: Number, z: float) -> float:
+    return float(np.exp(z * number.step)) if number.log else float(z * number.step)
+
+
+def _prior(model: Model, noise: Mapping[str, float]) -> float:
+    """Weak knowledge of noise keeps what the data do not show where roads and cars have it."""
+    return sum((float(np.log(noise[n] / number.usual)) / number.prior) ** 2 for n, number in model.noise.items())
+
+
+def deviations(model: Model, found: Fit, block: Floats, fixed: Mapping[str, float] = NOTHING) -> Values:
+    """Standard deviation of every sensor number: curvature, widened where manoeuvres disagree more than they should.
+
+    The sandwich of White, Econometrica 50 (1982), with the scores of whole manoeuvres; noise moves along.
+    """
+    inside = [n for n, v in found.noise.items() if 1.05 * model.noise[n].low < v < 0.95 * model.noise[n].high]
+    names = [*found.sensor, *inside]  # noise at its bound stays there
+    numbers = [model.numbers[n] if n in found.sensor else model.noise[n] for n in names]
+    z = np.array(
+        [_scaled(number, {**found.sensor, **found.noise}[n]) for n, number in zip(names, numbers, strict=True)]
+    )
+    count = int(block.max()) + 1
+
+    def by_block(at: Floats) -> Floats:
+        values = {n: _value(number, v) for n, number, v in zip(names, numbers, at, strict=True)}
+        noise = found.noise | {n: values[n] for n in inside}
+        _, score = model.score({**fixed, **{n: values[n] for n in found.sensor}}, noise)
+        return np.bincount(block, score, count) - 0.5 * _prior(model, noise) / count
+
+    size, step = len(z), 0.02
+    up = [by_block(z + step * e) for e in np.eye(size)]
+    down = [by_block(z - step * e) for e in np.eye(size)]
+    middle = by_block(z)
+    gradient = np.array([(u - d) / (2.0 * step) for u, d in zip(up, down, strict=True)])
+    hessian = np.zeros((size, size))
+    for i in range(size):
+        hessian[i, i] = -(up[i] - 2.0 * middle + down[i]).sum() / step**2
+        for j in range(i):
+            e = step * (np.eye(size)[i] + np.eye(size)[j])
+            f = step * (np.eye(size)[i] - np.eye(size)[j])
+            mixed = (by_block(z + e) - by_block(z + f) - by_block(z - f) + by_block(z - e)).sum() / (4.0 * step**2)
+            hessian[i, j] = hessian[j, i] = -mixed
+    values, vectors = np.linalg.eigh(hessian)
+    inverse = (vectors / np.maximum(values, 1e-3)) @ vectors.T
+    curvature = np.sqrt(np.maximum(np.diag(inverse), 0.0))
+    centred = gradient - gradient.mean(axis=1, keepdims=True)
+    robust = np.sqrt(np.maximum(np.diag(inverse @ (centred @ centred.T) @ inverse), 0.0))
+    spread = np.clip(robust, curvature, _WIDEST * curvature) if count >= 4 else curvature
+    return {n: float(s * number.step) for n, number, s in zip(names, numbers, spread, strict=True) if n in found.sensor}

@@ -1,0 +1,139 @@
+"""What the numbers of the models are called in the list of effects, and which other effects would look the same."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hil.study.consistency.search import Found
+from plant.effects.theta import THETA
+
+GRAVITY_MPS2 = 9.80665
+TIED = 4.6
+"""Twice the log of the odds (ten to one) below which two names are not told apart."""
+MISTAKES = (-1.0, 3.6, 1.0 / 3.6, GRAVITY_MPS2, 1.0 / GRAVITY_MPS2, -GRAVITY_MPS2, 0.1, 10.0, 256.0, 1.0 / 256.0)
+"""Factors that a database, not a sensor, is wrong by: sign, km/h, g, a decimal, a byte (effects, 69)."""
+_IMU_SCALE, _OF_A_SENSOR = 0.04, 0.2
+
+
+@dataclass(frozen=True)
+class Name:
+    """An effect that a number may be: value = factor * number, ``usual`` size in the number's own unit."""
+
+    effect: str
+    parameter: str
+    wheel: str
+    factor: float
+    usual: float
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """A number with its names, most likely first; ``value``, ``low`` and ``high`` are the number's own.
+
+    ``change`` is the number of ``model`` moved; ``channels`` say where it shows; ``exact`` the mistake it equals.
+    """
+
+    model: str
+    number: str
+    names: tuple[Name, ...]
+    odds: tuple[float, ...]
+    value: float
+    low: float
+    high: float
+    gain: float
+    channels: tuple[str, ...]
+    exact: float | None = None
+    contenders: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def tied(self) -> bool:
+        """Whether another effect does as well."""
+        return len(self.odds) > 1 and self.odds[1] > self.odds[0] * np.exp(-0.5 * TIED)
+
+    def as_json(self, at: int = 0) -> dict[str, object]:
+        """As a cause (its first name), or a rival."""
+        name = self.names[at]
+        effect = THETA.effect(name.effect)
+        joint = next((j for j in effect.joints if j == f"sensor.{name.wheel}"), effect.joints[0])
+        low, high = sorted((name.factor * self.low, name.factor * self.high))
+        parameter = {"value": name.factor * self.value, "unit": effect.parameter(name.parameter).unit}
+        return {
+            "effect": name.effect, "title": effect.title, "joint": joint, "wheel": name.wheel,
+            "parameters": {name.parameter: parameter | {"ci95": [low, high]}},
+            "probability": self.odds[at] / sum(self.odds), "onset": None, "onset_s": None, "variables": [], "curve": [],
+            "channels": list(self.channels),
+        }  # fmt: skip
+
+
+def causes_of(model: str, found: Found, to_ground: bool) -> list[Cause]:
+    """Every number that was taken up, by name."""
+    listed = []
+    for step in found.steps:
+        number, value = step.number, found.final.sensor[step.number]
+        low, high = found.interval(number)
+        names, channels, exact = _names(model, number, value, (low, high), to_ground)
+        rivals = {n: f.cost for n, f in step.others.items()}
+        odds = _odds(names, value)
+        order = sorted(range(len(names)), key=lambda k: -odds[k])
+        listed.append(
+            Cause(
+                model, number, tuple(names[k] for k in order), tuple(odds[k] for k in order), value, low, high,
+                step.gain, channels, exact, rivals,
+            )
+        )  # fmt: skip
+    return listed
+
+
+def _odds(names: tuple[Name, ...], value: float) -> list[float]:
+    """Density of a number of this size, were it each of these: Gauss, but no name is ever ruled out by size alone."""
+    if len(names) == 1:
+        return [1.0]
+    return [float(np.exp(-0.5 * min((value / n.usual) ** 2, 60.0)) / n.usual) for n in names]
+
+
+def _names(
+    model: str, number: str, value: float, interval: tuple[float, float], to_ground: bool
+) -> tuple[tuple[Name, ...], tuple[str, ...], float | None]:
+    if number in ("gain", "ay_gain", "yaw_gain"):
+        return _scale(number, value, interval, to_ground)
+    if model == "wheels":
+        return (Name("tyre_radius", "gain", number, -1.0, 0.01),), (f"wheel_speed_{number}_rad_s",), None
+    if number == "delay_s":
+        pressure = model == "braking"
+        late = "pressure" if pressure else ("imu" if value > 0.0 else "wheel")
+        channels = ("pressure",) if pressure else ("ax_mps2",) if value > 0.0 else ("wheel_speed",)
+        return (Name("timestamp_offset", "delay_s", late, 1.0 if late == "imu" else -1.0, 0.02),), channels, None
+    tied: dict[str, tuple[Name, ...]] = {
+        "bias_mps2": (
+            Name("imu_bias", "ax_mps2", "imu", 1.0, 0.1),
+            Name("road_grade", "grade", "car", 1.0 / GRAVITY_MPS2, 0.02 * GRAVITY_MPS2),
+            Name("imu_gain", "tilt_rad", "imu", 1.0 / GRAVITY_MPS2, 0.02 * GRAVITY_MPS2),
+        ),
+        "drift_mps3": (Name("imu_bias", "drift_mps3", "imu", 1.0, 0.002),),
+        "filter_s": (Name("imu_filter", "time_s", "imu", 1.0, 0.02),),
+        "cross": (Name("imu_gain", "cross", "imu", 1.0, 0.02),),
+        "ahead_m": (Name("imu_position", "x_m", "imu", 1.0, 0.3),),
+        "beside_m": (Name("imu_position", "y_m", "imu", 1.0, 0.15),),
+        "yaw_bias_rad_s": (Name("imu_bias", "yaw_rate_rad_s", "imu", 1.0, 0.005),),
+        "brake_mps2_pa": (
+            Name("pad_mu_gain", "gain", "car", 1.0, 0.15),
+            Name("pressure_gain", "gain", "car", 1.0, 0.15),
+            Name("mass_offset", "mass_kg", "car", -1.0, 0.1),
+        ),
+    }
+    seen = {"yaw_bias_rad_s": "yaw_rate_rad_s", "brake_mps2_pa": "pressure"}.get(number, "ax_mps2")
+    return tied[number], (seen,), None
+
+
+def _scale(
+    number: str, value: float, interval: tuple[float, float], to_ground: bool
+) -> tuple[tuple[Name, ...], tuple[str, ...], float | None]:
+    channel = {"gain": "ax_mps2", "ay_gain": "ay_mps2", "yaw_gain": "yaw_rate_rad_s"}[number]
+    exact = next((m for m in MISTAKES if interval[0] <= m - 1.0 <= interval[1]), None)
+    if exact is not None or abs(value) > _OF_A_SENSOR or number != "gain":
+        return (Name("wrong_scale", "factor", "imu", 1.0, 2.0),), (channel,), exact
+    names = [Name("imu_gain", "gain", "imu", 1.0, _IMU_SCALE)]
+    if not to_ground:  # nobody measured the ground: the wheels' radius would look the same
+        names.append(Name("tyre_radius", "gain", "car", 1.0, 0.015))
+    return tuple(names), (channel,), None

@@ -1,0 +1,136 @@
+"""One number at a time: which of a model's numbers the data ask for, and which others would have done as well."""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+from scipy.stats import t as student
+
+from hil.study.consistency.likelihood import Fit, Values, deviations, fit, usual
+from hil.study.consistency.model import Model
+from hil.study.table import Floats
+
+ASKED = 20.0
+"""Gain in -2 log likelihood asked of a number: noise gives it once in 100,000 looks, were the model true."""
+ALPHA = 0.003
+_STARTS: Mapping[str, Sequence[float]] = {
+    "gain": (0.0, -0.5, 0.5, -2.0), "filter_s": (0.02, 0.1, 0.5, 2.0), "delay_s": (0.02, -0.02, 0.15, -0.15),
+    "yaw_gain": (0.0, -2.0), "ay_gain": (0.0, -2.0),
+}  # fmt: skip
+_WORKERS = 2
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Step:
+    """A number that was taken up, its gain, and what the others would have gained in its place (one fit each)."""
+
+    number: str
+    gain: float
+    others: Mapping[str, Fit]
+
+
+@dataclass(eq=False)
+class Found:
+    """What a model learnt.
+
+    ``base`` has the numbers as handed in, ``final`` those taken up; ``deviation`` their standard deviations,
+    ``tolerance`` what each may be off without being wrong, ``degrees`` the degrees of freedom of the intervals.
+    """
+
+    model: Model
+    handed: Values
+    base: Fit
+    final: Fit
+    block: Floats
+    deviation: Values
+    tolerance: Mapping[str, float]
+    steps: list[Step] = field(default_factory=list)
+    evidence: int = 0
+
+    @property
+    def degrees(self) -> int:
+        """Manoeuvres less one; fewer where only some of them (``evidence``) say anything."""
+        return max((self.evidence or int(self.block.max()) + 1) - 1, 1)
+
+    @property
+    def numbers(self) -> Values:
+        """All numbers, as handed in and as learnt."""
+        return {**self.handed, **self.final.sensor}
+
+    def interval(self, number: str) -> tuple[float, float]:
+        """95 % of a number, Student's t over the manoeuvres."""
+        half = float(student.ppf(0.975, self.degrees)) * self.deviation[number]
+        value, of = self.final.sensor[number], self.model.numbers[number]
+        return max(value - half, of.low), min(value + half, of.high)
+
+
+def search(
+    model: Model, block: Floats, handed: Mapping[str, float], tolerance: Mapping[str, float], say: Say,
+    candidates: Sequence[str] | None = None, always: Sequence[str] = (), most: int = 6,
+) -> Found:  # fmt: skip
+    """Take up numbers one at a time, the one with the largest gain first; take out again what is not missed.
+
+    Parameters
+    ----------
+    handed : numbers as handed in; the others are 0.  tolerance : see `Found`.
+    always : numbers that nobody knows and that are no cause.
+    """
+    start = fit(model, dict.fromkeys(always, 0.0), usual(model), fixed=handed)
+    found = Found(model, dict(handed), start, start, block, {}, tolerance)
+    names = [n for n in (candidates or model.numbers) if n not in always]
+    while len(found.steps) < most:
+        left = [n for n in names if n not in found.final.sensor]
+        with ThreadPoolExecutor(_WORKERS) as pool:
+            tried = dict(zip(left, pool.map(lambda n: _with(found, n), left), strict=True))
+        taken = _take(found, tried)
+        if taken is None:
+            break
+        step, found.final, found.deviation = taken
+        found.steps.append(step)
+        say(f"{step.number} = {found.final.sensor[step.number]:.4g}, gains {step.gain:.0f}")
+    _prune(found)
+    return found
+
+
+def _with(found: Found, number: str) -> Fit:
+    """The model with one more number free, from several starts: first the noise alone, then all together."""
+    now, tried = found.handed.get(number, 0.0), []
+    for start in _STARTS.get(number, (0.0,)):
+        sensor = {**found.final.sensor, number: now + start}
+        noises = [found.final.noise]
+        if not found.steps:  # what was taken for noise is none with the cause in place
+            noises.append(usual(found.model))
+        firsts = [fit(found.model, sensor, noise, fixed=found.handed, rounds=3) for noise in noises]
+        tried.append(min(firsts, key=lambda f: f.cost))
+    tried.sort(key=lambda f: f.cost)
+    further = [fit(found.model, f.sensor, f.noise, fixed=found.handed, rounds=12) for f in tried[:2]]
+    return min(further, key=lambda f: f.cost)
+
+
+def _take(found: Found, tried: Mapping[str, Fit]) -> tuple[Step, Fit, Values] | None:
+    for number in sorted(tried, key=lambda n: tried[n].cost):
+        if found.final.cost - tried[number].cost < ASKED:
+            return None
+        better = fit(found.model, tried[number].sensor, tried[number].noise, fixed=found.handed)
+        deviation = deviations(found.model, better, found.block, found.handed)
+        if _beyond(found, better, deviation, number):
+            others = {n: f for n, f in tried.items() if n != number}
+            return Step(number, found.final.cost - better.cost, others), better, deviation
+    return None
+
+
+def _beyond(found: Found, fitted: Fit, deviation: Mapping[str, float], number: str) -> bool:
+    """Whether a number is off by more than chance and tolerance: every manoeuvre is one piece of evidence."""
+    off = abs(fitted.sensor[number] - found.handed.get(number, 0.0))
+    spread = (deviation[number] ** 2 + found.tolerance.get(number, 0.0) ** 2) ** 0.5
+    return bool(off > float(student.ppf(1.0 - 0.5 * ALPHA, found.degrees)) * spread)
+
+
+def _prune(found: Found) -> None:
+    for step in list(found.steps):
+        if len(found.steps) > 1 and not _beyond(found, found.final, found.deviation, step.number):
+            rest = {n: v for n, v in found.final.sensor.items() if n != step.number}
+            found.final = fit(found.model, rest, found.final.noise, fixed=found.handed)
+            found.deviation = deviations(found.model, found.final, found.block, found.handed)
+            found.steps.remove(step)
