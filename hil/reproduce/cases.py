@@ -237,6 +237,11 @@ def weak_pads(condition: Condition, seed: int) -> Numbers:
     return out
 
 
+def unshifted() -> EcuParameters:
+    """The controller that leaves the blending factor as it was asked, however weak the pads."""
+    return override(method(), {"compensation": {"motor_preference": 0.0}}, "no shift")
+
+
 def shift(condition: Condition, seed: int) -> Numbers:
     """Work moved to the motors where the pads are weak: a series at alpha 0.5, pads x0.7, with and without it.
 
@@ -245,8 +250,8 @@ def shift(condition: Condition, seed: int) -> Numbers:
     plant = with_pads(condition.plant(plant_parameters(), seed), WEAK)
     manoeuvre = manoeuvres.series(condition.road())
     best = slopes(ideal(manoeuvre, plant, seed, SHIFT_ALPHA))
-    fixed = override(method(), {"compensation": {"motor_preference": 0.0}}, "no shift")
-    runs = {name: drive(manoeuvre, plant, ecu, seed, SHIFT_ALPHA) for name, ecu in (("", method()), ("no ", fixed))}
+    controllers = (("", method()), ("no ", unshifted()))
+    runs = {name: drive(manoeuvre, plant, ecu, seed, SHIFT_ALPHA) for name, ecu in controllers}
     out: Numbers = {}
     for name, run in runs.items():
         rise = run.disc_temperature_k[:, 0] - run.disc_temperature_k[0, 0]

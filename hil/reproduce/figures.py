@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from dbc.bench_messages import PhysicalFault
 from ecu.law import paper_observer
 from ecu.law.base_brake import reference_deceleration
 from ecu.law.joint import layout
@@ -10,14 +9,20 @@ from hil.identify.summary import figures as identified
 from hil.report.report import Chart, Curve, Number, Panel, Report, Section, Style, Trace
 from hil.report.units import KMH, KN
 from hil.reproduce import manoeuvres
-from hil.reproduce.cases import ALPHAS, braking, ideal, method, onset, torque_error, with_pads
+from hil.reproduce.beyond import SEED, battery_refuses, motor_failure, nominal_plant, work_moved
+from hil.reproduce.cases import (
+    ALPHAS,
+    braking,
+    ideal,
+    method,
+    onset,
+    torque_error,
+)
 from hil.reproduce.conditions import NOMINAL
 from hil.reproduce.identification import shipped_study
-from hil.reproduce.runs import Fault, Run, Vector, drive, ecu_parameters, plant_parameters
+from hil.reproduce.runs import Run, Vector, drive, ecu_parameters
 from plant.manoeuvre import Manoeuvre
-from plant.parameters.plant import PlantParameters
 
-SEED = 1
 UNDER, OVER = 0.8, 1.25  # friction of the pads over what the controller believes
 
 
@@ -35,15 +40,13 @@ def figures() -> dict[str, Report]:
         "figure14_series.png": series(0.0, "Figure 14"),
         "figure15_series_blending.png": series(0.7, "Figure 15"),
         "motor_failure.png": motor_failure(),
+        "battery_refuses.png": battery_refuses(),
+        "work_moved_to_motors.png": work_moved(),
     }
 
 
-def _plant(pads: float = 1.0) -> PlantParameters:
-    return with_pads(NOMINAL.plant(plant_parameters(), SEED), pads)
-
-
 def _stop(name: str = "joint", alpha: float = 0.0, pads: float = 1.0, enabled: bool = True) -> Run:
-    return drive(manoeuvres.stop(NOMINAL.road()), _plant(pads), method(name, enabled=enabled), SEED, alpha)
+    return drive(manoeuvres.stop(NOMINAL.road()), nominal_plant(pads), method(name, enabled=enabled), SEED, alpha)
 
 
 def _window(run: Run, before_s: float = 0.3) -> slice:
@@ -131,8 +134,8 @@ def slippery_patch() -> Report:
     start_m = float(np.cumsum(dry.speed_mps)[onset(dry)]) * 0.01 + manoeuvres.PATCH_AFTER_M
     ends = ((start_m, manoeuvres.PATCH_FRICTION), (start_m + manoeuvres.PATCH_LENGTH_M, 1.0))
     manoeuvre = manoeuvres.stop(NOMINAL.road(ends))
-    runs = {n: drive(manoeuvre, _plant(), method(n), SEED) for n in ("joint", "paper")}
-    without = drive(manoeuvre, _plant(), method("paper", road=False), SEED)
+    runs = {n: drive(manoeuvre, nominal_plant(), method(n), SEED) for n in ("joint", "paper")}
+    without = drive(manoeuvre, nominal_plant(), method("paper", road=False), SEED)
     k = _window(runs["joint"])
     t = _since(runs["joint"])[k]
     force, torque = _forces(runs)
@@ -188,10 +191,10 @@ def pad_friction() -> Report:
 
 def _four_runs(manoeuvre: Manoeuvre, alpha: float) -> dict[str, Run]:
     return {
-        "ideal": ideal(manoeuvre, _plant(), SEED, alpha),
-        "under-braking": drive(manoeuvre, _plant(UNDER), method(enabled=False), SEED, alpha),
-        "over-braking": drive(manoeuvre, _plant(OVER), method(enabled=False), SEED, alpha),
-        "compensated": drive(manoeuvre, _plant(UNDER), method(), SEED, alpha),
+        "ideal": ideal(manoeuvre, nominal_plant(), SEED, alpha),
+        "under-braking": drive(manoeuvre, nominal_plant(UNDER), method(enabled=False), SEED, alpha),
+        "over-braking": drive(manoeuvre, nominal_plant(OVER), method(enabled=False), SEED, alpha),
+        "compensated": drive(manoeuvre, nominal_plant(UNDER), method(), SEED, alpha),
     }
 
 
@@ -229,11 +232,11 @@ def blending() -> Report:
     manoeuvre = manoeuvres.stop(NOMINAL.road())
     alphas = np.array(ALPHAS)
     curves = []
-    best = {alpha: ideal(manoeuvre, _plant(), SEED, alpha) for alpha in ALPHAS}
+    best = {alpha: ideal(manoeuvre, nominal_plant(), SEED, alpha) for alpha in ALPHAS}
     for pads, label in ((UNDER, "under-braking"), (OVER, "over-braking")):
         for enabled in (False, True):
             errors = [
-                torque_error(drive(manoeuvre, _plant(pads), method(enabled=enabled), SEED, alpha), best[alpha])
+                torque_error(drive(manoeuvre, nominal_plant(pads), method(enabled=enabled), SEED, alpha), best[alpha])
                 for alpha in ALPHAS
             ]
             name = f"{label}, {'compensated' if enabled else 'not compensated'}"
@@ -273,19 +276,3 @@ def series(alpha: float, title: str) -> Report:
     section = Section("Three brakings from 130 km/h", panels=(speed, friction), charts=(chart,))
     reason = f"alpha = {alpha:g}; pads of {UNDER:g} and {OVER:g} times the friction that the controller believes."
     return Report(f"{title}: series of brakings", reason=reason, sections=(section,))
-
-
-def motor_failure() -> Report:
-    """Motors lost in the middle of a stop at alpha 0.7: who gives the torque."""
-    at = manoeuvres.FAULT_AT_S
-    a, p = [], []
-    for name, wheels in (("one motor", 0b0001), ("front axle", 0b0011), ("all motors", 0b1111)):
-        fault = Fault(PhysicalFault.MOTOR_DEAD, wheels, at)
-        run = drive(manoeuvres.stop(NOMINAL.road()), _plant(), method(), SEED, 0.7, (fault,))
-        k = (run.time_s > at - 0.2) & (run.time_s < at + 0.6)
-        t = run.time_s[k] - at
-        a.append(Trace(name, t, run.acceleration_mps2[k], group=name))
-        p.append(Trace(name, t, run.pressure_pa[k, 0] * 1e-5, group=name))
-    panels = (Panel("Acceleration", "m/s2", tuple(a)), Panel("Pressure, front left", "bar", tuple(p)))
-    reason = "The motors report their failure at 0 s; friction takes over with a 6 Hz brake of 20 ms dead time."
-    return Report("Motor failure at alpha 0.7", reason=reason, sections=(Section("Around the failure", panels=panels),))

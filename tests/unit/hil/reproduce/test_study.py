@@ -152,7 +152,6 @@ def test_goals_are_numbers():
 
 
 @pytest.mark.slow
-@pytest.mark.long
 @pytest.mark.timeout(900)
 def test_one_seed_meets_the_goals_but_for_the_known_misses():
     found = {(name, 0): [case(NOMINAL, 1)] for name, case in cases.CASES.items()}
