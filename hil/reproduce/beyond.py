@@ -28,7 +28,7 @@ def motor_failure() -> Report:
         a.append(Trace(name, t, run.acceleration_mps2[k], group=name))
         p.append(Trace(name, t, run.pressure_pa[k, 0] * 1e-5, group=name))
     panels = (Panel("Acceleration", "m/s2", tuple(a)), Panel("Pressure, front left", "bar", tuple(p)))
-    reason = "The motors report their failure at 0 s; friction takes over with a 6 Hz brake of 20 ms dead time."
+    reason = "The motors fail at 0 s and say so; friction takes over with a 6 Hz brake of 20 ms dead time."
     return Report("Motor failure at alpha 0.7", reason=reason, sections=(Section("Around the failure", panels=panels),))
 
 
@@ -36,18 +36,22 @@ def battery_refuses() -> Report:
     """The battery refuses in the middle of a stop at alpha 0.7, announced and without notice."""
     at = manoeuvres.FAULT_AT_S
     fault = Fault(PhysicalFault.BATTERY_REFUSES_CHARGE, 0, at)
-    a, torque = [], []
+    a, friction, motors = [], [], []
     for name, plant in (("told 0.3 s ahead", nominal_plant()), ("without notice", without_notice(nominal_plant()))):
         run = drive(manoeuvres.stop(NOMINAL.road()), plant, method(), SEED, 0.7, (fault,))
         k = (run.time_s > at - 0.2) & (run.time_s < at + 0.8)
         t = run.time_s[k] - at
-        friction = run.friction_torque_nm[k].sum(axis=1)
+        of_pads = run.friction_torque_nm[k].sum(axis=1)
         a.append(Trace(name, t, run.acceleration_mps2[k], group=name))
-        torque.append(Trace(f"friction, {name}", t, friction, group=name))
-        torque.append(Trace(f"motors, {name}", t, run.wheel_torque_nm[k].sum(axis=1) - friction, "demand", group=name))
-    panels = (Panel("Acceleration", "m/s2", tuple(a)), Panel("Torque of all wheels", "Nm", tuple(torque)))
+        friction.append(Trace(name, t, of_pads, group=name))
+        motors.append(Trace(name, t, run.wheel_torque_nm[k].sum(axis=1) - of_pads, group=name))
+    panels = (
+        Panel("Acceleration", "m/s2", tuple(a)),
+        Panel("Torque of the friction brakes, all wheels", "Nm", tuple(friction)),
+        Panel("Torque of the motors, all wheels", "Nm", tuple(motors)),
+    )
     reason = "At 0 s the battery says that it takes no more, 0.3 s before it cuts or at once; it speaks every 0.1 s."
-    return Report("Battery refuses at alpha 0.7", reason=reason, sections=(Section("Around it", panels=panels),))
+    return Report("Battery refuses at alpha 0.7", reason=reason, sections=(Section("Around the refusal", panels=panels),))
 
 
 def work_moved() -> Report:
