@@ -8,7 +8,7 @@ from dbc.frame import BusName, Frame, Received
 from hil.bus.bus import Bus
 from hil.bus.channel import bench_channel, claim_channel
 from hil.bus.open import open_bus
-from hil.node_process import NODE_PERIOD_NS
+from hil.node_process import NODE_PERIOD_NS, grants_in
 from hil.process import Child, StopSignal, interrupts_held, wait_for_end
 from hil.rig import BenchError, BenchState, Rig, Say, silent
 from hil.rt.clock import WallClock
@@ -84,8 +84,15 @@ class Bench(Rig):
             self._spawn(name, [name, self.scenario.source, "--seed", str(self._seed), *self._node_options])
             self._waiting.append((round(order[name] * 1e9), self._children[-1]))
         self._await_ready(self._children[1:])
+        self._say(self._punctuality())
         self._release(0)
         self._ticks = Loop(WallClock(), NODE_PERIOD_NS, BENCH_PHASE_NS).ticks()
+
+    def _punctuality(self) -> str:
+        """What the nodes run with, for people."""
+        if not self._node_options:
+            return "scheduled as any program: --realtime asks for more, `brakebench doctor` says what it would get"
+        return f"real time: {grants_in(child.error_path.read_text() for child in self._children[1:])}"
 
     def _join(self, name: BusName, spec: str) -> None:
         self._buses[name] = self._stack.enter_context(open_bus(spec, name))

@@ -1,5 +1,6 @@
 """One node as one process: joins its buses, runs at a fixed rate until told to stop."""
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -14,6 +15,7 @@ from hil.rt.loop import Loop, run_node
 from hil.rt.realtime import request_realtime, request_timer_slack
 
 NODE_PERIOD_NS = 10_000_000
+GRANTED, NOT_GRANTED = "granted", "NOT granted"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +70,7 @@ def serve(
         say(f"{role.name}: on {bus}, every {NODE_PERIOD_NS / 1e6:g} ms")
         for grant in request_realtime() if realtime else [request_timer_slack()]:
             if realtime or not grant.granted:
-                say(f"{role.name}: {grant.what}: {'granted' if grant.granted else 'NOT granted'}, {grant.detail}")
+                say(f"{role.name}: {grant.what}: {GRANTED if grant.granted else NOT_GRANTED}, {grant.detail}")
         say_ready(ready_fd)
         health = Transmitter()
         loop = Loop(WallClock(), NODE_PERIOD_NS, role.phase_ns)
@@ -77,3 +79,12 @@ def serve(
             port.send(health.frames(tick.now_ns, [timing]))
             if stop.asked:
                 return
+
+
+def grants_in(words: Iterable[str]) -> str:
+    """What nodes were granted by their own words, in one line: what all of them have, then what is missing and why."""
+    said = re.findall(rf"^\w+: (.+): ({GRANTED}|{NOT_GRANTED}), (.+)$", "\n".join(words), re.MULTILINE)
+    missing = {what: why for what, how, why in said if how == NOT_GRANTED}
+    have = [what for what in dict.fromkeys(what for what, _, _ in said) if what not in missing]
+    parts = [f"{', '.join(have)}: {GRANTED}"] if have else []
+    return "; ".join([*parts, *(f"{what}: {NOT_GRANTED}, {why}" for what, why in missing.items())])

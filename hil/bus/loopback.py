@@ -44,6 +44,7 @@ class _Peer:
         self.addressed = 0  # frames sent or lost on the way to it
         self.heard = 0  # frames it sent or lost on the way to us
         self.takes = True  # False once it has closed: its last frames may still be to be read
+        self.untold = False  # frames to it were lost, and it got none since that would tell it
 
 
 class LoopbackBus:
@@ -101,17 +102,27 @@ class LoopbackBus:
         peer.addressed += count
         try:
             peer.connection.send(packet, socket.MSG_NOSIGNAL)
+            peer.untold = False
         except (BrokenPipeError, ConnectionResetError):
             peer.takes = False
         except OSError:  # EAGAIN: its queue is full; ENOBUFS, ENOMEM: the machine's memory is
-            self._sent_lost += count
-            self._sent_lost_to.add(peer.pid)
+            peer.untold = True
+            if count:
+                self._sent_lost += count
+                self._sent_lost_to.add(peer.pid)
+
+    def _tell_losses(self) -> None:
+        """Tell those who lost frames how many, as soon as they have room: nothing else may follow for long."""
+        for peer in list(self._peers.values()):
+            if peer.untold and peer.takes:
+                self._send_to(peer, 0, monotonic_ns(), b"")
 
     def receive(self, timeout_s: float = 0.0) -> list[Received]:
         """Return everything there is: in order per member, by time of sending between members."""
         if self._epoll.closed:
             raise ValueError(f"{self.name} is closed")
         received: list[Received] = []
+        self._tell_losses()
         if self._sent_lost:
             received.append(self._not_taken())
             timeout_s = 0.0
@@ -180,13 +191,14 @@ class LoopbackBus:
             self._drop(file)
             return
         content = unpack(packet, self.bus)
-        if content is None or content[0] < peer.heard:
+        if content is None or content[0] < peer.heard + (not content[1]):  # without frames it must tell of a loss
             self.garbage += 1
             return
         sequence, frames = content
         if sequence > peer.heard:
             lost, detail = sequence - peer.heard, f"from process {peer.pid}"
-            received.append(LinkEvent(self.bus, LinkState.RX_OVERFLOW, frames[0].time_ns, lost, detail))
+            time_ns = frames[0].time_ns if frames else monotonic_ns()
+            received.append(LinkEvent(self.bus, LinkState.RX_OVERFLOW, time_ns, lost, detail))
         peer.heard = sequence + len(frames)
         received += frames
 

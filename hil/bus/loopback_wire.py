@@ -4,7 +4,7 @@ One packet of a seqpacket Unix socket, in the machine's byte order:
 
     offset  size       field
     0       4          b"BBL1"
-    4       4          count     frames in this packet, 1..64
+    4       4          count     frames in this packet, 0..64; none: only tells what was lost before
     8       8          sequence  frames addressed to this peer before this packet, lost ones included
     16      8          time_ns   the sender's CLOCK_MONOTONIC, ns, at least 0
     24      16 count   frames    see `hil.bus.can_frame`; neither error nor remote frames
@@ -34,12 +34,7 @@ def unpack(packet: bytes, bus: BusName) -> tuple[int, list[Frame]] | None:
     if len(packet) < _HEADER.size:
         return None
     magic, count, sequence, time_ns = _HEADER.unpack_from(packet)
-    if (
-        magic != MAGIC
-        or not 0 < count <= MAX_FRAMES
-        or len(packet) != _HEADER.size + count * CAN_FRAME.size
-        or time_ns < 0
-    ):
+    if magic != MAGIC or count > MAX_FRAMES or len(packet) != _HEADER.size + count * CAN_FRAME.size or time_ns < 0:
         return None
     frames = []
     records = CAN_FRAME.iter_unpack(packet[_HEADER.size :])

@@ -10,6 +10,7 @@ import select
 import socket
 import struct
 from collections.abc import Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -19,7 +20,8 @@ from hil.bus.can_frame import CAN_FRAME, ERROR_FLAG, EXTENDED_FLAG, EXTENDED_MAS
 from hil.bus.error_frame import append_event, link_events
 from hil.rt.clock import WallClock, monotonic_ns, wall_time_ns
 
-_SO_RCVBUFFORCE, _SO_TIMESTAMPNS, _SO_RXQ_OVFL = 33, 35, 40  # asm-generic/socket.h
+_SO_RCVBUFFORCE, _SO_TIMESTAMPNS, _SO_RXQ_OVFL, _SO_MEMINFO = 33, 35, 40, 55  # asm-generic/socket.h
+_MEMINFO = struct.Struct("=9I")  # linux/sock_diag.h; the last one counts drops
 _CAN_RAW_ERR_FILTER = 2  # linux/can/raw.h
 _RECEIVE_BYTES = 1 << 20  # the default holds about 250 frames
 _ANCILLARY_BYTES = 128
@@ -62,6 +64,7 @@ class SocketcanBus:
             self._socket: socket.socket | None = _open(spec.channel)
         except OSError as error:
             raise BusError(f"bus {spec.name}: {_reason(spec.channel, error)}") from error
+        self._note_bus_off()
 
     def send(self, frames: Sequence[Frame]) -> None:
         """Send frames; what the transmit queue does not take is dropped, not kept for later."""
@@ -130,7 +133,15 @@ class SocketcanBus:
                 self._dropped = 0
                 self._retry_ns = _FIRST_RETRY_NS
                 self._pending.append(LinkEvent(self.bus, LinkState.RESTARTED, monotonic_ns(), 1, "reconnected"))
+                self._note_bus_off()
         return self._socket
+
+    def _note_bus_off(self) -> None:
+        """Report what no error frame reports: that the interface went bus-off before we joined."""
+        if _without_carrier(self._interface):
+            help_ = f"sudo ip link set {self._interface} type can restart, or down and up"
+            detail = f"{self._interface} was bus-off before it was opened: {help_}"
+            self._pending.append(LinkEvent(self.bus, LinkState.BUS_OFF, monotonic_ns(), 1, detail))
 
     def _disconnect(self, error: OSError) -> None:
         if self._socket is not None:
@@ -155,7 +166,8 @@ class SocketcanBus:
         for _ in range(_MOST_FRAMES):
             try:
                 record, ancillary, _, _ = receive(CAN_FRAME.size, _ANCILLARY_BYTES)
-            except BlockingIOError:
+            except BlockingIOError:  # the frames' own count is of the time before them: were some lost after the last?
+                self._count_drops(_drops(link, self._dropped), monotonic_ns(), received)
                 return
             except OSError as error:
                 self._disconnect(error)
@@ -181,9 +193,25 @@ class SocketcanBus:
 
     def _count_drops(self, dropped: int, time_ns: int, received: list[Received]) -> None:
         lost = (dropped - self._dropped) & 0xFFFFFFFF
-        if lost:
+        if 0 < lost < 1 << 31:  # beyond: a frame's count from before the one we asked for
             self._dropped = dropped
             received.append(LinkEvent(self.bus, LinkState.RX_OVERFLOW, time_ns, lost, "socket's queue full"))
+
+
+def _drops(link: socket.socket, known: int) -> int:
+    """Frames dropped so far for want of room; ``known`` where the kernel does not say (before 4.12)."""
+    try:
+        return int(_MEMINFO.unpack(link.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMINFO.size))[-1])
+    except OSError:
+        return known
+
+
+def _without_carrier(interface: str) -> bool:
+    """Whether an interface that is up has no carrier: a CAN driver takes it away at bus-off."""
+    try:
+        return Path(f"/sys/class/net/{interface}/carrier").read_text().strip() == "0"
+    except OSError:
+        return False
 
 
 def _open(interface: str) -> socket.socket:

@@ -357,7 +357,7 @@ def test_a_stopped_member_loses_its_own_frames_only_and_learns_how_many(join, st
     assert str(stopped.process.pid) in refused[0].detail
     stopped.process.send_signal(signal.SIGCONT)
     not_taken = refused[0].number
-    while True:  # something must follow a gap to show it
+    while True:  # until all of them are counted
         here.send([Frame(VEHICLE, 0x7FF, b"")])
         if not (refused := here.receive()):
             break
@@ -367,6 +367,24 @@ def test_a_stopped_member_loses_its_own_frames_only_and_learns_how_many(join, st
     assert result["lost"] == not_taken
     assert result["numbers"] == list(range(len(result["numbers"])))
     assert len(result["numbers"]) >= 100
+
+
+@loopback
+def test_a_loss_is_told_although_nothing_follows(join):
+    here, there = join(), join()
+    for first in range(0, 100_000, 50):
+        here.send(frames(range(first, first + 50)))
+    refused = sum(event.number for event in here.receive())
+    assert refused > 0
+    received = there.receive()
+    assert lost(received) == 0  # its queue ends before the first gap
+    assert here.receive() == []  # there is room again
+    (event,) = there.receive()
+    assert (event.state, event.number) == (LinkState.RX_OVERFLOW, refused)
+    assert numbers(received) == list(range(100_000 - refused))
+    here.receive()
+    here.send(frames([100_000]))
+    assert numbers(there.receive(PATIENCE_S)) == [100_000]
 
 
 @loopback

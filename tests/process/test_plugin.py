@@ -8,12 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from documented import MOTOR_LOSS
 from processes import RUN_LIMIT_S, alive, children_of, heed_interrupts, wait_until
 
 from hil.result import Signals
 
-DOCUMENTED = Path(__file__).parents[2].joinpath("docs/testing.md").read_text()
-MOTOR_LOSS = DOCUMENTED.split("```python\n")[1].split("```")[0]
 NO_TAKEOVER = """
 import ecu.law.step  # every motor is taken for able, whatever it reports
 ecu.law.step._usable_torque = lambda inputs, lost, mode: (700.0, 700.0, 700.0, 700.0)

@@ -9,6 +9,9 @@ import time
 
 import can
 
+from dbc.frame import BusName, Frame, LinkEvent, LinkState
+from hil.bus import open_bus
+
 
 def _bus(channel: str, can_id: int) -> can.BusABC:
     filters = [{"can_id": can_id, "can_mask": 0x7FF, "extended": False}]
@@ -97,3 +100,20 @@ def test_another_process_answers_with_compiled_code_100_times_a_second(vcan0: st
             time.sleep(0.01)
         bus.send(can.Message(arbitration_id=0x6A3, is_extended_id=False))
         assert other.wait(10.0) == 0
+
+
+def test_a_lost_frame_is_told_although_nothing_follows(lab_vcan0: str) -> None:
+    """More than a receive queue holds, then silence: what arrived and what was lost are all that was sent."""
+    spec, sent = f"socketcan:{lab_vcan0}", 20_000
+    with open_bus(spec, BusName.VEHICLE) as sender, open_bus(spec, BusName.VEHICLE) as receiver:
+        for number in range(sent):
+            sender.send([Frame(BusName.VEHICLE, 0x6A5, number.to_bytes(4, "big"))])
+        assert sender.receive() == []
+        received = receiver.receive()
+        *frames, last = received
+        assert isinstance(last, LinkEvent)
+        assert (last.state, last.number) == (LinkState.RX_OVERFLOW, sent - len(frames))
+        assert [int.from_bytes(frame.data, "big") for frame in frames if isinstance(frame, Frame)] == [
+            *range(len(frames))
+        ]
+        assert receiver.receive() == []

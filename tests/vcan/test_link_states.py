@@ -191,6 +191,30 @@ def test_bus_off_ends_blending_at_once_and_the_link_comes_back_without_a_stale_f
     assert sides.faults == Fault.NONE
 
 
+def test_an_interface_that_was_bus_off_before_it_was_opened_says_so(slcan: SlcanInterface) -> None:
+    slcan.device.send_line(adapter.BUS_OFF)
+    wait_until(lambda: slcan.state() == "BUS-OFF", "the driver to take it in", PATIENCE_S)
+    with open_bus(f"socketcan:{slcan.name}", BusName.VEHICLE) as bus:
+        (event,) = bus.receive()
+        assert isinstance(event, LinkEvent)
+        assert event.state is LinkState.BUS_OFF
+        assert f"{slcan.name} was bus-off before it was opened" in event.detail
+        node = EcuNode(load_scenario("stop72").ecu)
+        node.step(0, [event])
+        assert node.outputs is not None
+        assert Fault.LINK in node.outputs.faults
+        slcan.down()
+        slcan.up()
+        states: list[LinkState] = []
+
+        def again() -> bool:
+            states.extend(item.state for item in bus.receive(0.1) if isinstance(item, LinkEvent))
+            return LinkState.RESTARTED in states
+
+        wait_until(again, "the bus to be joined again", PATIENCE_S)
+        assert states == [LinkState.DISCONNECTED, LinkState.RESTARTED]
+
+
 def test_an_unplugged_adapter_is_a_lost_link(slcan: SlcanInterface, sides: TwoSides) -> None:
     slcan.unplug()
     sides.tick(cut=True)

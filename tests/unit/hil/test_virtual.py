@@ -65,10 +65,11 @@ def test_a_recording_as_of_two_processes(short, tmp_path):
 
 
 def test_two_fresh_processes_give_the_same_bytes_and_another_seed_others(short, tmp_path):
-    digests = []
-    for folder, seed in (("a", 1), ("b", 1), ("c", 2)):
-        subprocess.run([sys.executable, "-c", RECORD, short.source, str(tmp_path / folder), str(seed)], check=True)
-        digests.append(hashlib.sha256((tmp_path / folder / "recording.log").read_bytes()).hexdigest())
+    runs = {"a": 1, "b": 1, "c": 2}
+    command = [sys.executable, "-c", RECORD, short.source]
+    processes = [subprocess.Popen([*command, str(tmp_path / name), str(seed)]) for name, seed in runs.items()]
+    assert [process.wait(120) for process in processes] == [0, 0, 0]
+    digests = [hashlib.sha256((tmp_path / name / "recording.log").read_bytes()).hexdigest() for name in runs]
     assert digests[0] == digests[1] != digests[2]
 
 

@@ -29,6 +29,7 @@ class Link:
 
     def __init__(self, arriving=(), refusing=()):
         self.arriving, self.refusing, self.sent, self.closed = list(arriving), list(refusing), [], False
+        self.drops = 0
         self.file, self.far = socket.socketpair()
 
     def recvmsg(self, size, ancillary_size):
@@ -36,6 +37,10 @@ class Link:
         if isinstance(item, Exception):
             raise item
         return item
+
+    def getsockopt(self, level, option, size):
+        assert (level, option, size) == (socket.SOL_SOCKET, 55, 36)  # SO_MEMINFO
+        return struct.pack("=9I", *range(8), self.drops)
 
     def send(self, record):
         item = self.refusing.pop(0) if self.refusing else None
@@ -105,14 +110,29 @@ def test_stamps_become_monotonic_time(bus_on):
 
 def test_what_the_kernel_dropped_is_reported_where_it_is_missing(bus_on):
     link = Link([record(1), record(2, drops=5), record(3, drops=5), record(4, drops=7)])
+    link.drops = 7
     received = bus_on(link).receive()
     assert states(received) == [1, LinkState.RX_OVERFLOW, 2, 3, LinkState.RX_OVERFLOW, 4]
     assert [item.number for item in received if isinstance(item, LinkEvent)] == [5, 2]
 
 
+def test_what_was_dropped_after_the_last_frame_is_reported_although_nothing_follows(bus_on):
+    link = Link([record(1), record(2, drops=1)])
+    link.drops = 4
+    bus = bus_on(link)
+    received = bus.receive()
+    assert states(received) == [1, LinkState.RX_OVERFLOW, 2, LinkState.RX_OVERFLOW]
+    assert [item.number for item in received if isinstance(item, LinkEvent)] == [1, 3]
+    assert bus.receive() == []
+    link.arriving = [record(3, drops=3)]  # queued before the kernel's count was asked for
+    assert states(bus.receive()) == [3]
+
+
 def test_the_count_of_drops_may_wrap(bus_on):
-    received = bus_on(Link([record(1, drops=2**32 - 1), record(2, drops=1)])).receive()
-    assert [item.number for item in received if isinstance(item, LinkEvent)] == [2**32 - 1, 2]
+    link = Link([record(1, drops=2**31 - 1), record(2, drops=2**32 - 2), record(3, drops=1)])
+    link.drops = 1
+    received = bus_on(link).receive()
+    assert [item.number for item in received if isinstance(item, LinkEvent)] == [2**31 - 1, 2**31 - 1, 3]
 
 
 def test_error_frames_become_events_and_floods_are_counted(bus_on):
