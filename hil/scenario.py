@@ -121,7 +121,7 @@ def load_scenario(name: str) -> Scenario:
     hil.scenario_table.ScenarioError, hil.parameters.ParameterError
         No such scenario, or a wrong field; the message names file, key and what is allowed.
     """
-    source = _find(name)
+    source = find_scenario(name)
     try:
         text = source.read_bytes()
         values = tomllib.loads(text.decode("utf-8"))
@@ -163,7 +163,8 @@ def _library() -> Traversable:
     return resources.files("hil") / "scenarios"
 
 
-def _find(name: str) -> Path | Traversable:
+def find_scenario(name: str) -> Path | Traversable:
+    """File of a scenario, by name (of the library) or by path; ScenarioError where there is none of that name."""
     path = Path(name)
     if path.suffix == ".toml" or "/" in name:
         return path

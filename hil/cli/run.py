@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from pathlib import Path
 
 from hil.cli.options import add_bus, add_json, add_realtime, add_scenario, add_seed
 
@@ -23,6 +24,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         default=[],
         help="do not start this node: it is somebody else's, on the same bus",
     )
+    parser.add_argument("--extend", type=Path, metavar="FILE", help="extension that `explain` wrote: the car it taught")
     parser.add_argument("--out", metavar="DIR", help="folder for log, signals, figure and report (default: runs/...)")
     add_seed(parser)
     add_realtime(parser)
@@ -37,10 +39,18 @@ def run(args: argparse.Namespace) -> int:
 
     if args.virtual and (args.without or args.realtime or args.bus != "auto"):
         raise BrakebenchError("--virtual has no bus and no processes: leave out --bus, --without and --realtime")
+    scenario, out = args.scenario, args.out
+    if args.extend is not None:
+        from hil.run import new_folder
+        from hil.study.extended import extended_scenario
+
+        folder = Path(out) if out else new_folder(Path(scenario).stem)
+        folder.mkdir(parents=True, exist_ok=True)
+        scenario, out = str(extended_scenario(scenario, args.extend, folder)), str(folder)
     outcome = run_scenario(
-        args.scenario,
+        scenario,
         args.bus,
-        out=args.out,
+        out=out,
         seed=args.seed,
         realtime=args.realtime,
         virtual=args.virtual,

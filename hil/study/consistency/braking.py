@@ -27,10 +27,11 @@ _NUMBERS: Final[Mapping[str, Number]] = {
     "engine_mps2": Number(0.0, -10.0, 10.0, 0.2),
     "drag_mps2": Number(0.0, -10.0, 10.0, 0.2),
     "drag_1_m": Number(0.0, -0.02, 0.02, 2e-4),
+    "offset_pa": Number(0.0, -5e6, 5e6, 1e4),
     "by_speed": Number(0.0, -3.0, 3.0, 0.1),
     "by_pressure": Number(0.0, -3.0, 3.0, 0.1),
 }
-_OFF = 0.01
+_OFF, _GAINING_MPS2 = 0.01, 0.4
 _REFERENCE = (20.0, 5e5)
 LEAST_PA = 2e5
 LEAST_STOPS = 3
@@ -49,7 +50,8 @@ class Braking(Model):
         self.motion = motion
         self.demanded = not motion.has("pressure")
         pressure = motion.channels["pressure_demand" if self.demanded else "pressure"]
-        self.pressure = np.nan_to_num(pressure)
+        self.offset_pa, self.offset_sigma_pa = _zero(motion, pressure)
+        self.pressure = np.nan_to_num(pressure - self.offset_pa)
         self.speed = motion.channels["speed_mps"] if motion.has("speed_mps") else motion.speed_mps
         self.throttle = np.nan_to_num(motion.channels["throttle"]) if motion.has("throttle") else None
         self._known = (np.isfinite(self.speed) * motion.moving)[:, None]
@@ -119,6 +121,19 @@ def _lagged(values: Floats, fresh: Floats, phi: float, old: float, new: float) -
         part = values[first:last]
         out[first:last], _ = lfilter([new, old], [1.0, -phi], part, zi=[old * part[0] + phi * part[0]])
     return out
+
+
+def _zero(motion: Motion, pressure: Floats) -> tuple[float, float]:
+    """What the pressure reads while the car gains speed, and how far the manoeuvres disagree on it."""
+    free = (motion.accel_mps2 > _GAINING_MPS2) & (motion.moving > 0.5) & np.isfinite(pressure)
+    values = [
+        float(np.median(pressure[part])) for k in range(motion.blocks) if (part := free & (motion.block == k)).sum() > 5
+    ]
+    if len(values) < LEAST_STOPS:
+        return 0.0, 0.0
+    return float(np.median(values)), float(np.subtract(*np.quantile(values, (0.84, 0.16)))) * 0.5 * (
+        len(values) - 1
+    ) ** -0.5
 
 
 def _stops(motion: Motion, pressure: Floats) -> list[tuple[int, int]]:

@@ -89,7 +89,7 @@ def check(
         ],
         "gain": {
             m.channel: {
-                "before": m.before, "after": m.held_out, "ci95": [m.low, m.high], "tuned": m.before,
+                "before": m.before, "after": m.held_out, "ci95": [m.low, m.high], "tuned": m.tuned,
                 "best_wrong": m.best_wrong,
             }
             for m in missed

@@ -25,8 +25,9 @@ Predict = Callable[[Mapping[str, float]], Floats]
 class Miss:
     """One channel: measured and foretold, and the root mean squares of what is missed.
 
-    ``before`` as handed in, ``after`` with all that was learnt, ``held_out`` on manoeuvres the fit did not see (``low``
-    and ``high``: 95 % by bootstrap over manoeuvres), ``best_wrong`` likewise with the best number of another name.
+    ``before`` as handed in, ``after`` with all that was learnt, ``tuned`` without any cause; ``held_out`` on manoeuvres
+    the fit did not see (``low`` and ``high``: 95 % by bootstrap over manoeuvres), ``best_wrong`` likewise with the best
+    number of another name.
     """
 
     channel: str
@@ -36,6 +37,7 @@ class Miss:
     learnt: Floats
     before: float
     after: float
+    tuned: float
     held_out: float
     low: float
     high: float
@@ -76,7 +78,8 @@ def _rolled(model: Wheels, wheel: str) -> Predict:
 
 
 def _miss(motion: Motion, found: Found, channel: str, unit: str, measured: Floats, predict: Predict) -> Miss:
-    handed, learnt = predict({**found.handed, **found.base.sensor}), predict(found.numbers)
+    handed, learnt = predict(found.handed), predict(found.numbers)
+    tuned = predict({**found.handed, **found.base.sensor})
     mask = (motion.moving > 0.5) & np.isfinite(measured) & np.isfinite(handed)
     own = _held_out(found, predict)
     wrong = _wrong(found)
@@ -85,6 +88,7 @@ def _miss(motion: Motion, found: Found, channel: str, unit: str, measured: Float
     low, high = _interval(squares)
     return Miss(
         channel, unit, measured, handed, learnt, _rms(measured - handed, mask), _rms(measured - learnt, mask),
+        _rms(measured - tuned, mask),
         _root(squares), low, high, other, _pattern(motion, measured - handed, mask, found),
     )  # fmt: skip
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from hil.study.table import PRESSURE, PRESSURE_DEMAND, WHEEL_SPEED, Floats, Log, UnusableError
 
-CELL_S, LONG_CELL_S, LONG_S = 0.04, 0.08, 200.0
+CELL_S = 0.04
 SLOW_MPS = 3.0  # below, wheel-speed sensors hold and drop
 MANOEUVRE_S = (6.0, 12.0)
 _GAP_S = 0.25
@@ -67,9 +67,7 @@ def motion_of(logs: Sequence[Log], radius_m: float) -> Motion:
     if not (set(WHEEL_SPEED) <= there or "speed_mps" in there):
         raise UnusableError("neither all wheel speeds nor a speed in every log; nothing says how the car moved")
     step = max(float(np.median(np.diff(log.t_s))) for log in logs)
-    whole = sum(float(log.t_s[-1] - log.t_s[0]) for log in logs)
-    cell = CELL_S if whole < LONG_S else LONG_CELL_S
-    cell = max(1, round(cell / step)) * step if step > 0.5 * CELL_S else cell
+    cell = CELL_S if step <= 1.05 * CELL_S else step
     parts = [_cells(log, there, cell, radius_m) for log in logs]
     t_s = np.concatenate([t for t, _ in parts])
     channels = {name: np.concatenate([c[name] for _, c in parts]) for name in parts[0][1]}

@@ -18,7 +18,7 @@ _IMU_SCALE, _OF_A_SENSOR = 0.04, 0.2
 
 @dataclass(frozen=True)
 class Name:
-    """An effect that a number may be: value = factor * number, ``usual`` size in the number's own unit."""
+    """An effect that a number may be: value = factor * change, ``usual`` size in the number's own unit."""
 
     effect: str
     parameter: str
@@ -29,9 +29,10 @@ class Name:
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """A number with its names, most likely first; ``value``, ``low`` and ``high`` are the number's own.
+    """A number with its names, most likely first; ``value``, ``low`` and ``high`` are what it has
+    changed by since it was handed in.
 
-    ``change`` is the number of ``model`` moved; ``channels`` say where it shows; ``exact`` the mistake it equals.
+    ``number`` is of ``model``; ``channels`` say where it shows; ``exact`` is the mistake that it equals.
     """
 
     model: str
@@ -70,8 +71,9 @@ def causes_of(model: str, found: Found, to_ground: bool) -> list[Cause]:
     """Every number that was taken up, by name."""
     listed = []
     for step in found.steps:
-        number, value = step.number, found.final.sensor[step.number]
-        low, high = found.interval(number)
+        number, handed = step.number, found.handed.get(step.number, 0.0)
+        value, low, high = (_change(number, v, handed) for v in (found.final.sensor[number], *found.interval(number)))
+        low, high = sorted((low, high))
         names, channels, exact = _names(model, number, value, (low, high), to_ground)
         rivals = {n: f.cost for n, f in step.others.items()}
         odds = _odds(names, value)
@@ -83,6 +85,13 @@ def causes_of(model: str, found: Found, to_ground: bool) -> list[Cause]:
             )
         )  # fmt: skip
     return listed
+
+
+def _change(number: str, value: float, handed: float) -> float:
+    """What a number has become, beside what was handed in: scales as ratios, all else as differences."""
+    if number.endswith("gain"):
+        return (1.0 + value) / (1.0 + handed) - 1.0
+    return value / handed - 1.0 if number == "brake_mps2_pa" else value - handed
 
 
 def _odds(names: tuple[Name, ...], value: float) -> list[float]:
@@ -116,13 +125,16 @@ def _names(
         "ahead_m": (Name("imu_position", "x_m", "imu", 1.0, 0.3),),
         "beside_m": (Name("imu_position", "y_m", "imu", 1.0, 0.15),),
         "yaw_bias_rad_s": (Name("imu_bias", "yaw_rate_rad_s", "imu", 1.0, 0.005),),
+        "offset_pa": (Name("pressure_offset", "offset_pa", "pressure", 1.0, 1e5),),
         "brake_mps2_pa": (
             Name("pad_mu_gain", "gain", "car", 1.0, 0.15),
             Name("pressure_gain", "gain", "car", 1.0, 0.15),
             Name("mass_offset", "mass_kg", "car", -1.0, 0.1),
         ),
     }
-    seen = {"yaw_bias_rad_s": "yaw_rate_rad_s", "brake_mps2_pa": "pressure"}.get(number, "ax_mps2")
+    seen = {"yaw_bias_rad_s": "yaw_rate_rad_s", "brake_mps2_pa": "pressure", "offset_pa": "pressure"}.get(
+        number, "ax_mps2"
+    )
     return tied[number], (seen,), None
 
 

@@ -17,6 +17,7 @@ _UNKNOWN: Final = ("drive_mps2", "drive_delay_s", "engine_mps2")
 _FREE: Final = ("brake_mps2_pa", "delay_s", "drag_mps2", "drag_1_m")
 _STARTS_S: Final = (0.05, -0.2, 0.3)
 _DEAD_TIME_SIGMA_S: Final = 0.03
+_LEAST_OFFSET_PA, _OFFSET_SIGMA_PA, _SURE = 2e4, 5e3, 4.0
 _HINTS: Final = {"lag_s": "ehb_bandwidth", "by_speed": "mu_speed", "by_pressure": "mu_pressure"}
 _UNITS: Final = {
     "brake_mps2_pa": ("deceleration_per_pressure", "m/s2/Pa"), "delay_s": ("pressure_to_deceleration_delay", "s"),
@@ -66,6 +67,7 @@ def stop_search(model: Braking, motion: Motion, vehicle: Vehicle, handed: Mappin
     deviation = deviations(model, final, motion.block, handed)
     found = Found(model, dict(handed), base, final, motion.block, deviation, _tolerance(vehicle, handed))
     found.evidence = len(model.stops)
+    _zero_off(model, found, say)
     for number in ("delay_s", "brake_mps2_pa"):
         spread = float(np.hypot(deviation[number], found.tolerance[number]))
         off = abs(final.sensor[number] - handed[number])
@@ -75,6 +77,16 @@ def stop_search(model: Braking, motion: Motion, vehicle: Vehicle, handed: Mappin
             found.steps.append(Step(number, gain, {}))
             say(f"{number} = {final.sensor[number]:.4g}, gains {gain:.0f}")
     return found
+
+
+def _zero_off(model: Braking, found: Found, say: Say) -> None:
+    """The pressure's zero while the car gains speed; it was taken off before all else."""
+    off = abs(model.offset_pa - found.handed.get("offset_pa", 0.0))
+    if off > max(_LEAST_OFFSET_PA, _SURE * model.offset_sigma_pa):
+        found.final.sensor["offset_pa"] = model.offset_pa
+        found.deviation["offset_pa"] = max(model.offset_sigma_pa, _OFFSET_SIGMA_PA)
+        found.steps.append(Step("offset_pa", (off / found.deviation["offset_pa"]) ** 2, {}))
+        say(f"the pressure reads {model.offset_pa:.0f} Pa while the car gains speed")
 
 
 def _settled(

@@ -10,7 +10,9 @@ from hil.study.consistency.braking import Braking
 from hil.study.consistency.check import Consistency
 from hil.study.consistency.misses import Miss
 from hil.study.consistency.motion import Motion
+from hil.study.consistency.search import ASKED
 from hil.study.table import Floats
+from plant.effects.theta import THETA
 
 _SENTENCE = {
     "none": "The sensors agree with the car's own motion within noise.",
@@ -32,7 +34,7 @@ def build_report(answer: Consistency, sources: Sequence[str]) -> Report:
     return Report(
         title="Measured sensors against the car's own motion",
         verdict={"none": Verdict.PASSED, "named": None}.get(content["verdict"], Verdict.INCOMPLETE),
-        reason=_SENTENCE[content["verdict"]],
+        reason=f"{_SENTENCE[content['verdict']]} {_headline(answer)}".strip(),
         numbers=tuple(_cards(answer)),
         sections=tuple(sections),
         provenance={
@@ -49,13 +51,36 @@ def _cards(answer: Consistency) -> list[Number]:
     for cause in answer.json["causes"]:
         for name, entry in cause["parameters"].items():
             low, high = entry["ci95"]
-            label = f"{cause['title']} ({', '.join(cause['channels'])}): {name}"
+            label = f"{', '.join(cause['channels'])}: {cause['effect'].replace('_', ' ')}, {name.replace('_', ' ')}"
             cards.append(Number(label, _short(entry["value"]), entry["unit"], note=f"95 %: {low:.3g} to {high:.3g}"))
     for miss in answer.misses:
         if miss.before > 0.0 and miss.held_out < 0.8 * miss.before:
-            note = f"{_title(miss)}, manoeuvres no fit saw"
-            cards.append(Number("Error removed", round(100.0 * (1.0 - miss.held_out / miss.before), 1), "%", note=note))
+            note = "on manoeuvres that no fit saw"
+            cards.append(
+                Number(
+                    f"{_title(miss)}: error removed",
+                    round(100.0 * (1.0 - miss.held_out / miss.before), 1),
+                    "%",
+                    note=note,
+                )
+            )
     return cards
+
+
+def _headline(answer: Consistency) -> str:
+    """The causes in words."""
+    said = []
+    for cause in answer.causes:
+        name, channel = cause.names[0], ", ".join(cause.channels)
+        if name.effect == "wrong_scale":
+            wrong = "its sign is wrong" if cause.exact == -1.0 else "scale or sign is wrong"
+            said.append(f"{channel} reads {1.0 + cause.value:.2f} of the truth ({wrong})")
+        else:
+            unit = THETA.effect(name.effect).parameter(name.parameter).unit
+            said.append(
+                f"{channel}: {name.effect.replace('_', ' ')} of {name.factor * cause.value:.3g} {unit}".rstrip()
+            )
+    return "; ".join(said) + "." if said else ""
 
 
 def _short(value: float) -> float:
@@ -73,10 +98,10 @@ def _time(motion: Motion) -> Floats:
 
 def _panels(miss: Miss, t: Floats, rows: Floats) -> list[Panel]:
     unit = _UNIT[miss.unit]
-    shown = [("measured", miss.measured, "demand", ""), ("as handed in", miss.handed_in, "line", "rl")]
+    shown = [("measured", miss.measured, "line", ""), ("as handed in", miss.handed_in, "line", "rl")]
     shown.append(("extended", miss.learnt, "line", "fl"))
     traces = tuple(Trace(n, t[rows], y[rows], style, group) for n, y, style, group in shown)  # type: ignore[arg-type]
-    return [Panel(f"{_title(miss)}: measured and foretold from the wheels", unit, traces)]
+    return [Panel(_title(miss), unit, traces)]
 
 
 def _left(miss: Miss, t: Floats, rows: Floats) -> Panel:
@@ -84,7 +109,7 @@ def _left(miss: Miss, t: Floats, rows: Floats) -> Panel:
         Trace(name, t[rows], (miss.measured - y)[rows], group=group)
         for name, y, group in (("as handed in", miss.handed_in, "rl"), ("extended", miss.learnt, "fl"))
     ]
-    return Panel(f"{_title(miss)}: measured less foretold", _UNIT[miss.unit], tuple(traces))
+    return Panel(f"{_title(miss)}: what is missed", _UNIT[miss.unit], tuple(traces))
 
 
 def _overview(answer: Consistency) -> Section:
@@ -121,7 +146,7 @@ def _windows(answer: Consistency) -> list[Section]:
             rows = np.zeros(len(t), bool)
             rows[first:last] = True
             curves = [
-                Curve("measured", t[rows], stops.measured[rows], style="demand"),
+                Curve("measured", t[rows], stops.measured[rows]),
                 Curve("as handed in", t[rows], stops.handed_in[rows], group="rl"),
                 Curve("extended", t[rows], stops.learnt[rows], group="fl"),
             ]
@@ -166,31 +191,19 @@ def _numbers_section(answer: Consistency) -> Section:
         )  # fmt: skip
         names = ("number", "value", "95 %", "unit", "handed in")
         tables.append(Table("What the stops support", names, estimates, note="Student's t over the stops."))
-    return Section("Numbers", tables=tuple(tables), charts=tuple(_race(answer)))
+    return Section("Numbers", tables=(*tables, *_race(answer)))
 
 
-def _race(answer: Consistency) -> list[Chart]:
+def _race(answer: Consistency) -> list[Table]:
     """What each number would have gained in the place of the first one taken up."""
     found = answer.models.get("along")
     if found is None or not found.steps:
         return []
     step = found.steps[0]
-    names = [step.number, *step.others]
-    gains = [step.gain, *(found.base.cost - f.cost for f in step.others.values())]
-    order = np.argsort(gains)[::-1]
-    x = np.arange(1.0, len(names) + 1.0)
-    y = np.maximum(np.array(gains)[order], 0.1)
-    label = "rank: " + ", ".join(f"{k + 1} {names[i].split('_')[0]}" for k, i in enumerate(order))
-    return [
-        Chart(
-            "Accelerometer: log-likelihood gained by each number alone",
-            label,
-            "",
-            "gain",
-            "",
-            (Curve("gain", x, y, style="points"),),
-        )
-    ]
+    gains = {step.number: step.gain} | {n: found.base.cost - f.cost for n, f in step.others.items()}
+    rows = tuple((n.replace("_", " "), round(g, 1)) for n, g in sorted(gains.items(), key=lambda item: -item[1]))
+    note = f"Twice the log-likelihood, each number alone in the first place; {ASKED:g} is asked of a cause."
+    return [Table("Who else was in the race (accelerometer)", ("number", "gain"), rows, note)]
 
 
 def _relations(answer: Consistency) -> Section:
