@@ -41,7 +41,14 @@ from ecu.law.joint.layout import (
     YAW_RATE,
 )
 from ecu.law.joint.measurements import balance_forces, compare_wheel_speed
-from ecu.law.joint.motion import expected_acceleration, level_acceleration, stand, watch_accelerometer, wheel_states
+from ecu.law.joint.motion import (
+    expected_acceleration,
+    level_acceleration,
+    median_wheel,
+    stand,
+    watch_accelerometer,
+    wheel_states,
+)
 from ecu.law.joint.sliding import LOST_S, find_speed_again, torque_of_standing_wheels, watch_wheel
 from ecu.law.joint.torque import track_pressure_zero, update_torques, wheel_force
 
@@ -75,7 +82,7 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     if s[STARTED] == 0.0:
         if fastest < 0.0 or isnan(z[AX]):
             return s
-        start(s, p, np.nanmedian(z[WHEEL : WHEEL + 4]) * p[P_RADIUS])
+        start(s, p, median_wheel(z) * p[P_RADIUS])
         for i in range(4):
             s[MOTOR_LAG + i] = 0.0 if isnan(z[MOTOR + i]) else z[MOTOR + i]
     body = watch_accelerometer(s, z, p, dt)

@@ -45,6 +45,21 @@ CONTRADICTION_MPS2 = 0.5
 
 
 @helper
+def median_wheel(z: Vector) -> float:
+    """Median of the wheel speeds that are there, rad/s; at least one is. (numpy's takes long to compile.)"""
+    ordered, number = np.empty(4), 0
+    for i in range(4):
+        if not isnan(z[WHEEL + i]):
+            k = number
+            while k > 0 and ordered[k - 1] > z[WHEEL + i]:
+                ordered[k] = ordered[k - 1]
+                k -= 1
+            ordered[k] = z[WHEEL + i]
+            number += 1
+    return float(0.5 * (ordered[(number - 1) // 2] + ordered[number // 2]))
+
+
+@helper
 def watch_accelerometer(s: Vector, z: Vector, p: Vector, dt: float) -> bool:
     """Whether the accelerometer can be believed.
 

@@ -8,6 +8,7 @@ import pytest
 from ecu.law.estimator import joint_parameters
 from ecu.law.joint import layout as joint
 from ecu.law.joint.filter import joint_step
+from ecu.law.joint.motion import median_wheel
 
 DT, RADIUS, INERTIA, MASS = 0.01, 0.308, 1.5, 1463.0
 FRICTION = slice(joint.FRICTION, joint.FRICTION + 4)
@@ -208,3 +209,13 @@ def test_a_quiet_sensor_at_steady_speed_is_not_stuck(parameters):
     car = SmallCar(parameters)
     car.run(0.5, noise=0.0)
     assert max(samples(car, [0.0] * 200, [car.v] * 200)) == 0.0
+
+
+NONE = math.nan
+
+
+@pytest.mark.parametrize("speeds", [[4.0, 1.0, 3.0, 2.0], [NONE, 5.0, NONE, 1.0], [2.0, 9.0, NONE, 1.0], [3.0] * 4])
+def test_the_median_is_numpys(speeds):
+    z = np.zeros(17)
+    z[joint.WHEEL : joint.WHEEL + 4] = speeds
+    assert median_wheel(z) == np.nanmedian(speeds)
