@@ -169,11 +169,14 @@ def series(condition: Condition, seed: int) -> Numbers:
     return out
 
 
-def dips(run: Run, from_s: float) -> Numbers:
-    """How far deceleration fell below demand after a fault, m/s2, for how long, ms, and the speed lost by it, m/s."""
+def dips(run: Run, from_s: float, grade: float = 0.0) -> Numbers:
+    """How far deceleration fell below demand after a fault, m/s2, for how long, ms, and the speed lost by it, m/s.
+
+    What the hill brakes is the driver's, not the pedal's.
+    """
     k = (run.time_s >= from_s) & (run.time_s < from_s + 1.5) & (run.speed_mps > SLOWEST_MPS)
     before = (run.time_s >= from_s - 0.3) & (run.time_s < from_s)
-    lack = run.demanded_mps2 + run.acceleration_mps2
+    lack = run.demanded_mps2 + run.acceleration_mps2 + GRAVITY_MPS2 * grade
     dip = lack[k]
     return {
         "depth": float(dip.max()),
@@ -191,14 +194,14 @@ def failures(condition: Condition, seed: int) -> Numbers:
     for name, wheels in (("one", 0b0001), ("axle", 0b0011), ("all", 0b1111)):
         fault = Fault(PhysicalFault.MOTOR_DEAD, wheels, at)
         run = drive(manoeuvres.stop(condition.road()), plant, method(), seed, 0.7, (fault,))
-        out |= {f"{name} {key}": value for key, value in dips(run, at).items()}
+        out |= {f"{name} {key}": value for key, value in dips(run, at, condition.grade).items()}
     at += 0.01 * (seed % 10)  # the battery speaks every 0.1 s: any moment between
     refuses = Fault(PhysicalFault.BATTERY_REFUSES_CHARGE, 0, at)
     for name, vehicle in (("announced", plant), ("at once", without_notice(plant))):
         run = drive(manoeuvres.stop(condition.road()), vehicle, method(), seed, 0.7, (refuses,))
-        out |= {f"{name} {key}": value for key, value in dips(run, at).items()}
+        out |= {f"{name} {key}": value for key, value in dips(run, at, condition.grade).items()}
     run = drive(full_battery(condition), small_battery(plant), method(), seed, 0.7)
-    out["full depth"] = dips(run, run.time_s[onset(run)] + SETTLED_S)["depth"]
+    out["full depth"] = dips(run, run.time_s[onset(run)] + SETTLED_S, condition.grade)["depth"]
     return out
 
 
@@ -226,7 +229,7 @@ def weak_pads(condition: Condition, seed: int) -> Numbers:
         run = drive(manoeuvres.two_stops(condition.road()), plant, ecu, seed)
         second = onset(run, manoeuvres.STOP_AT_S + 10.0)
         k = slice(second + 60, second + 460)
-        hill = GRAVITY_MPS2 * condition.grade  # what the hill brakes is the driver's, not the pedal's
+        hill = GRAVITY_MPS2 * condition.grade  # as in `dips`
         braked = float(np.mean(-run.acceleration_mps2[k])) - hill
         reached = 100.0 * (braked / float(np.mean(run.demanded_mps2[k])) - 1.0)
         out[f"{name} second"] = abs(reached)

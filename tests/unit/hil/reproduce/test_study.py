@@ -110,6 +110,8 @@ def test_dips_count_time_below_demand():
                  acceleration_mps2=np.where(short, -1.5, -3.0))  # fmt: skip
     found = cases.dips(run, 8.0)
     assert found == {"depth": 1.5, "above 1.0": 70.0, "above 0.3": 70.0, "lost": pytest.approx(0.105)}
+    uphill = dataclasses.replace(run, acceleration_mps2=run.acceleration_mps2 - 0.03 * 9.81)
+    assert cases.dips(uphill, 8.0, 0.03)["depth"] == pytest.approx(1.5)
 
 
 def test_conditions_change_what_they_say_and_keep_the_sensors_spread():
