@@ -51,7 +51,9 @@ def battery_refuses() -> Report:
         Panel("Torque of the motors, all wheels", "Nm", tuple(motors)),
     )
     reason = "At 0 s the battery says that it takes no more, 0.3 s before it cuts or at once; it speaks every 0.1 s."
-    return Report("Battery refuses at alpha 0.7", reason=reason, sections=(Section("Around the refusal", panels=panels),))
+    return Report(
+        "Battery refuses at alpha 0.7", reason=reason, sections=(Section("Around the refusal", panels=panels),)
+    )
 
 
 def work_moved() -> Report:
