@@ -35,8 +35,13 @@ def wanted_torque(demand_nm: Four, factor: float, available_nm: Four, motor: Mot
     """Torque asked of each motor, Nm: alpha T_dem (paper eq. 2) as far as it is available."""
     if factor <= 0.0:
         return ZERO
-    a, b, c, d = (min(factor * t, a, motor.torque_max_nm) for t, a in zip(demand_nm, available_nm, strict=True))
-    return (a, b, c, d)
+    (d0, d1, d2, d3), (a0, a1, a2, a3), most = demand_nm, available_nm, motor.torque_max_nm
+    return (
+        min(factor * d0, a0, most),
+        min(factor * d1, a1, most),
+        min(factor * d2, a2, most),
+        min(factor * d3, a3, most),
+    )
 
 
 def hand_over(held: ChargePower, announced_w: float, power_w: float, p: BlendParameters, dt_s: float) -> ChargePower:

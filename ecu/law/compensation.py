@@ -26,13 +26,18 @@ def friction_in_use(
     low = max(nominal * (1.0 - p.authority), p.friction_lowest)
     high = min(nominal * (1.0 + p.authority), p.friction_highest)
     rate = p.rate_1_s * nominal
-    result = []
-    for u, e, k in zip(used, estimate, confidence, strict=True):
-        most = rate * k * dt_s
-        change = min(max(e, low), high) - u
-        result.append(u + (most if change > most else -most if change < -most else change))
-    a, b, c, d = result
-    return (a, b, c, d)
+    (u0, u1, u2, u3), (e0, e1, e2, e3), (k0, k1, k2, k3) = used, estimate, confidence
+    return (
+        _toward(u0, low if e0 < low else high if e0 > high else e0, rate * k0 * dt_s),
+        _toward(u1, low if e1 < low else high if e1 > high else e1, rate * k1 * dt_s),
+        _toward(u2, low if e2 < low else high if e2 > high else e2, rate * k2 * dt_s),
+        _toward(u3, low if e3 < low else high if e3 > high else e3, rate * k3 * dt_s),
+    )
+
+
+def _toward(value: float, target: float, most: float) -> float:
+    change = target - value
+    return value + (most if change > most else -most if change < -most else change)
 
 
 def motor_factor(factor: float, friction: Four, nominal: float, p: CompensationParameters) -> float:
