@@ -44,7 +44,6 @@ class _Peer:
         self.addressed = 0  # frames sent or lost on the way to it
         self.heard = 0  # frames it sent or lost on the way to us
         self.takes = True  # False once it has closed: its last frames may still be to be read
-        self.untold = False  # frames to it were lost, and it got none since that would tell it
 
 
 class LoopbackBus:
@@ -67,6 +66,7 @@ class LoopbackBus:
         """Packets ignored because they were not ours."""
         self._sent_lost = 0
         self._sent_lost_to: set[int] = set()
+        self._untold: set[_Peer] = set()  # lost frames, and got none since that would tell them
         self._peers: dict[int, _Peer] = {}
         self._epoll = select.epoll()
         self._joiners = select.poll()
@@ -102,27 +102,28 @@ class LoopbackBus:
         peer.addressed += count
         try:
             peer.connection.send(packet, socket.MSG_NOSIGNAL)
-            peer.untold = False
+            self._untold.discard(peer)
         except (BrokenPipeError, ConnectionResetError):
             peer.takes = False
+            self._untold.discard(peer)
         except OSError:  # EAGAIN: its queue is full; ENOBUFS, ENOMEM: the machine's memory is
-            peer.untold = True
+            self._untold.add(peer)
             if count:
                 self._sent_lost += count
                 self._sent_lost_to.add(peer.pid)
 
     def _tell_losses(self) -> None:
         """Tell those who lost frames how many, as soon as they have room: nothing else may follow for long."""
-        for peer in list(self._peers.values()):
-            if peer.untold and peer.takes:
-                self._send_to(peer, 0, monotonic_ns(), b"")
+        for peer in list(self._untold):
+            self._send_to(peer, 0, monotonic_ns(), b"")
 
     def receive(self, timeout_s: float = 0.0) -> list[Received]:
         """Return everything there is: in order per member, by time of sending between members."""
         if self._epoll.closed:
             raise ValueError(f"{self.name} is closed")
         received: list[Received] = []
-        self._tell_losses()
+        if self._untold:
+            self._tell_losses()
         if self._sent_lost:
             received.append(self._not_taken())
             timeout_s = 0.0
@@ -232,6 +233,7 @@ class LoopbackBus:
     def _drop(self, file: int) -> None:
         peer = self._peers.pop(file, None)
         if peer is not None:
+            self._untold.discard(peer)
             with contextlib.suppress(OSError):
                 self._epoll.unregister(file)
             peer.connection.close()
