@@ -138,9 +138,9 @@ class Director:
         out: list[Message] = []
         if Channel.BLENDING in self._traces:
             out.append(StimulusEcu(self.value(Channel.BLENDING)))
-        if any(channel in self._traces for channel in _DRIVER):
+        if not self._traces.keys().isdisjoint(_DRIVER):
             out.append(StimulusDriver(*map(self.value, _DRIVER)))
-        if any(channel in self._traces for channel in _ROAD):
+        if not self._traces.keys().isdisjoint(_ROAD):
             out.append(StimulusRoad(*map(self.value, _ROAD)))
         if self.motion is not None and self._opening:
             self._opening -= 1
