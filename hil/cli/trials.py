@@ -24,6 +24,12 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--count", type=int, default=12, metavar="N", help="cases a family, single: a size (default: 12)"
     )
     add_seed(parser)
+    parser.add_argument(
+        "--own-error",
+        type=Path,
+        metavar="FILE",
+        help="instead: measure the model's own error on N null cases into FILE",
+    )
     parser.add_argument("--out", type=Path, default=Path("trials"), metavar="DIR", help="where cases and table go")
     add_json(parser)
     parser.set_defaults(run=run)
@@ -34,6 +40,12 @@ def run(args: argparse.Namespace) -> int:
     from hil.trials.run import run_family
     from hil.trials.score import table_of
 
+    if args.own_error is not None:
+        from hil.trials.own_error import as_toml, measure, ratios
+
+        gains = measure(args.count, args.seed, lambda text: print(text, file=sys.stderr))
+        args.own_error.write_text(as_toml(ratios(gains), args.count, args.seed), encoding="utf-8")
+        return 0
     families = FAMILIES if args.family is None else (args.family,)
     result = {}
     for family in families:

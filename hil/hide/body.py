@@ -191,7 +191,8 @@ def rates(
     )
     dx[S.load_ax_mps2] = (specific_x - x[S.load_ax_mps2]) / 0.02
     dx[S.load_ay_mps2] = (specific_y - x[S.load_ay_mps2]) / 0.04
-    felt = specific_x * cos(x[S.pitch_rad]) - GRAVITY_MPS2 * sin(x[S.pitch_rad])
+    held = GRAVITY_MPS2 * sin(atan2(grade, 1.0)) * (1.0 - moving)  # what keeps a standing car on the slope is felt
+    felt = (specific_x + held) * cos(x[S.pitch_rad]) - GRAVITY_MPS2 * sin(x[S.pitch_rad])
     arm = e[E.imu_position, 0]
     felt -= arm * yaw * yaw
     turned = specific_y + arm * dx[S.yaw_rate_rad_s]

@@ -17,7 +17,7 @@ PRESSURE_REFERENCE_PA, DROOP_PA = 3.0e6, 2.4e7
 BEDDING_J, DRYING_J = 1.0e6, 3.0e4
 HOT_SPOT_K, HOT_SPOTS = 523.15, 10.0
 STICK_RAD_S = 1.0
-LINE_STIFFNESS_M3_PA, ATMOSPHERE_PA = 1.0e-12, 1.0e5
+LINE_STIFFNESS_M3_PA, ATMOSPHERE_PA = 5.0e-13, 1.0e5
 
 
 @equation
@@ -25,20 +25,20 @@ def brake_pressure_rates(x: Vector, i: int, demand_pa: float, car: Car, e: Vecto
     """Rates of the pressure of one wheel: second order behind a rate limit; Lee et al., SAE 2015 (M), values per set.
 
     p'' = w^2 (p* - p) - 2 zeta w p'. Air in the line: dV/dp = s0 + V_air pa / (p + pa)^2, which divides the rate
-    (Limpert, Brake Design and Safety). ``fluid_temp``: viscosity stretches the lag; ``valve_leak``: p' = -k p beside.
+    (Limpert, Brake Design and Safety). ``fluid_temp``: viscosity stretches lag and flow, w/(1+e), rates/(1+e)^2;
+    ``ehb_deadband``: the loop answers what the error has beyond the band; ``valve_leak``: p' = -k p beside.
     """
     p = x[S.pressure_pa + i]
     w = 6.283185307 * car.ehb_frequency_hz * (1.0 + e[E.ehb_bandwidth, i]) / (1.0 + e[E.fluid_temp, i])
-    zeta = car.ehb_damping * (1.0 + 0.5 * e[E.fluid_temp, i])
-    limit = 1.0 + e[E.ehb_rate_limit, i]
+    zeta = car.ehb_damping
+    limit = (1.0 + e[E.ehb_rate_limit, i]) / (1.0 + e[E.fluid_temp, i]) ** 2
     build, release = car.ehb_build_rate_pa_s * limit, car.ehb_release_rate_pa_s * limit
     ceiling = car.ehb_max_pressure_pa
     target = min(max(demand_pa, 0.0), ceiling) * (
         1.0 - e[E.accumulator, i] * min(x[S.applied_pa_s + i] / DROOP_PA, 1.0)
     )
     error = target - p
-    if abs(error) < e[E.ehb_deadband, i]:
-        error = 0.0
+    error -= min(max(error, -e[E.ehb_deadband, i]), e[E.ehb_deadband, i])
     rate = min(max(x[S.pressure_rate_pa_s + i], -release), build)
     jerk = w * w * error - 2.0 * zeta * w * rate
     if (rate >= build and jerk > 0.0) or (rate <= -release and jerk < 0.0):

@@ -71,7 +71,7 @@ LISTED: tuple[Hideable, ...] = (
     Hideable("pitch_dive", "softness", "", 0.3, -0.4, 1.0),
     Hideable("sus_compliance", "compliance_m_n", "m/N", 5e-7, 0.0, 2e-6, AXLE),
     Hideable("steer_lateral", "offset_rad", "rad", 0.005, -0.01, 0.01),
-    Hideable("road_roughness", "height_m", "m", 0.001, 0.0, 0.004),
+    Hideable("road_roughness", "height_m", "m", 0.001, 0.0, 0.004, scales=False),
     Hideable("split_mu", "right", "", -0.5, -0.8, 0.2),
     Hideable("tyre_radius", "gain", "", -0.008, -0.05, 0.05, WHEEL),
     Hideable("tyre_pressure_loss", "share", "", 0.3, 0.0, 0.7, WHEEL),

@@ -50,7 +50,7 @@ def start_state(manoeuvre: Manoeuvre, car: Car) -> Vector:
         x[S.mu + i] = car.pad_a_1_ks / car.pad_b_1_j * disc / car.pad_epsilon_w
         x[S.pad_k + i] = disc
         x[S.disc_k + i] = disc
-        x[S.winding_k + i] = 323.15
+        x[S.winding_k + i] = car.ambient_k
         x[S.tyre_k + i] = 313.15
         x[S.pressure_pa + i] = manoeuvre.pressure_pa[0, i]
         x[S.line_pa + i] = manoeuvre.pressure_pa[0, i]

@@ -9,8 +9,9 @@ from hil.study.candidates import Candidate, Column, candidates, columns
 from hil.study.fit import Fitter, Model, Term, Tracks
 from hil.study.linear import Sums, project, track_columns
 from hil.study.noise import Frame, Noise
+from hil.study.own_error import variance_of
 from hil.study.prepare import Case
-from hil.study.screen import Score, inflation, leaders, not_testable, relevance, score, scores, threshold
+from hil.study.screen import Score, inflation, leaders, not_testable, score, scores, threshold
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
 from hil.study.world import Rig, World, start_nuisances
@@ -35,13 +36,22 @@ class Settings:
 
 @dataclass(frozen=True, eq=False)
 class Contender:
-    """A model that explains the data with one cause in a certain place: its term, cost and log of the odds."""
+    """A model that explains the data with one cause in a certain place: its term, cost and log of the odds.
+
+    ``gained`` is what it takes off chi-squared, shared out over the model's own error.
+    """
 
     term: Term
     model: Model
     cost: float
     evidence: float
     information: float
+    gained: float = 0.0
+
+
+def _odds(contender: Contender) -> float:
+    """Twice the negative log of the odds, the smaller the better."""
+    return contender.cost - 2.0 * contender.evidence
 
 
 @dataclass(eq=False)
@@ -137,6 +147,7 @@ class _Search:
     def _effect_columns(self, model: Model) -> Tracks:
         world = self.fitter.world(model.z, model.terms)
         base = model.stack
+        self.rig.keep(world)
         worlds = []
         for column in self.columns:
             theta = world.theta.copy()
@@ -161,28 +172,32 @@ class _Search:
             s for s in listed if (s.candidate.effect.name, s.candidate.parameter.name, s.candidate.place) not in used
         ]
         top = leaders(listed, LEADERS)
-        if not top or top[0].gain < 0.4 * found.least_gain:
+        if not top or max(item.gain for item in top) < 0.4 * found.least_gain:
             return None
         self.say(f"fitting {len(top)} leaders")
         fitted = [self._contender(model, item, noise) for item in top]
-        best = min(fitted, key=lambda c: c.cost - 2.0 * c.evidence)
+        best = min(fitted, key=_odds)
         # what the noise model had taken for noise: estimated again with the best leader in place
         tighter = self.fitter.estimated(best.model, noise, 80)
-        fitted = [self._again(c, tighter) for c in fitted]
-        reference = self.fitter.fit(model, tighter, 3).cost
-        loose = self.fitter.cost(model.residual, model.z, noise)
-        fitted.sort(key=lambda c: c.cost - 2.0 * c.evidence)
-        best = fitted[0]
-        gained = (min(reference, loose) - best.cost) * relevance(best.term.candidate, best.term.value)
-        screened = next(item.gain for item in top if item.candidate is best.term.candidate)
-        gained = min(gained, _OF_SCREEN * screened)  # more than that is the nuisances' or the noise's doing
-        if gained < found.least_gain:
-            self.say(f"{best.term.candidate.name} gains {gained:.1f}, {found.least_gain:.1f} is asked")
+        reference = min(self.fitter.fit(model, tighter, 3).cost, self.fitter.cost(model.residual, model.z, noise))
+        fitted = [self._gained(self._again(c, tighter), item, reference) for c, item in zip(fitted, top, strict=True)]
+        clear = sorted((c for c in fitted if c.gained >= found.least_gain), key=_odds)
+        if not clear:
+            most = max(fitted, key=lambda c: c.gained)
+            self.say(f"{most.term.candidate.name} gains {most.gained:.1f}, {found.least_gain:.1f} is asked")
             return None
+        best = clear[0]
         polished = self.fitter.fit(best.model, tighter, 4, self.settings.relinearise)
         polished, tighter = self.fitter.settle(polished, tighter, 2, 60)
-        fitted[0] = replace(best, model=polished, term=polished.terms[-1], cost=polished.cost)
-        return polished, tighter, fitted
+        rest = sorted((c for c in fitted if c is not best), key=_odds)
+        first = replace(best, model=polished, term=polished.terms[-1])
+        return polished, tighter, [first, *rest]
+
+    @staticmethod
+    def _gained(contender: Contender, item: Score, reference: float) -> Contender:
+        """With its gain, shared out over the model's own error; more than the screen saw is the noise's doing."""
+        gained = min(reference - contender.cost, _OF_SCREEN * item.raw) / variance_of(item.candidate)
+        return replace(contender, gained=gained)
 
     def _contender(self, model: Model, item: Score, noise: Noise) -> Contender:
         term = Term(item.candidate, item.value)
@@ -212,7 +227,7 @@ class _Search:
         for k in reversed(range(len(model.terms))):
             rest = tuple(term for j, term in enumerate(model.terms) if j != k)
             without = self.fitter.fit(self.fitter.at(model.z, rest, found.noise), found.noise, 2)
-            if without.cost - model.cost < found.least_gain:
+            if without.cost - model.cost < found.least_gain * variance_of(model.terms[k].candidate):
                 self.say(f"{model.terms[k].candidate.name} is not needed any more")
                 model = without
                 del found.contenders[k]

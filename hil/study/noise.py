@@ -15,7 +15,10 @@ _REFERENCE_MPS = 20.0
 MODES = np.array([[0.25, 0.25, 0.25, 0.25], [0.25, 0.25, -0.25, -0.25], [0.5, -0.5, 0.0, 0.0], [0.0, 0.0, 0.5, -0.5]])
 MODE_NAMES = ("mean", "front-rear", "left-right front", "left-right rear")
 _FLOOR = {"wheel": 5e-4, "ax": 2e-3, "gps": 2e-3, "ay": 2e-3, "yaw": 2e-4, "pressure": 500.0, "motor": 0.05}
-_LONGEST_S = 1.0  # what is slower is no noise but wants a cause
+_LONGEST_S = 2.0  # what is slower is no noise but wants a cause
+_USUAL = np.array([0.05, 0.03, 0.03, 0.005, 1.0, 3.0, 2.0, 1.0])
+_SPREAD = np.array([1.5, 1.5, 1.5, 1.5, 0.7, 0.7, 0.7, 0.7])
+"""Disturbances that roads, drivers and sensors usually make (sizes, then times), and the spread of their logarithms."""
 _PRIOR_SAMPLES, _SCALES = 60.0, (0.4, 8.0)
 _LONG = ("wheel.mean", "ax", "gps")
 
@@ -32,7 +35,10 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Noise of all tracks; ``disturbances`` are force, slope and accelerometer (standard deviation m/s2, tau s).
+    """Noise of all tracks.
+
+    ``disturbances``: force, slope, accelerometer (standard deviation m/s2, tau s) and what all wheels tell wrong
+    (m/s at 20 m/s, tau s).
 
     ``scales``: by how much a manoeuvre is noisier than the others (one number each), per track; the moving car's
     tracks share those of "long". Where the car is driven hard the model's own error is larger too.
@@ -172,7 +178,8 @@ def _long(tracks: Mapping[str, Floats], frame: Frame, noise: Noise, columns: int
     on = 1.0 if noise.enabled else 0.0
     colours = np.array([(_factor(tau, frame.sample_s), on * size**2 + 1e-12) for size, tau in noise.disturbances])
     out = np.empty_like(y)
-    value = moving(y, frame.fresh, frame.restart, white, frame.sample_s, colours, out)
+    share = frame.speed_mps / _REFERENCE_MPS
+    value = moving(y, frame.fresh, frame.restart, white, share, frame.sample_s, colours, out)
     return likelihood + float(value), {name: out[:, m] for m, name in enumerate(_LONG) if name in tracks}
 
 
@@ -200,7 +207,7 @@ def first_guess(tracks: Mapping[str, Floats], frame: Frame, enabled: bool = True
     for name, values in tracks.items():
         a = max(_differences(values[:, 0], frame.present[name]), _FLOOR[name.split(".")[0]])
         found[name] = Track(a, 1e-6, 3.0 * a, 0.5)
-    return Noise(found, ((0.05, 1.0), (0.03, 3.0), (0.03, 0.3)), enabled)
+    return Noise(found, tuple(zip(_USUAL[:4].tolist(), _USUAL[4:].tolist(), strict=True)), enabled)
 
 
 def _differences(values: Floats, known: Floats) -> float:
@@ -251,21 +258,18 @@ def _estimate_long(tracks: Mapping[str, Floats], frame: Frame, noise: Noise, bud
         sizes = np.exp(z)
         changed = dict(noise.tracks)
         for k, name in enumerate(there):
-            a = max(float(sizes[6 + k]), _FLOOR[name.split(".")[0]])
+            a = max(float(sizes[8 + k]), _FLOOR[name.split(".")[0]])
             b = noise.tracks["wheel.front-rear"].b if name == "wheel.mean" and "wheel.front-rear" in changed else 0.0
             changed[name] = Track(a, b, 0.0, 1.0)
-        taus = np.clip(sizes[3:6], 0.02, 30.0)
-        pairs = tuple((float(s), float(t)) for s, t in zip(sizes[:3], taus, strict=True))
+        taus = np.clip(sizes[4:8], 0.02, 30.0)
+        pairs = tuple((float(s), float(t)) for s, t in zip(sizes[:4], taus, strict=True))
         return replace(noise, tracks=changed, disturbances=pairs)
 
     def cost(z: Floats) -> float:
         # weak knowledge of sizes and times keeps what the data do not show where roads and cars have it
-        usual = np.log([0.05, 0.03, 0.03, 1.0, 3.0, 0.3])
-        return -_long(tracks, frame, built(z), 1)[0] + 0.5 * float(np.sum(((z[:6] - usual) / 1.5) ** 2))
+        return -_long(tracks, frame, built(z), 1)[0] + 0.5 * float(np.sum(((z[:8] - np.log(_USUAL)) / _SPREAD) ** 2))
 
     sizes, taus = zip(*noise.disturbances, strict=True)
     z0 = np.log([*sizes, *taus, *(noise.tracks[name].a for name in there)])
-    best = minimize(
-        cost, z0, method="Nelder-Mead", options={"maxfev": budget, "xatol": 0.02, "fatol": 0.05, "adaptive": True}
-    )
+    best = minimize(cost, z0, method="L-BFGS-B", options={"maxfun": budget, "eps": 1e-3, "ftol": 1e-8})
     return built(best.x)

@@ -220,6 +220,7 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float) -> Dri
     after = max(int(SETTLE_S / (stride * ROW_S)), 1)
     near_stop = np.convolve(slow < SLOW_MPS, np.ones(2 * after + 1), mode="same") > 0.5
     resting = np.convolve(slow > 0.02, np.ones(2 * after + 1), mode="same") < 0.5
+    resting[: 2 * after] = False  # the simulated body first sinks into its springs
     return Drive(
         log,
         inputs,

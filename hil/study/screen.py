@@ -8,21 +8,18 @@ from scipy.stats import chi2
 
 from hil.study.candidates import Candidate
 from hil.study.linear import Projected
+from hil.study.own_error import variance_of
 
 _USUAL = 1.5
 SEEN = 3.0
 _MEDIAN_CHI2 = 0.455
-INDIFFERENT = 0.08
-"""Share of an effect's usual size that no model of a car is better than: less is not called a cause."""
-_ANYWAY = {"clock_drift": 0.5}
-"""The same where healthy parts differ by more: clocks of nodes."""
-_LEAST_INFLATION = 2.0
+_MOST_INFLATION = 6.0
 
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """One candidate: estimate by one linear step, gain in chi2, log of the Bayes factor against leaving it out,
-    ``raw`` is the gain before what is too small to matter is taken off;
+    """One candidate: estimate by one linear step, gain in chi2, log of the Bayes factor against leaving it out;
+    ``raw`` is the gain before it is shared out over the model's own error (`hil.study.own_error`);
     how many standard deviations its largest allowed value would make (``reach``) and its usual one (``usual``)."""
 
     candidate: Candidate
@@ -57,16 +54,10 @@ def score(candidate: Candidate, b: float, q: float, now: float = 0.0) -> Score:
     step = float(np.clip(now + step, parameter.low, parameter.high)) - now
     gain = 2.0 * b * step - q * step * step
     raw = gain
-    gain *= relevance(candidate, now + step)
-    evidence = 0.5 * (gain - (step / tau) ** 2) - 0.5 * float(np.log1p(q * tau * tau)) - float(np.log(candidate.places))
+    gain /= variance_of(candidate)
+    evidence = 0.5 * (raw - (step / tau) ** 2) - 0.5 * float(np.log1p(q * tau * tau)) - float(np.log(candidate.places))
     reach, usual = largest * float(np.sqrt(q)), tau / _USUAL * float(np.sqrt(q))
     return Score(candidate, now + step, gain, evidence, reach, usual, q, raw)
-
-
-def relevance(candidate: Candidate, value: float) -> float:
-    """Share of a gain that counts: that of the value beyond what no model is better than."""
-    least = _ANYWAY.get(candidate.effect.name, INDIFFERENT) * abs(candidate.parameter.typical)
-    return max(1.0 - least / max(abs(value), 1e-300), 0.0) ** 2
 
 
 def threshold(looks: int, alpha: float) -> float:
@@ -75,26 +66,28 @@ def threshold(looks: int, alpha: float) -> float:
 
 
 def inflation(found: Sequence[Score]) -> float:
-    """How much more candidates explain than noise alone would let them: median gain over that of chi-squared.
+    """How much more candidates explain here than noise and the model's usual error let them, at least 1.
 
-    Most candidates are absent; what half of them seem to explain measures the model's own error (genomic control,
-    Devlin and Roeder 1999).
+    Most candidates are absent; what half of them seem to explain measures how wrong the model is for these logs (median
+    gain over that of chi-squared: genomic control, Devlin and Roeder 1999).
     """
-    shown = [item.raw for item in found if item.reach > SEEN]
-    return float(np.clip(np.median(shown) / _MEDIAN_CHI2, _LEAST_INFLATION, 6.0)) if shown else _LEAST_INFLATION
+    shown = [item.gain for item in found if item.reach > SEEN]
+    return float(np.clip(np.median(shown) / _MEDIAN_CHI2, 1.0, _MOST_INFLATION)) if shown else 1.0
 
 
 def leaders(found: Sequence[Score], count: int) -> list[Score]:
-    """Best candidates: the best place of each effect's number first, then places that explain nearly as much."""
+    """Best candidates, the best place of each effect's number: by evidence, and by what the model's error leaves of it.
+
+    Then places of the very best that explain nearly as much.
+    """
     ranked = sorted(found, key=lambda s: -s.evidence)
-    best: list[Score] = []
-    seen: set[tuple[str, str]] = set()
+    best: dict[tuple[str, str], Score] = {}
     for item in ranked:
-        key = (item.candidate.effect.name, item.candidate.parameter.name)
-        if key not in seen and item.gain > 4.0:
-            seen.add(key)
-            best.append(item)
-    top = best[:count]
+        if item.raw > 4.0:
+            best.setdefault((item.candidate.effect.name, item.candidate.parameter.name), item)
+    by_evidence = list(best.values())
+    by_gain = sorted(by_evidence, key=lambda s: -s.gain)
+    top = list(dict.fromkeys([*by_evidence[:count], *by_gain[: max(count // 2, 1)]]))
     if top:
         near = [s for s in ranked if s.evidence > top[0].evidence - 6.0 and s not in top]
         top += near[: max(count // 2, 1)]

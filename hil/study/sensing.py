@@ -5,12 +5,25 @@ from collections.abc import Mapping
 import numpy as np
 
 from hil.study.table import Floats
+from plant.effects.effect import NODES
+from plant.effects.sensing.catalogue import SENSING
 from plant.effects.sensing.chain import Chain
+from plant.effects.theta import THETA
 from plant.vectors import INPUT
 
 Stack = Mapping[str, Floats]
 _IMU = ("ax", "ay", "yaw")
 _INPUT = {"pressure": "pressure_pa", "motor": "motor_torque_nm"}
+WATCHING = np.concatenate(
+    [
+        np.arange(THETA.size)[THETA.slice(effect.name, parameter.name)]
+        for effect in SENSING
+        if not set(effect.nodes) & set(_INPUT)
+        for parameter in effect.parameters
+    ]
+)
+"""Places in theta of sensing effects that leave the replay's inputs alone."""
+_WHEEL_SCALE = THETA.slice("wrong_scale", "factor").start + NODES.index("wheel")
 
 
 def inverted(inputs: Floats, theta: Floats, row_s: float) -> Floats:
@@ -43,3 +56,8 @@ def sensed(stack: Stack, theta: Floats, row_s: float) -> dict[str, Floats]:
         body = chain.sense("imu", time_s, np.hstack([found.get(name, rest) for name in _IMU]))
         found |= {name: body[:, k : k + 1] for k, name in enumerate(_IMU) if name in found}
     return found
+
+
+def wheel_speed_before(told_rad_s: float, theta: Floats) -> float:
+    """Middle wheel speed before a wrong scale of the wheel node; other wheel effects move no start."""
+    return told_rad_s / (1.0 + float(theta[_WHEEL_SCALE]))

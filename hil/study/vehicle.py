@@ -24,7 +24,7 @@ _CONSTANT_B_1_J = 2e-6
 _BRAKE_K = 423.15
 _STATED = 0.01
 _FORM = {
-    "motor_time_constant_s": 0.3, "ehb_dead_time_s": 0.15, "wheel_inertia_kg_m2": 0.1, "vehicle_cog_height_m": 0.15,
+    "motor_time_constant_s": 0.3, "ehb_dead_time_s": 0.3, "wheel_inertia_kg_m2": 0.1, "vehicle_cog_height_m": 0.15,
     "vehicle_yaw_inertia_kg_m2": 0.1, "vehicle_steering_ratio": 0.05,
 }  # fmt: skip
 _SUSPENSION = {

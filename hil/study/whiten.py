@@ -43,42 +43,42 @@ def _coloured(y: Floats, fresh: Floats, white: Floats, phi: float, colour: float
 
 
 def _moving(
-    y: Floats, fresh: Floats, restart: Floats, white: Floats, step_s: float, colours: Floats, out: Floats
+    y: Floats, fresh: Floats, restart: Floats, white: Floats, share: Floats, step_s: float, colours: Floats, out: Floats
 ) -> float:
-    # states: error of the speed, force disturbance, slope disturbance, disturbance of the accelerometer alone
+    # states: error of the speed, force disturbance, slope disturbance, disturbance of the accelerometer, of the wheels
     columns = y.shape[2]
-    x = np.zeros((4, columns))
-    cov = np.zeros((4, 4))
-    h = np.zeros(4)
+    x = np.zeros((5, columns))
+    cov = np.zeros((5, 5))
+    h = np.zeros(5)
     likelihood = 0.0
-    move = np.zeros((4, 4))
+    move = np.zeros((5, 5))
     for t in range(y.shape[0]):
         if fresh[t] > 0.5:
             x[:] = 0.0
             cov[:] = 0.0
-            for i in range(3):
+            for i in range(4):
                 cov[1 + i, 1 + i] = colours[i, 1]
             cov[0, 0] = _UNKNOWN
         else:
             for k in range(columns):
                 x[0, k] += step_s * (x[1, k] + x[2, k])
-                for i in range(3):
+                for i in range(4):
                     x[1 + i, k] *= colours[i, 0]
-            for i in range(4):
-                for j in range(4):
+            for i in range(5):
+                for j in range(5):
                     move[i, j] = cov[i, j]
-            for j in range(4):
+            for j in range(5):
                 move[0, j] += step_s * (cov[1, j] + cov[2, j])
-                for i in range(3):
+                for i in range(4):
                     move[1 + i, j] *= colours[i, 0]
-            for i in range(4):
+            for i in range(5):
                 cov[i, 0] = move[i, 0] + step_s * (move[i, 1] + move[i, 2])
-                for j in range(3):
+                for j in range(4):
                     cov[i, 1 + j] = move[i, 1 + j] * colours[j, 0]
-            for i in range(3):
+            for i in range(4):
                 cov[1 + i, 1 + i] += (1.0 - colours[i, 0] ** 2) * colours[i, 1]
             if restart[t] > 0.5:
-                for i in range(4):
+                for i in range(5):
                     cov[0, i] = 0.0
                     cov[i, 0] = 0.0
                 cov[0, 0] = _UNKNOWN
@@ -89,18 +89,20 @@ def _moving(
                 for k in range(columns):
                     out[t, m, k] = 0.0
                 continue
-            for i in range(4):  # speed, acceleration, ground speed
-                h[i] = (cov[i, 1] + cov[i, 3]) if m == 1 else cov[i, 0]
-            total = white[t, m] + ((h[1] + h[3]) if m == 1 else h[0])
+            # what is seen: wheels (speed and their own share), acceleration, ground speed
+            first, second = (1, 3) if m == 1 else (0, 4)
+            weight = 1.0 if m == 1 else (share[t] if m == 0 else 0.0)
+            for i in range(5):
+                h[i] = cov[i, first] + weight * cov[i, second]
+            total = white[t, m] + h[first] + weight * h[second]
             scale = 1.0 / np.sqrt(total)
             for k in range(columns):
-                expected = (x[1, k] + x[3, k]) if m == 1 else x[0, k]
-                innovation = y[t, m, k] - expected
-                for i in range(4):
+                innovation = y[t, m, k] - x[first, k] - weight * x[second, k]
+                for i in range(5):
                     x[i, k] += h[i] / total * innovation
                 out[t, m, k] = innovation * scale
-            for i in range(4):
-                for j in range(4):
+            for i in range(5):
+                for j in range(5):
                     cov[i, j] -= h[i] * h[j] / total
             likelihood -= 0.5 * (out[t, m, 0] ** 2 + np.log(total))
     return likelihood
@@ -112,5 +114,5 @@ the first column. ``white`` is the variance of each sample, 0 where nothing is c
 moving = _compile(_moving)
 """The moving car: (samples, 3 tracks, columns) of speed, acceleration, ground speed.
 
-``colours`` holds rows (factor from sample to sample, variance) of force, slope and accelerometer disturbance;
-``restart`` forgets the speed's error."""
+``colours`` holds rows (factor from sample to sample, variance) of force, slope, accelerometer and wheel disturbance,
+the last one weighted by ``share`` (samples,); ``restart`` forgets the speed's error."""

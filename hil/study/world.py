@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.signal import savgol_filter
 
-from hil.study.prepare import ROW_S, Case, Drive, averaged
-from hil.study.sensing import inverted, sensed
+from hil.study.prepare import ROW_S, SLOW_MPS, Case, Drive, Segment, averaged
+from hil.study.sensing import WATCHING, inverted, sensed, wheel_speed_before
 from hil.study.table import Floats
 from hil.study.vehicle import Nuisance, Vehicle, rest_friction
 from plant.effects.bank import NO_TERMS
@@ -19,8 +19,10 @@ from plant.model import column_indices, healthy, initial_state, simulate
 from plant.road import DRY, road_table
 from plant.vectors import INPUT, OUTPUT, STATE, P, X
 
-STEPS = 4
+STEPS, FINE_STEPS = 4, 8
 WORKERS = 2
+_STIFF = (("sus_compliance", "compliance_m_n"),)
+"""What swings so fast that it wants finer steps."""
 DISC_K = 350.0
 _SUFFIX = ("fl", "fr", "rl", "rr")
 _SOURCE = {
@@ -38,37 +40,44 @@ Stack = dict[str, Floats]
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """One car: flat parameters, theta, basis terms (rows as in `plant.effects.bank`), discs at the start, latencies."""
+    """One car: flat parameters, theta, basis terms (rows as in `plant.effects.bank`), discs at the start, latencies.
+
+    ``tooth_share`` multiplies the lag of a toothed wheel, half the time between two teeth: the speed is told when a
+    tooth has passed.
+    """
 
     p: Floats
     theta: Floats
     terms: Floats = field(default_factory=NO_TERMS.copy)
     disc_offset_k: float = 0.0
-    late_s: tuple[float, ...] = (0.0, 0.0, 0.0)
+    late_s: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    tooth_share: float = 1.0
 
     def shifted(self, nuisances: Sequence[Nuisance], z: Floats) -> "World":
         """With nuisances ``z`` standard deviations off."""
-        p, disc, late = self.p.copy(), self.disc_offset_k, list(self.late_s)
+        p, disc, late, tooth = self.p.copy(), self.disc_offset_k, list(self.late_s), self.tooth_share
         for nuisance, amount in zip(nuisances, z, strict=True):
             for at, step in zip(nuisance.at, nuisance.step, strict=True):
                 if nuisance.kind == "disc":
                     disc += amount * step
                 elif nuisance.kind == "late":
                     late[at] += amount * step
+                elif nuisance.kind == "tooth":
+                    tooth += amount * step
                 else:
                     p[at] = _within(p[at], p[at] + amount * step)
-        return replace(self, p=p, disc_offset_k=disc, late_s=tuple(late))
+        return replace(self, p=p, disc_offset_k=disc, late_s=tuple(late), tooth_share=tooth)
 
 
-LATE = ("imu", "pressure", "motor")
-"""Nodes whose frames may come later than the wheel speeds'."""
+LATE = ("imu", "pressure", "motor", "demand")
+"""Nodes whose frames may come later than the wheel speeds'; demands may be acted on later than they are logged."""
 _NODE = {"ax": 0, "ay": 0, "yaw": 0, "pressure": 1, "motor": 2}
 
 
 def start_nuisances() -> list[Nuisance]:
     """What the logs, not the vehicle, leave open: temperature of the discs, latency of the nodes."""
     found = [Nuisance(f"late_{node}", (k,), (2e-3,), "late") for k, node in enumerate(LATE)]
-    return [Nuisance("disc_temperature_k", (0,), (15.0,), "disc"), *found]
+    return [Nuisance("disc_temperature_k", (0,), (15.0,), "disc"), Nuisance("tooth_lag", (0,), (0.5,), "tooth"), *found]
 
 
 def _within(now: float, wanted: float) -> float:
@@ -82,7 +91,7 @@ def nominal(vehicle: Vehicle) -> World:
 
 
 _INPUTS = (("pressure", "pressure_pa"), ("motor", "motor_torque_nm"))
-_SMOOTH = 13  # rows of 10 ms
+_SMOOTH = 21  # rows of 10 ms
 _OF_THE_ROAD = (("road_grade", "grade"), ("headwind", "wind_mps"))
 
 
@@ -96,32 +105,89 @@ def _along(theta: Floats, direction: int) -> Floats:
     return turned
 
 
-def _later(values: Floats, rows: float) -> Floats:
-    """Channels as seen a fraction of a row later."""
-    slope = np.gradient(values, axis=0)
-    return np.asarray(values - rows * slope)
+def _later(values: Floats, rows: float | Floats) -> Floats:
+    """Channels as seen some rows later, straight lines between rows."""
+    last = len(values) - 1
+    at = np.clip(np.arange(len(values))[:, None] - rows, 0.0, last) + np.zeros(values.shape)
+    before = at.astype(np.intp)
+    share = at - before
+    column = np.arange(values.shape[1])
+    return np.asarray((1.0 - share) * values[before, column] + share * values[np.minimum(before + 1, last), column])
 
 
-def _earlier(inputs: Floats, late_s: tuple[float, ...]) -> Floats:
-    """Measured inputs with their nodes' latency taken back."""
-    if late_s[1] == 0.0 and late_s[2] == 0.0:
+def _held_later(values: Floats, rows: float) -> Floats:
+    """Held values that change a fraction of a row later (earlier where negative), as the mean over each row."""
+    change = np.diff(values, axis=0)
+    moved = values.copy()
+    if rows >= 0.0:
+        moved[1:] -= min(rows, 1.0) * change
+    else:
+        moved[:-1] += min(-rows, 1.0) * change
+    return moved
+
+
+def _in_time(inputs: Floats, late_s: tuple[float, ...]) -> Floats:
+    """Measured inputs with their nodes' latency taken back, demands when they are acted on."""
+    if not any(late_s[1:]):
         return inputs
     moved = inputs.copy()
+    for part in ("pressure_demand_pa", "motor_demand_nm"):
+        where = INPUT.slice(part)
+        moved[:, where] = _held_later(inputs[:, where], late_s[3] / ROW_S)
     for part, late in (("pressure_pa", late_s[1]), ("motor_torque_nm", late_s[2])):
         where = INPUT.slice(part)
         moved[:, where] = _later(inputs[:, where], -late / ROW_S)
     return moved
 
 
-class Rig:
-    """Replays worlds over the drives of a case."""
+_SHORT, _SETTLED_ROWS = 0.97, 6
+_LEAST_MPS, _STEEPEST_NMS_RAD = 0.2, 150.0
+_USUAL_RADIUS_M = 0.3
+_TOOTH_ROWS = 2.0
 
-    def __init__(self, case: Case, vehicle: Vehicle) -> None:
-        self.case, self.vehicle = case, vehicle
+
+def speed_slope(torque_nm: Floats, demand_nm: Floats, omega_rad_s: Floats, world: World) -> Floats:
+    """How the torque of motors that give less than demanded answers their speed, N m s/rad, (rows, 4).
+
+    Regeneration that fades at low speed has T / (v - v0) per m/s, constant power (of motor or battery) -T / omega.
+    """
+    before = np.vstack((np.repeat(demand_nm[:1], _SETTLED_ROWS, axis=0), demand_nm[:-_SETTLED_ROWS]))
+    short = np.abs(torque_nm) < _SHORT * np.minimum(np.abs(demand_nm), np.abs(before))
+    radius = float(world.p[P.wheel_rolling_radius_m])
+    speed = omega_rad_s * radius
+    fades = short & (speed < world.p[P.motor_fade_start_mps]) & (torque_nm < 0.0)
+    over = np.maximum(speed - float(world.p[P.motor_fade_end_mps]), _LEAST_MPS)
+    power = np.where(short, -torque_nm / np.maximum(omega_rad_s, 1.0), 0.0)
+    return np.asarray(np.where(fades, torque_nm / over * radius, power))
+
+
+def _moves_alike(one: World, other: World) -> bool:
+    """Whether two worlds differ in sensors that only watch, if at all."""
+    apart = np.flatnonzero(one.theta != other.theta)
+    return (
+        (one.p is other.p or np.array_equal(one.p, other.p))
+        and np.array_equal(one.terms, other.terms)
+        and one.disc_offset_k == other.disc_offset_k
+        and one.late_s[1:] == other.late_s[1:]
+        and bool(np.isin(apart, WATCHING).all())
+    )
+
+
+class Rig:
+    """Replays worlds over the drives of a case.
+
+    Simulated motor torque and turning are those at the measured wheel speed: a motor at its limits and a car in a bend
+    answer every error of the speed, whatever made it. ``slopes``, (samples, 4) a drive, say how motors do
+    (`speed_slope`).
+    """
+
+    def __init__(self, case: Case, vehicle: Vehicle, slopes: Sequence[Floats] | None = None) -> None:
+        self.case, self.vehicle, self._slopes = case, vehicle, slopes
         self._groups = case.groups
         names = [name for group in case.groups for name in _SOURCE[group]]
         self._columns = column_indices(names)
         self._road = road_table(DRY)
+        self._kept: tuple[World, list[Stack]] | None = None
         self.runs = 0
 
     def quieted(self, world: World) -> "Rig":
@@ -130,7 +196,7 @@ class Rig:
         What drives the car is the simulated value plus the smoothed difference of the measured one: steps stay sharp.
         """
         wanted = [(group, part) for group, part in _INPUTS if group in self._groups]
-        drives = []
+        drives, slopes = [], []
         for drive in self.case.drives:
             raw = self._raw(drive, world)
             inputs = drive.inputs.copy()
@@ -139,14 +205,24 @@ class Rig:
                 apart = drive.inputs[:, where] - raw[group]
                 window = min(_SMOOTH, (len(apart) - 1) // 2 * 2 + 1)
                 inputs[:, where] = raw[group] + savgol_filter(apart, window, 2, axis=0)
-            drives.append(replace(drive, inputs=inputs))
-        return Rig(replace(self.case, drives=tuple(drives)), self.vehicle)
+            measured = drive.measured
+            if "motor" in measured and "wheel" in measured:
+                demand = drive.inputs[:, INPUT.slice("motor_demand_nm")]
+                slope = averaged(speed_slope(raw["motor"], demand, raw["wheel"], world), drive.stride)
+                measured = {**measured, "motor": np.where(np.abs(slope) > _STEEPEST_NMS_RAD, np.nan, measured["motor"])}
+                slopes.append(np.clip(slope, -_STEEPEST_NMS_RAD, _STEEPEST_NMS_RAD))
+            drives.append(replace(drive, inputs=inputs, measured=measured))
+        return Rig(replace(self.case, drives=tuple(drives)), self.vehicle, slopes or None)
 
     def run(self, world: World) -> Stack:
         """Simulated channels of all drives."""
         self.runs += 1
-        parts = [self._drive(drive, world) for drive in self.case.drives]
+        parts = [self._drive(k, drive, world) for k, drive in enumerate(self.case.drives)]
         return {group: np.concatenate([part[group] for part in parts]) for group in self._groups}
+
+    def keep(self, world: World) -> None:
+        """Keep the motion of this world: one that differs in its sensors alone is not simulated again."""
+        self._kept = world, [self._raw(drive, world) for drive in self.case.drives]
 
     def run_all(self, worlds: Sequence[World]) -> Iterator[Stack]:
         """Of many worlds, in order, over threads."""
@@ -172,38 +248,64 @@ class Rig:
             ambient = float(world.p[P.friction_brake_ambient_k])
             x[STATE.slice("pad_temperature_k")] = ambient
             x[STATE.slice("pad_friction")] = rest_friction(self.vehicle.parameters, ambient)
-        speed = self._speed(first.start_wheel_rad_s, first.start_speed_mps, world)
+        speed = self._speed(drive, first, world)
         x[X.speed_mps] = speed
         x[STATE.slice("wheel_speed_rad_s")] = speed / world.p[P.wheel_rolling_radius_m]
         x[STATE.slice("pressure_pa")] = np.clip(drive.inputs[0, INPUT.slice("pressure_pa")], 0.0, None)
         x[STATE.slice("motor_torque_nm")] = drive.inputs[0, INPUT.slice("motor_torque_nm")]
         return x
 
-    def _speed(self, wheel_rad_s: float, ground_mps: float | None, world: World) -> float:
-        if ground_mps is not None:
-            return max(ground_mps, 0.0)
-        return max(wheel_rad_s, 0.0) * float(world.p[P.wheel_rolling_radius_m])
+    def _speed(self, drive: Drive, segment: Segment, world: World) -> float:
+        """Speed a segment starts with: what the sensors told, less what the world's sensors add."""
+        if segment.start_speed_mps is not None:
+            return max(segment.start_speed_mps, 0.0)
+        told = wheel_speed_before(segment.start_wheel_rad_s, _along(world.theta, drive.log.direction))
+        return max(told, 0.0) * float(world.p[P.wheel_rolling_radius_m])
 
-    def _drive(self, drive: Drive, world: World) -> Stack:
-        stack = sensed(self._raw(drive, world), _along(world.theta, drive.log.direction), ROW_S)
+    def _drive(self, number: int, drive: Drive, world: World) -> Stack:
+        kept = self._kept is not None and _moves_alike(world, self._kept[0])
+        raw = self._kept[1][number] if self._kept is not None and kept else self._raw(drive, world)
+        stack = sensed(raw, _along(world.theta, drive.log.direction), ROW_S)
         for group, values in stack.items():
             late = world.late_s[_NODE[group]] if group in _NODE else 0.0
             if late:
                 stack[group] = _later(values, late / ROW_S)
-        return {group: averaged(values, drive.stride) for group, values in stack.items()}
+            elif group == "wheel" and world.tooth_share:
+                stack[group] = _later(values, self._tooth_rows(values) * world.tooth_share)
+        found = {group: averaged(values, drive.stride) for group, values in stack.items()}
+        if "wheel" in found:
+            self._at_measured_speed(found, drive, None if self._slopes is None else self._slopes[number])
+        return found
+
+    def _tooth_rows(self, omega_rad_s: Floats) -> Floats:
+        """Half the time between two teeth, rows; two rows at most."""
+        pitch = 2.0 * np.pi / self.vehicle.parameters.sensor.teeth
+        return np.minimum(0.5 * pitch / np.maximum(np.abs(omega_rad_s), 0.1) / ROW_S, _TOOTH_ROWS)
+
+    def _at_measured_speed(self, found: Stack, drive: Drive, slope: Floats | None) -> None:
+        """What answers the speed, as it is at the measured speed: limited motors, a_y as v^2, yaw rate as v."""
+        faster = np.nan_to_num(drive.measured["wheel"] - found["wheel"])
+        if slope is not None:
+            found["motor"] += slope * faster
+        share = faster.mean(axis=1) / np.maximum(found["wheel"].mean(axis=1), SLOW_MPS / _USUAL_RADIUS_M)
+        share = np.clip(share, -0.2, 0.2)[:, None]
+        for group, power in (("ay", 2.0), ("yaw", 1.0)):
+            if group in found:
+                found[group] *= 1.0 + power * share
 
     def _raw(self, drive: Drive, world: World) -> Stack:
         x = self._start(drive, world)
         theta = _along(world.theta, drive.log.direction)
         inputs = inverted(drive.inputs, theta, ROW_S)
-        inputs = _earlier(inputs, world.late_s)
+        inputs = _in_time(inputs, world.late_s)
         table = np.empty((len(inputs), len(self._columns)))
         cut, switch, y = self.case.cut, healthy(), OUTPUT.zeros()
+        steps = FINE_STEPS if any(theta[THETA.slice(*stiff)].any() for stiff in _STIFF) else STEPS
         for number, segment in enumerate(drive.segments):
             if number:
-                self._restart(x, self._speed(segment.start_wheel_rad_s, segment.start_speed_mps, world))
+                self._restart(x, self._speed(drive, segment, world))
             simulate(
-                x, inputs[segment.first : segment.last], cut, switch, world.p, self._road, ROW_S / STEPS, STEPS,
+                x, inputs[segment.first : segment.last], cut, switch, world.p, self._road, ROW_S / steps, steps,
                 SEMI_IMPLICIT, self._columns, table[segment.first : segment.last], y, theta, world.terms, NO_PLUGINS,
             )  # fmt: skip
         stack: Stack = {}

@@ -1,11 +1,15 @@
 """The race: estimates, bounds and thresholds of the linear screen."""
 
+import tomllib
+from importlib import resources
+
 import numpy as np
 import pytest
 
 from hil.study.candidates import candidates, columns
 from hil.study.linear import project, solve
-from hil.study.screen import inflation, score, threshold
+from hil.study.own_error import variance_of
+from hil.study.screen import inflation, leaders, score, threshold
 
 CANDIDATES = {c.name: c for c in candidates(columns())}
 
@@ -15,7 +19,7 @@ def test_a_score_finds_the_value_that_made_the_residual() -> None:
     q, true = 1.0, 120.0
     found = score(candidate, q * true, q)
     assert found.value == pytest.approx(true, rel=1e-3)
-    assert found.gain == pytest.approx(q * true**2, rel=0.3)
+    assert found.raw == pytest.approx(q * true**2, rel=1e-3)
 
 
 def test_a_value_of_the_forbidden_sign_explains_nothing() -> None:
@@ -36,9 +40,32 @@ def test_more_looks_ask_for_more() -> None:
 def test_the_models_own_error_raises_what_is_asked() -> None:
     quiet = [score(c, 0.3, 1e4) for c in CANDIDATES.values()]
     loud = [score(c, 0.05 * c.parameter.typical * 1e6, 1e6) for c in CANDIDATES.values()]
-    assert inflation(quiet) == 2.0
-    assert inflation([]) == 2.0
-    assert inflation(loud) >= 2.0
+    assert inflation(quiet) == 1.0
+    assert inflation([]) == 1.0
+    assert inflation(loud) > 1.0
+
+
+def test_a_gain_is_shared_out_over_the_models_own_error() -> None:
+    candidate = CANDIDATES["tyre_relaxation@car"]
+    found = score(candidate, 0.1 * 1e4, 1e4)
+    assert variance_of(candidate) > 1.0
+    assert found.gain == pytest.approx(found.raw / variance_of(candidate))
+
+
+def test_every_entry_of_the_models_own_error_is_a_candidates_number() -> None:
+    numbers = {(c.effect.name, c.parameter.name) for c in CANDIDATES.values()}
+    source = resources.files("hil.study") / "own_error.toml"
+    table = tomllib.loads(source.read_text(encoding="utf-8"))["ratio"]
+    assert {(effect, name) for effect, ratios in table.items() for name in ratios} <= numbers
+    assert all(ratio >= 1.0 for ratios in table.values() for ratio in ratios.values())
+
+
+def test_both_the_best_explanation_and_the_clearest_are_fitted() -> None:
+    """A number in which the model errs much explains most; one in which it errs little is still among the leaders."""
+    erring = [s for s in (score(c, 40.0, 100.0) for c in CANDIDATES.values()) if variance_of(s.candidate) > 4.0]
+    clear = min(CANDIDATES.values(), key=variance_of)
+    listed = [*erring, score(clear, 30.0 / abs(clear.parameter.typical), 100.0 / clear.parameter.typical**2)]
+    assert clear in [s.candidate for s in leaders(listed, 2)]
 
 
 def test_a_nuisance_takes_only_what_its_tolerance_allows() -> None:

@@ -36,8 +36,8 @@ def _innovations(y: np.ndarray, force: float) -> np.ndarray:
     n = len(y)
     fresh, white, out = np.zeros(n), np.tile([1e-4, 4e-4, 0.0], (n, 1)), np.empty_like(y)
     fresh[0] = 1.0
-    colours = np.array([[np.exp(-STEP_S), force**2], [0.5, 1e-12], [0.5, 1e-12]])
-    moving(y, fresh, np.zeros(n), white, STEP_S, colours, out)
+    colours = np.array([[np.exp(-STEP_S), force**2], [0.5, 1e-12], [0.5, 1e-12], [0.5, 1e-12]])
+    moving(y, fresh, np.zeros(n), white, np.ones(n), STEP_S, colours, out)
     return out[:, :2, 0]
 
 
@@ -50,6 +50,22 @@ def test_a_force_disturbance_shows_in_speed_and_acceleration_as_one() -> None:
 def test_without_the_disturbance_in_the_model_nothing_is_white() -> None:
     out = _innovations(_moving_car(10000, np.random.default_rng(2)), 1e-6)
     assert out[10:, 0].std() > 3.0
+
+
+def test_what_all_wheels_tell_wrong_is_no_motion() -> None:
+    """A coloured error of the wheels with its weight is white after the filter, and leaves the ground speed alone."""
+    n, rng = 10000, np.random.default_rng(4)
+    share = np.linspace(0.5, 1.5, n)
+    wrong = _ar1(n, 0.02, 1.0, rng)
+    y = np.zeros((n, 3, 1))
+    y[:, 0, 0] = share * wrong + 0.005 * rng.standard_normal(n)
+    y[:, 2, 0] = 0.01 * rng.standard_normal(n)
+    fresh, white, out = np.zeros(n), np.tile([2.5e-5, 0.0, 1e-4], (n, 1)), np.empty_like(y)
+    fresh[0] = 1.0
+    colours = np.array([[0.5, 1e-12], [0.5, 1e-12], [0.5, 1e-12], [np.exp(-STEP_S), 0.02**2]])
+    moving(y, fresh, np.zeros(n), white, share, STEP_S, colours, out)
+    assert out[10:, [0, 2], 0].std(axis=0) == pytest.approx([1.0, 1.0], abs=0.05)
+    assert abs(np.corrcoef(out[11:, 0, 0], out[10:-1, 0, 0])[0, 1]) < 0.05
 
 
 def test_what_is_not_measured_leaves_nothing() -> None:

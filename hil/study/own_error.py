@@ -1,0 +1,29 @@
+"""The model's own error, measured: how much more each number of an effect seems to explain where nothing is hidden.
+
+Two models of one car, written apart, differ in form; some effects imitate such differences. ``own_error.toml`` holds
+the root mean square of each number's estimate over its standard deviation, on drives of a car that shares no code with
+the plant and has nothing hidden (``brakebench trials --own-error``); 1 would be a perfect model. A gain in chi-squared
+is divided by its square before it is called beyond noise.
+"""
+
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+
+from hil.study.candidates import Candidate
+
+USUAL = 1.5
+"""Where nothing was measured."""
+
+
+@cache
+def _table() -> Mapping[str, Mapping[str, float]]:
+    source = resources.files("hil.study") / "own_error.toml"
+    table: Mapping[str, Mapping[str, float]] = tomllib.loads(source.read_text(encoding="utf-8"))["ratio"]
+    return table
+
+
+def variance_of(candidate: Candidate) -> float:
+    """What the gain of a candidate is divided by, at least 1."""
+    return max(float(_table().get(candidate.effect.name, {}).get(candidate.parameter.name, USUAL)), 1.0) ** 2
