@@ -1,5 +1,6 @@
 """Along the car: the accelerometer against the wheels' speed, with all that a sensor may do in between."""
 
+import math
 from collections.abc import Mapping
 from typing import Final
 
@@ -14,13 +15,15 @@ NOISE: Final[Mapping[str, Number]] = {
     "speed_mps": Number(0.02, 1e-4, 1.0, 0.3, True, 2.0),
     "motion_mps2": Number(1.0, 0.05, 20.0, 0.3, True, 2.0),
     "motion_s": Number(5.0, 0.1, 100.0, 0.3, True, 1.0),
+    "motion_lag_s": Number(0.1, 0.005, 1.0, 0.3, True, 1.0),
     "slope_mps2": Number(0.2, 1e-4, 5.0, 0.3, True, 1.5),
     "slope_s": Number(10.0, 0.5, 100.0, 0.3, True, 0.7),
     "body_mps2": Number(0.1, 1e-4, 20.0, 0.3, True, 2.0),
     "body_s": Number(0.15, 0.02, 1.5, 0.3, True, 0.7),
     "ax_mps2": Number(0.05, 1e-4, 5.0, 0.3, True, 2.0),
 }
-"""White noise of the speed; the motion itself; the road's slope; pitch and vibration; white noise of the accelerometer.
+"""White noise of the speed; the motion itself and how fast it changes; the road's slope; pitch and vibration; white
+noise of the accelerometer.
 
 Origins: roads of 1 to 3 % over some hundred metres (effects 1), pitch at 1 to 2 Hz (8), sensors (55 to 64).
 """
@@ -38,6 +41,7 @@ SENSOR: Final[Mapping[str, Number]] = {
 """What the accelerometer may do: ax' = (1 + gain) lowpass(a + g slope) + bias + ..., ``delay_s`` after its stamp."""
 
 _UNKNOWN = 1e4
+_SPEED, _ACCEL, _SLOPE, _FELT, _LAST, _BODY, _PULL = range(7)
 
 
 def lag(time_s: float, step_s: float) -> tuple[float, float, float]:
@@ -53,7 +57,11 @@ def lag(time_s: float, step_s: float) -> tuple[float, float, float]:
 
 
 class Along(Model):
-    """The model along the car: states speed, acceleration, slope (m/s2), filtered specific force, body's shaking."""
+    """The model along the car.
+
+    States: speed, acceleration, slope (m/s2), filtered specific force and its last value, the body's shaking, and what
+    pulls the car.
+    """
 
     noise = NOISE
     channel = "ax_mps2"
@@ -71,52 +79,60 @@ class Along(Model):
             self._added["ahead_m"] = -(turn**2)
             self._added["beside_m"] = -np.gradient(turn, motion.cell_s) * (motion.fresh < 0.5)
         self.numbers = {n: v for n, v in SENSOR.items() if n in {"gain", "filter_s", "delay_s", *self._added}}
-        self._known = np.column_stack([motion.moving, motion.known(self.channel)])
+        edges = round(SENSOR["delay_s"].high / motion.cell_s) + 1  # the same cells whatever the delay
+        inside = 1.0 - np.minimum(np.convolve(_ends(motion), np.ones(2 * edges + 1), "same"), 1.0)
+        self._known = np.column_stack([motion.moving, motion.moving * inside])
 
     def linear(self, sensor: Mapping[str, float], noise: Mapping[str, float]) -> Linear:
         """The model's matrices."""
         step = self.motion.cell_s
-        a, s, c = (float(np.exp(-step / noise[n])) for n in ("motion_s", "slope_s", "body_s"))
-        phi, old, new = lag(sensor.get("filter_s", 0.0), step)
-        delay = sensor.get("delay_s", 0.0)
-        hold, past, now = lag(0.5 * abs(delay), step)
-        row = np.zeros((6, 6))  # of the next state, in terms of this one
-        row[0, :2] = 1.0, 0.5 * step * (1.0 + a)
-        row[1, 1], row[2, 2], row[5, 5] = a, s, c
-        row[3, 1:4] = old + new * a, old + new * s, phi
-        into = np.zeros((6, 3))  # of motion, slope, body
-        into[:2, 0] = 0.5 * step, 1.0
-        into[2, 1] = 1.0
-        into[3, :2] = new
-        into[5, 2] = 1.0
-        of = 3 if delay >= 0.0 else 0  # a delay of the accelerometer, or of the speed
-        row[4] = now * row[of]
-        row[4, of] += past
-        row[4, 4] += hold
-        into[4] = now * into[of]
+        keep = {n: float(np.exp(-step / noise[f"{n}_s"])) for n in ("motion", "slope", "body")}
+        now, into = np.eye(7), np.zeros((7, 3))  # next state of this one, and of the three white sources
+        for state, name, source in ((_PULL, "motion", 0), (_SLOPE, "slope", 1), (_BODY, "body", 2)):
+            now[state, state], into[state, source] = keep[name], 1.0
+        for state, inputs, time_s in (
+            (_ACCEL, [_PULL], noise["motion_lag_s"]),
+            (_FELT, [_ACCEL, _SLOPE], sensor.get("filter_s", 0.0)),
+        ):
+            phi, old, new = lag(time_s, step)
+            now[state] = phi * np.eye(7)[state] + old * np.eye(7)[inputs].sum(axis=0) + new * now[inputs].sum(axis=0)
+            into[state] = new * into[inputs].sum(axis=0)
+        now[_SPEED] = np.eye(7)[_SPEED] + 0.5 * step * (np.eye(7)[_ACCEL] + now[_ACCEL])
+        into[_SPEED] = 0.5 * step * into[_ACCEL]
+        now[_LAST] = np.eye(7)[_FELT]
         sizes = [noise["motion_mps2"], noise["slope_mps2"], noise["body_mps2"]]
-        driven = np.diag([size**2 * (1.0 - p * p) for size, p in zip(sizes, (a, s, c), strict=True)])
+        driven = np.diag([size**2 * (1.0 - k * k) for size, k in zip(sizes, keep.values(), strict=True)])
         felt = sizes[0] ** 2 + sizes[1] ** 2
-        start = np.diag([_UNKNOWN, sizes[0] ** 2, sizes[1] ** 2, felt, 0.0, sizes[2] ** 2])
-        start[4] = start[of]
-        start[:, 4] = start[:, of]
-        start[4, 4] = start[of, of]
-        gain = 1.0 + sensor.get("gain", 0.0)
-        observe = np.array([[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, gain, 0.0, 1.0]])
-        passed = 1.0 if of == 0 else gain  # all-pass of first order (Pade): 2 lag - 1
-        observe[0 if of == 0 else 1, [of, 4]] = -passed, 2.0 * passed
+        start = np.diag([_UNKNOWN, sizes[0] ** 2, sizes[1] ** 2, felt, 0.0, sizes[2] ** 2, sizes[0] ** 2])
+        start[_ACCEL, _PULL] = start[_PULL, _ACCEL] = sizes[0] ** 2
+        start[_LAST, [_FELT, _LAST]] = start[_FELT, _LAST] = felt
+        gain, (_, share) = 1.0 + sensor.get("gain", 0.0), self._shift(sensor)
+        observe = np.zeros((2, 7))
+        observe[0, _SPEED] = 1.0
+        observe[1, [_FELT, _LAST, _BODY]] = gain * (1.0 - share), gain * share, 1.0
         white = np.array([noise["speed_mps"] ** 2, noise["ax_mps2"] ** 2])
-        return Linear(row, into @ driven @ into.T, start, observe, white)
+        return Linear(now, into @ driven @ into.T, start, observe, white)
+
+    def _shift(self, sensor: Mapping[str, float]) -> tuple[int, float]:
+        """A delay as whole cells, which move the data, and a share of one, which the model interpolates.
+
+        The data are never interpolated: that would make their noise smaller, and any delay likely.
+        """
+        cells = sensor.get("delay_s", 0.0) / self.motion.cell_s
+        whole = math.floor(cells)
+        return whole, cells - whole
 
     def measured(self, sensor: Mapping[str, float]) -> Floats:
         """Speed and accelerometer, the latter at the time it was felt and less all that is added to it."""
-        values = self.motion.channels[self.channel]
+        values = self.motion.later(self.channel, self._shift(sensor)[0])
         added = sum((sensor.get(name, 0.0) * column for name, column in self._added.items()), np.zeros(len(values)))
         return np.column_stack([self.motion.speed_mps, values - added])
 
     def score(self, sensor: Mapping[str, float], noise: Mapping[str, float]) -> tuple[Floats, Floats]:
         """Innovations (cells, 2) and log-likelihood of every cell."""
-        return innovations(self.measured(sensor), self._known, self.motion.fresh, self.linear(sensor, noise))
+        y = self.measured(sensor)
+        known = self._known * np.isfinite(y)
+        return innovations(y, known, self.motion.fresh, self.linear(sensor, noise))
 
     def predicted(self, sensor: Mapping[str, float]) -> Floats:
         """The accelerometer as the wheels' motion alone foretells it; flat road."""
@@ -135,3 +151,8 @@ class Along(Model):
             rows = motion.log == k
             found[rows] = np.interp(motion.t_s[rows] - late, motion.t_s[rows], found[rows])
         return found
+
+
+def _ends(motion: Motion) -> Floats:
+    """1 in the first and the last cell of every log."""
+    return np.maximum(motion.fresh, np.concatenate((motion.fresh[1:], [1.0])))

@@ -49,6 +49,13 @@ class Motion:
         """1 where a channel is measured while the car moves."""
         return np.isfinite(self.channels[name]) * self.moving
 
+    def later(self, name: str, cells: int) -> Floats:
+        """A channel as it will be ``cells`` cells later; NaN beyond the ends of the log."""
+        values = self.channels[name]
+        at = np.arange(len(values)) + cells
+        inside = np.clip(at, 0, len(values) - 1)
+        return np.where((at == inside) & (self.log[inside] == self.log), values[inside], np.nan)
+
     @property
     def blocks(self) -> int:
         """How many manoeuvres there are."""
