@@ -85,6 +85,15 @@ def _held_demand(x: Vector, target_mps: float) -> float:
     return min(max(push, -HOLD_LIMIT_NM), HOLD_LIMIT_NM)
 
 
+@equation
+def _delayed(demand: Vector, i: int, t: float) -> float:
+    """Demand of wheel ``i`` over the step that begins at ``t``; a change within the step counts for its share."""
+    first, last = t / TICK_S + 1e-6, (t + STEP_S) / TICK_S + 1e-6
+    before, after = floor(first), floor(last)
+    share = (last - after) / (last - first) if after > before else 0.0
+    return demand[max(before, 0), i] * (1.0 - share) + demand[max(after, 0), i] * share
+
+
 @entry
 def _integrate(
     x: Vector, car: Car, strength: Vector, onset_s: Vector, law: int, pressure_demand: Vector, motor_demand: Vector,
@@ -108,8 +117,7 @@ def _integrate(
         for sub in range(PER_TICK):
             late = now + sub * STEP_S
             for i in range(4):
-                delayed = floor((late - car.ehb_dead_time_s - e[E.ehb_dead_time, i]) / TICK_S + 1e-6)
-                demand_pa[i] = pressure_demand[max(delayed, 0), i]
+                demand_pa[i] = _delayed(pressure_demand, i, late - car.ehb_dead_time_s - e[E.ehb_dead_time, i])
             for stage in range(4):
                 share = (0.0, 0.5, 0.5, 1.0)[stage] * STEP_S
                 before = stages[max(stage - 1, 0)]
