@@ -53,7 +53,7 @@ def test_the_accelerometers_read_the_wrong_way_round(answer):
 
 def test_the_accelerometer_is_slow_and_the_gyro_has_a_zero(answer):
     slow = _cause(answer, "imu_filter", "ax_mps2")["parameters"]["time_s"]
-    assert 0.05 < slow["ci95"][0] < slow["ci95"][1] < 0.25
+    assert 0.02 < slow["ci95"][0] < slow["ci95"][1] < 0.2
     zero = _cause(answer, "imu_bias", "yaw_rate_rad_s")["parameters"]["yaw_rate_rad_s"]
     assert zero["ci95"][1] < -0.002
 

@@ -79,6 +79,7 @@ class Along(Model):
             self._added["ahead_m"] = -(turn**2)
             self._added["beside_m"] = -np.gradient(turn, motion.cell_s) * (motion.fresh < 0.5)
         self.numbers = {n: v for n, v in SENSOR.items() if n in {"gain", "filter_s", "delay_s", *self._added}}
+        self.resolution = {"delay_s": 0.5 * motion.cell_s}
         edges = round(SENSOR["delay_s"].high / motion.cell_s) + 1  # the same cells whatever the delay
         inside = 1.0 - np.minimum(np.convolve(_ends(motion), np.ones(2 * edges + 1), "same"), 1.0)
         self._known = np.column_stack([motion.moving, motion.moving * inside])

@@ -146,9 +146,7 @@ def _remarks(models: Mapping[str, Found], causes: Sequence[Cause]) -> list[str]:
     said = []
     for c in causes:
         if c.exact is not None:
-            said.append(
-                f"{c.channels[0]}: its scale of {1.0 + c.value:.2f} is a factor of {c.exact:.4g} within its interval"
-            )
+            said.append(f"{c.channels[0]} reads {1.0 + c.value:.2f} of the truth; {c.exact:.4g} lies in the interval")
         limit = THETA.effect(c.names[0].effect).parameter(c.names[0].parameter)
         if not limit.low <= c.names[0].factor * c.value <= limit.high:
             said.append(f"{c.names[0].effect}: larger than any sensor's ({limit.low:g} to {limit.high:g} {limit.unit})")

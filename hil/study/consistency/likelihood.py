@@ -117,4 +117,5 @@ def deviations(model: Model, found: Fit, block: Floats, fixed: Mapping[str, floa
     centred = gradient - gradient.mean(axis=1, keepdims=True)
     robust = np.sqrt(np.maximum(np.diag(inverse @ (centred @ centred.T) @ inverse), 0.0))
     spread = np.clip(robust, curvature, _WIDEST * curvature) if count >= 4 else curvature
-    return {n: float(s * number.step) for n, number, s in zip(names, numbers, spread, strict=True) if n in found.sensor}
+    sizes = {n: float(s * number.step) for n, number, s in zip(names, numbers, spread, strict=True)}
+    return {n: float(np.hypot(sizes[n], model.resolution.get(n, 0.0))) for n in found.sensor}

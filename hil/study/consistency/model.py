@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from hil.study.table import Floats
 
@@ -23,10 +24,11 @@ class Number:
 
 
 class Model(ABC):
-    """What can be fitted: ``numbers`` are 0 where nothing is wrong."""
+    """What can be fitted: ``numbers`` are 0 where nothing is wrong; ``resolution`` is what the cells leave of some."""
 
     noise: Mapping[str, Number]
     numbers: Mapping[str, Number]
+    resolution: Mapping[str, float] = MappingProxyType({})
 
     @abstractmethod
     def score(self, sensor: Mapping[str, float], noise: Mapping[str, float]) -> tuple[Floats, Floats]:

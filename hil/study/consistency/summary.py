@@ -34,7 +34,7 @@ def build_report(answer: Consistency, sources: Sequence[str]) -> Report:
     return Report(
         title="Measured sensors against the car's own motion",
         verdict={"none": Verdict.PASSED, "named": None}.get(content["verdict"], Verdict.INCOMPLETE),
-        reason=f"{_SENTENCE[content['verdict']]} {_headline(answer)}".strip(),
+        reason=_headline(answer) or _SENTENCE[content["verdict"]],
         numbers=tuple(_cards(answer)),
         sections=tuple(sections),
         provenance={
@@ -73,8 +73,8 @@ def _headline(answer: Consistency) -> str:
     for cause in answer.causes:
         name, channel = cause.names[0], ", ".join(cause.channels)
         if name.effect == "wrong_scale":
-            wrong = "its sign is wrong" if cause.exact == -1.0 else "scale or sign is wrong"
-            said.append(f"{channel} reads {1.0 + cause.value:.2f} of the truth ({wrong})")
+            wrong = "sign" if cause.exact == -1.0 else "scale or sign"
+            said.append(f"{channel}: wrong {wrong}, reads {1.0 + cause.value:.2f} of the truth")
         else:
             unit = THETA.effect(name.effect).parameter(name.parameter).unit
             said.append(
