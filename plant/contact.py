@@ -27,7 +27,7 @@ from plant.vectors import C, P, U, X, Y
 from plant.vehicle import GRAVITY_MPS2, rolling_resistance
 
 Vector = NDArray[np.float64]
-BLEED_MPS = 1.0
+BLEED_MPS = 6.0  # C: a locked wheel's deflection at rest is then what its sliding force can hold
 LOAD_FLOOR_N = 50.0  # an unloaded tyre is computed at this load, and its force scaled down
 FRICTION_FLOOR = 1e-3
 
@@ -72,27 +72,30 @@ def rolling_radius(i: int, p: Vector, y: Vector) -> float:
 
 
 @equation
-def slip_rate(slip: float, sliding_mps: float, transport_mps: float, gain_1_m: float, limit: float) -> float:
+def slip_rate(
+    slip: float, sliding_mps: float, transport_mps: float, bleeding_mps: float, gain_1_m: float, held: float
+) -> float:
     """Rate of a relaxed slip, 1/s: sigma s' = v_s - |v| s (Pacejka 2006, section 7.2), less what bleeds off.
 
-    A carcass holds no more than the friction: slip beyond ``limit`` (where sliding is complete) bleeds off at
-    `BLEED_MPS` even at rest, so that a locked wheel does not spring back by its whole slip when the car stops.
+    At rest the slip is the deflection of the carcass, and that is no larger than its stiffness and the friction let it
+    be: slip beyond ``held``, D / K, bleeds off near standstill. Else the deflection of a locked wheel, kept up to its
+    sliding slip, would throw the car back with more than the energy of its springs.
     """
-    excess = slip - min(max(slip, -limit), limit)
-    return (sliding_mps - transport_mps * slip - BLEED_MPS * excess) * gain_1_m
+    excess = slip - min(max(slip, -held), held)
+    return (sliding_mps - transport_mps * slip - bleeding_mps * excess) * gain_1_m
 
 
 @equation
-def slip_decay(slip: float, transport_mps: float, gain_1_m: float, limit: float) -> float:
+def slip_decay(slip: float, transport_mps: float, bleeding_mps: float, gain_1_m: float, held: float) -> float:
     """Own decay rate of a relaxed slip, 1/s."""
-    return (transport_mps + (BLEED_MPS if abs(slip) > limit else 0.0)) * gain_1_m
+    return (transport_mps + (bleeding_mps if abs(slip) > held else 0.0)) * gain_1_m
 
 
 @equation
-def low_speed_damping(speed_mps: float, limit_mps: float, damping_ns_m: float) -> float:
-    """Damping of the contact, N s/m: fades in below ``limit_mps`` with a cosine (Pacejka 2006, section 8.6)."""
+def near_standstill(speed_mps: float, limit_mps: float) -> float:
+    """Share of what acts near standstill only, fading in below ``limit_mps`` (Pacejka 2006, section 8.6)."""
     share = min(speed_mps / limit_mps, 1.0)
-    return 0.5 * damping_ns_m * (1.0 + sin(0.5 * pi - pi * share))
+    return 0.5 + 0.5 * sin(0.5 * pi - pi * share)
 
 
 @equation
@@ -121,17 +124,18 @@ def contacts(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, cos_grade:
         stiffness_x = at_wheel(slip_stiffness(loaded, dfz, p), y, J.tyre_stiffness, i)
         stiffness_y = -cornering_stiffness(loaded, p)
         least = p[P.tyre_relaxation_least_m]
-        limit_x = 3.0 * peak_longitudinal(loaded, dfz, grip, p) / stiffness_x
-        limit_y = 3.0 * peak_lateral(loaded, dfz, grip, p) / stiffness_y
-        gain_x = 1.0 / sliding_relaxation(relaxation_longitudinal(loaded, dfz, p), slip, limit_x, least)
-        gain_y = 1.0 / sliding_relaxation(relaxation_lateral(loaded, p), side_slip, limit_y, least)
+        held_x = peak_longitudinal(loaded, dfz, grip, p) / stiffness_x
+        held_y = peak_lateral(loaded, dfz, grip, p) / stiffness_y
+        gain_x = 1.0 / sliding_relaxation(relaxation_longitudinal(loaded, dfz, p), slip, 3.0 * held_x, least)
+        gain_y = 1.0 / sliding_relaxation(relaxation_lateral(loaded, p), side_slip, 3.0 * held_y, least)
         y[Y.slip_gain_1_m + i] = gain_x
-        y[Y.rate + X.slip + i] = slip_rate(slip, sliding, transport, gain_x, limit_x)
-        y[Y.rate + X.side_slip + i] = slip_rate(side_slip, across, transport, gain_y, limit_y)
-        y[Y.decay_1_s + X.slip + i] = slip_decay(slip, transport, gain_x, limit_x)
-        y[Y.decay_1_s + X.side_slip + i] = slip_decay(side_slip, transport, gain_y, limit_y)
+        standing = near_standstill(transport, p[P.tyre_low_speed_mps])
+        bleeding, damping = BLEED_MPS * standing, p[P.tyre_low_speed_damping_ns_m] * standing
+        y[Y.rate + X.slip + i] = slip_rate(slip, sliding, transport, bleeding, gain_x, held_x)
+        y[Y.rate + X.side_slip + i] = slip_rate(side_slip, across, transport, bleeding, gain_y, held_y)
+        y[Y.decay_1_s + X.slip + i] = slip_decay(slip, transport, bleeding, gain_x, held_x)
+        y[Y.decay_1_s + X.side_slip + i] = slip_decay(side_slip, transport, bleeding, gain_y, held_y)
 
-        damping = low_speed_damping(transport, p[P.tyre_low_speed_mps], p[P.tyre_low_speed_damping_ns_m])
         side = 1.0 - 2.0 * (i % 2)
         force, cross = combined_at(
             slip + damping * sliding / stiffness_x, atan(side_slip + damping * across / stiffness_y), loaded, grip,

@@ -72,7 +72,7 @@ def reference() -> tuple[Vector, Vector]:
     """Exact state at the end of the bend, and a scale for each state."""
     x0 = start()[: RATES.size]
     result = solve_ivp(
-        RightHandSide(car(), bend()), (0.0, DURATION_S), x0, "LSODA", rtol=1e-9,
+        RightHandSide(car(), bend()), (0.0, DURATION_S), x0, "DOP853", rtol=1e-9,
         atol=1e-9 * np.maximum(np.abs(x0), 1e-2), max_step=5e-3,
     )  # fmt: skip
     return result.y[:, -1], np.maximum(np.abs(result.y).max(axis=1), 1e-3)
