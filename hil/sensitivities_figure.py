@@ -16,9 +16,9 @@ from plant.effects.signals import CHANNELS, NAMES
 LEAST, MOST = 0.1, 100.0  # sigma; smaller is left white, larger saturates
 GROUPS = {
     "wheel": "wheel speeds", "imu": "IMU", "pressure": "pressures", "motor": "motor torques", "driver": "pedal",
-    "speed": "speed",
+    "speed": "GPS",
 }  # fmt: skip
-_SHORT = ("fl", "fr", "rl", "rr", "ax", "ay", "yaw rate", *("fl", "fr", "rl", "rr") * 2, "travel", "GPS")
+_SHORT = ("fl", "fr", "rl", "rr", "ax", "ay", "yaw rate", *("fl", "fr", "rl", "rr") * 2, "travel", "speed")
 
 
 def draw(title: str, found: list[Signature], path: Path) -> None:
