@@ -41,10 +41,10 @@ def unforced(logs: Sequence[Log], radius_m: float) -> str:
     there = set.intersection(*(set(log.channels) for log in logs))
     if {*MOTOR_TORQUE} <= there or {*MOTOR_DEMAND} <= there:
         return ""
+    if not ({*WHEEL_SPEED} <= there or {"speed_mps", "ax_mps2"} <= there):
+        return ""  # nothing to compare
     if not ({*PRESSURE} <= there or {*PRESSURE_DEMAND} <= there):
         return "neither pressures nor motor torques are measured: forces cannot be replayed, sensors are compared"
-    if not ({*WHEEL_SPEED} <= there or "speed_mps" in there):
-        return ""
     motion = motion_of(logs, radius_m)
     pulled = float(((motion.accel_mps2 > _PULLED_MPS2) * motion.moving).sum()) * motion.cell_s
     if pulled < _PULLED_S:

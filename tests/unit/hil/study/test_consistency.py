@@ -1,0 +1,77 @@
+"""Sensors against the motion, on motion made here: nothing in nothing, what was put in by its name and size."""
+
+import numpy as np
+import pytest
+
+from hil.study.consistency.along import Along
+from hil.study.consistency.check import unforced
+from hil.study.consistency.motion import motion_of
+from hil.study.consistency.search import search
+from hil.study.explain import explain
+from hil.study.table import WHEEL_SPEED, Log, UnusableError, make_log
+
+RADIUS_M, STEP_S = 0.33, 0.01
+
+
+def _coloured(rng, n: int, size: float, time_s: float) -> np.ndarray:
+    keep = np.exp(-STEP_S / time_s)
+    out, white = np.zeros(n), size * np.sqrt(1.0 - keep**2) * rng.standard_normal(n)
+    for k in range(1, n):
+        out[k] = keep * out[k - 1] + white[k]
+    return out
+
+
+def _log(seed: int, gain: float = 0.0, late: int = 0) -> Log:
+    """One minute: accelerations in steps, a hilly road, shaking, noise."""
+    rng, n = np.random.default_rng(seed), 6000
+    levels = rng.uniform(-2.0, 2.0, 20)
+    levels -= levels.mean()
+    pull = np.repeat(levels, n // 20)
+    kernel = np.exp(-np.arange(200) * STEP_S / 0.15)
+    accel = np.convolve(pull, kernel / kernel.sum())[:n]
+    speed = 20.0 + np.cumsum(accel) * STEP_S
+    felt = accel + _coloured(rng, n, 0.2, 8.0) + _coloured(rng, n, 0.1, 0.15)
+    ax = (1.0 + gain) * np.concatenate((felt[:1].repeat(late), felt[: n - late])) + 0.05 * rng.standard_normal(n)
+    channels = {name: (speed + 0.02 * rng.standard_normal(n)) / RADIUS_M for name in WHEEL_SPEED}
+    return make_log("made", np.arange(n) * STEP_S, channels | {"ax_mps2": ax})
+
+
+def _found(log: Log):
+    motion = motion_of([log], RADIUS_M)
+    return search(Along(motion), motion.block, {}, {}, lambda _: None)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_nothing_is_found_in_nothing(seed):
+    assert _found(_log(seed)).steps == []
+
+
+@pytest.mark.slow
+def test_a_sign_is_found_with_its_interval():
+    found = _found(_log(4, gain=-2.0))
+    assert [step.number for step in found.steps] == ["gain"]
+    low, high = found.interval("gain")
+    assert low < -2.0 < high
+    assert high - low < 0.5
+
+
+@pytest.mark.slow
+def test_a_delay_is_found_with_its_interval():
+    found = _found(_log(5, late=15))
+    assert [step.number for step in found.steps] == ["delay_s"]
+    low, high = found.interval("delay_s")
+    assert low < 0.15 < high
+
+
+def test_the_way_is_chosen_by_the_channels():
+    log = _log(6)
+    assert "forces cannot be replayed" in unforced([log], RADIUS_M)
+    torque = {f"motor_torque_{w}_nm": np.zeros(6000) for w in ("fl", "fr", "rl", "rr")}
+    assert unforced([make_log("made", log.t_s, {**log.channels, **torque})], RADIUS_M) == ""
+
+
+def test_a_car_that_stands_is_unusable():
+    t = np.arange(1000) * STEP_S
+    with pytest.raises(UnusableError, match="moves for"):
+        explain({"t_s": t, "speed_mps": np.zeros(1000), "ax_mps2": np.zeros(1000)})
