@@ -12,7 +12,6 @@ from hil.study.consistency.misses import Miss
 from hil.study.consistency.motion import Motion
 from hil.study.consistency.search import ASKED
 from hil.study.table import Floats
-from plant.effects.theta import THETA
 
 _SENTENCE = {
     "none": "The sensors agree with the car's own motion within noise.",
@@ -68,19 +67,15 @@ def _cards(answer: Consistency) -> list[Number]:
 
 
 def _headline(answer: Consistency) -> str:
-    """The causes in words."""
-    said = []
+    """The channels and what is wrong with them; the numbers follow as cards."""
+    by_channel: dict[str, list[str]] = {}
     for cause in answer.causes:
-        name, channel = cause.names[0], ", ".join(cause.channels)
-        if name.effect == "wrong_scale":
-            wrong = "sign" if cause.exact == -1.0 else "scale or sign"
-            said.append(f"{channel}: wrong {wrong}, reads {1.0 + cause.value:.2f} of the truth")
-        else:
-            unit = THETA.effect(name.effect).parameter(name.parameter).unit
-            said.append(
-                f"{channel}: {name.effect.replace('_', ' ')} of {name.factor * cause.value:.3g} {unit}".rstrip()
-            )
-    return "; ".join(said) + "." if said else ""
+        words = cause.names[0].effect.replace("_", " ")
+        if cause.names[0].effect == "wrong_scale":
+            words = "wrong sign" if cause.exact == -1.0 else "wrong scale or sign"
+        by_channel.setdefault(", ".join(cause.channels), []).append(words)
+    said = "; ".join(f"{channel}: {', '.join(words)}" for channel, words in by_channel.items())
+    return f"{said}." if said else ""
 
 
 def _short(value: float) -> float:
