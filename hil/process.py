@@ -107,6 +107,21 @@ class Child:
                 )
         finally:
             child_end.close()
+        self._used: list[tuple[int, float]] = []  # time, ns, and processor time, s, at its release and its end
+
+    @property
+    def share_of_core(self) -> float | None:
+        """Processor time over time between its release and when it was asked to stop; None where that is not known."""
+        if len(self._used) < 2:
+            return None
+        (begin_ns, before_s), (end_ns, after_s) = self._used
+        return (after_s - before_s) / max((end_ns - begin_ns) * 1e-9, 1e-9)
+
+    def _note_use(self) -> None:
+        with contextlib.suppress(OSError, IndexError):  # gone, or a system without /proc
+            fields = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
+            seconds = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")  # utime, stime: proc(5)
+            self._used.append((WallClock().now_ns(), seconds))
 
     @property
     def pid(self) -> int:
@@ -130,6 +145,7 @@ class Child:
 
     def release(self) -> None:
         """Let a process that said ready begin."""
+        self._note_use()
         with contextlib.suppress(BrokenPipeError):
             self._ready.send(_GO)
 
@@ -148,6 +164,8 @@ class Child:
     def ask_to_stop(self) -> None:
         """Send SIGTERM."""
         if not self.ended:
+            if len(self._used) == 1:
+                self._note_use()
             self._process.terminate()
 
     def stop(self) -> None:

@@ -118,6 +118,7 @@ def finish(rig: Rig, seed: int, provenance: Mapping[str, object], failure: str =
         "reason": reason,
         "bus": rig.spec,
         "processes": rig.alive_at_end,
+        "share_of_core": _shares(rig),
         "seed": seed,
     }
     facts |= _write(rig.out, report, signals)
@@ -177,10 +178,16 @@ def _provenance(scenario: Scenario, rig: Rig, seed: int) -> dict[str, object]:
         "seed": seed,
         "bus": rig.spec,
         "processes": {child.name: child.error_path.read_text(errors="replace").strip() for child in rig.processes},
+        "share of a core": _shares(rig),
         "versions": {"python": platform.python_version()} | {name: version(name) for name in packages},
         "host": {"kernel": platform.release(), "machine": platform.machine(), "processors": os.cpu_count()},
         "executable": Path(sys.executable).name,
     }
+
+
+def _shares(rig: Rig) -> dict[str, float]:
+    """Processor time over time of each process, where it is known."""
+    return {c.name: round(c.share_of_core, 4) for c in rig.processes if c.share_of_core is not None}
 
 
 def _write(out: Path, report: Report, signals: Signals) -> dict[str, str]:

@@ -59,6 +59,8 @@ def test_the_main_job(brakebench, channel, tmp_path):
     result = json.loads(done.stdout)
     assert set(result) >= FACTS
     assert set(result["lateness_ms"]) == {"p50", "p99", "max"}
+    assert set(result["share_of_core"]) == {"recorder", "plant", "ecu"}
+    assert all(0.0 < share < 1.0 for share in result["share_of_core"].values())
     assert 60.0 < result["stop_distance_m"] < 75.0
     assert result["mean_decel_mps2"] == pytest.approx(result["demanded_decel_mps2"], rel=0.06)
     assert (result["processes"], result["frames_lost"], result["frames_corrupt"]) == (2, 0, 0)
