@@ -19,6 +19,7 @@ from hil.faults.frames import FrameFaults
 from hil.parameters import load_set, override
 from hil.scenario_table import Files, ScenarioError, Table, as_number
 from hil.stimulus import ALL_WHEELS, WHEELS, FaultEvent
+from hil.tir import load_tir
 from plant.manoeuvre import DirectDemands, Manoeuvre, SpeedPhase, Trace
 from plant.parameters.plant import PlantParameters
 from plant.road import DRY, RoadSegment
@@ -140,9 +141,7 @@ def load_scenario(name: str) -> Scenario:
         title=title,
         source=str(source),
         sha256="",
-        plant=override(
-            load_set(_set("plant", plant_set), PlantParameters), plant_table.rest(), f"{source.name}: plant"
-        ),
+        plant=_plant(plant_table, plant_set, files),
         ecu=override(load_set(_set("ecu", ecu_set), EcuParameters), ecu_table.rest(), f"{source.name}: ecu"),
         plant_set=plant_set,
         ecu_set=ecu_set,
@@ -178,6 +177,16 @@ def find_scenario(name: str) -> Path | Traversable:
 def _set(package: str, name: str) -> Path | Traversable:
     """A parameter set by name (of the package) or by path."""
     return Path(name) if name.endswith(".toml") else resources.files(package) / "parameters" / f"{name}.toml"
+
+
+def _plant(table: Table, name: str, files: Files) -> PlantParameters:
+    """A set with the scenario's changes; a tyre file's coefficients come before single changes."""
+    car = load_set(_set("plant", name), PlantParameters)
+    if table.has("tyre_file"):
+        path = Path(str(files.folder / table.text("tyre_file")))
+        car = replace(car, tyre=load_tir(path, car.tyre).tyre)
+        files.read.append(path.read_bytes())
+    return override(car, table.rest(), table.where)
 
 
 def _manoeuvre(top: Table, start: Table) -> Manoeuvre:

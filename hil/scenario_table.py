@@ -58,6 +58,11 @@ class Table:
         self._files = files
         self._known: list[str] = []
 
+    @property
+    def where(self) -> str:
+        """File and table, for messages."""
+        return self._where
+
     def take(self, key: str, default: Any = None) -> Any:
         """Value as it stands in the file."""
         self._known.append(key)

@@ -5,6 +5,7 @@ from importlib import resources
 import pytest
 
 from hil.parameters import ParameterError, load_set
+from hil.scenario import load_scenario
 from hil.tir import load_tir
 from plant.parameters.plant import PlantParameters
 
@@ -77,3 +78,26 @@ def test_refusals(write, base, arguments, message):
 def test_a_missing_file_is_named(tmp_path, base):
     with pytest.raises(ParameterError, match=r"none.tir: cannot be read"):
         load_tir(tmp_path / "none.tir", base)
+
+
+def test_a_scenario_drives_on_a_tyre_file(write, base, tmp_path):
+    name = write({"pdx1": 0.8, "pkx1": 25.0}).name
+    text = f"""title = "tyre"
+[plant]
+tyre_file = "{name}"
+tyre.pkx1 = 24.0
+[start]
+speed_mps = 20.0
+[end]
+duration_s = 1.0
+"""
+    path = tmp_path / "tyre.toml"
+    path.write_text(text)
+    scenario = load_scenario(str(path))
+    assert (scenario.plant.tyre.pdx1, scenario.plant.tyre.pkx1) == (0.8, 24.0)  # the single change comes last
+    assert scenario.plant.tyre.pcx1 == base.pcx1
+    (tmp_path / name).write_text((tmp_path / name).read_text().replace("0.8", "0.9"))
+    assert load_scenario(str(path)).sha256 != scenario.sha256
+    path.write_text(text.replace(name, "none.tir"))
+    with pytest.raises(ParameterError, match=r"none\.tir: cannot be read"):
+        load_scenario(str(path))
