@@ -8,6 +8,7 @@ from hil.study.world import World
 from plant.effects.effect import NODES, Effect, Parameter, Scope
 from plant.effects.theta import THETA
 
+_SHARE = 0.05
 _GROUPS: Mapping[Scope, Mapping[str, tuple[int, ...]]] = {
     Scope.CAR: {"car": (0,)},
     Scope.AXLE: {"car": (0, 1), "front": (0,), "rear": (1,)},
@@ -34,8 +35,8 @@ class Column:
 
     @property
     def step(self) -> float:
-        """A third of what is met on real cars, on the side that is allowed."""
-        return self.parameter.typical / 3.0 if self.parameter.typical else 0.1 * self.parameter.high
+        """A small share of what is met on real cars, on the side that is allowed: many effects show long before."""
+        return self.parameter.typical * _SHARE if self.parameter.typical else 0.3 * _SHARE * self.parameter.high
 
 
 @dataclass(frozen=True, eq=False)

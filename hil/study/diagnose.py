@@ -186,12 +186,26 @@ class _Search:
             most = max(fitted, key=lambda c: c.gained)
             self.say(f"{most.term.candidate.name} gains {most.gained:.1f}, {found.least_gain:.1f} is asked")
             return None
-        best = clear[0]
+        better = min(fitted, key=_odds)
+        least = found.least_gain
+        standing = [c for c in clear if c is better or self._stands_beside(better, c, tighter, least)]
+        if not standing:
+            self.say(f"{better.term.candidate.name} explains more, and the model errs there; nothing stands beside it")
+            return None
+        best = standing[0]
         polished = self.fitter.fit(best.model, tighter, 4, self.settings.relinearise)
         polished, tighter = self.fitter.settle(polished, tighter, 2, 60)
-        rest = sorted((c for c in fitted if c is not best), key=_odds)
+        rest = sorted((c for c in fitted if c is not best and (c in clear or _odds(c) >= _odds(best))), key=_odds)
         first = replace(best, model=polished, term=polished.terms[-1])
         return polished, tighter, [first, *rest]
+
+    def _stands_beside(self, better: Contender, clear: Contender, noise: Noise, least: float) -> bool:
+        """Whether a cause that is beyond doubt is so even when a better one, which is not, is let in as an error."""
+        if _odds(clear) - _odds(better) < TIED:
+            return True
+        joint = self.fitter.at(better.model.z, (*better.model.terms, clear.term), noise)
+        both = self.fitter.fit(joint, noise, 2, self.settings.relinearise)
+        return (better.cost - both.cost) / variance_of(clear.term.candidate) >= least
 
     @staticmethod
     def _gained(contender: Contender, item: Score, reference: float) -> Contender:

@@ -177,7 +177,7 @@ class Fitter:
 def _difference(term: Term) -> float:
     """Step of a finite difference: small against what is usual, and inside the bounds."""
     parameter = term.candidate.parameter
-    size = max(abs(parameter.typical) / 5.0, 0.05 * abs(term.value))
+    size = max(0.02 * abs(parameter.typical), 0.05 * abs(term.value))
     return -size if term.value + size > parameter.high else size
 
 
