@@ -90,7 +90,7 @@ class _Search:
     def __init__(self, case: Case, vehicle: Vehicle, base: World, settings: Settings, say: Say) -> None:
         self.settings, self.say = settings, say
         self.rig = Rig(case, vehicle).quieted(base)
-        self.frame = Frame.of(case)
+        self.frame = Frame.of(self.rig.case)
         self.nuisances = (*vehicle.nuisances, *start_nuisances())
         self.base_world = base
         self.columns: list[Column] = columns()

@@ -141,7 +141,7 @@ def _in_time(inputs: Floats, late_s: tuple[float, ...]) -> Floats:
 
 
 _SHORT, _SETTLED_ROWS = 0.97, 6
-_LEAST_MPS, _STEEPEST_NMS_RAD = 0.2, 150.0
+_LEAST_MPS, _STEEPEST_NMS_RAD = 0.2, 40.0
 _USUAL_RADIUS_M = 0.3
 _TOOTH_ROWS = 2.0
 
