@@ -75,7 +75,7 @@ class Bench(Rig):
         self._await_ready(self._children)
         self._children[0].release()
         self.state = BenchState.RECORDING
-        self._say("starting plant and ECU (the first start on a machine compiles the plant: about half a minute)")
+        self._say("starting plant and ECU (the first start on a machine compiles the plant: some 15 s)")
         order = {"plant": self.scenario.start_order.plant_s, "ecu": self.scenario.start_order.ecu_s}
         for name in NODES:
             if name in self._without:

@@ -4,6 +4,7 @@ import json
 import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -90,11 +91,11 @@ def compare_scenario(
     """Run a scenario twice, in virtual and in real time, and report the difference."""
     scenario = load_scenario(name)
     folder = Path(out) if out else new_folder(f"{scenario.name}-compare")
-    common = {"seed": seed, "command_line": command_line, "say": say}
-    virtual = run_scenario(name, "auto", out=str(folder / "virtual"), realtime=False, virtual=True, **common)  # type: ignore[arg-type]
+    one = partial(run_scenario, name, seed=seed, command_line=command_line, say=say)
+    virtual = one("auto", out=str(folder / "virtual"), realtime=False, virtual=True)
     if virtual.facts["verdict"] == Verdict.INCOMPLETE.value:
         return _incomplete(virtual)
-    real = run_scenario(name, bus, out=str(folder / "real"), realtime=realtime, **common)  # type: ignore[arg-type]
+    real = one(bus, out=str(folder / "real"), realtime=realtime)
     if real.facts["verdict"] == Verdict.INCOMPLETE.value:
         return _incomplete(real)
     logs = {"virtual": folder / "virtual" / "recording.log", "real": folder / "real" / "recording.log"}

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from hil.study.diagnose import TIED, Contender, Diagnosis
+from hil.study.diagnose import TIED, Contender, Diagnosis, odds
 from hil.study.measure import Gain, intervals, probabilities
 from hil.study.patterns import WORDS, Wrong
 from plant.effects.theta import THETA
@@ -60,13 +60,9 @@ def _verdict(found: Diagnosis, causes: list[dict[str, Any]]) -> str:
         best = listed[0]
         for other in listed[1:]:
             another = other.term.candidate.effect.name != best.term.candidate.effect.name
-            if another and _odds(other) - _odds(best) < _CERTAIN:
+            if another and odds(other) - odds(best) < _CERTAIN:
                 return "cannot_tell_apart"
     return "named"
-
-
-def _odds(contender: Contender) -> float:
-    return contender.cost - 2.0 * contender.evidence
 
 
 def _causes(found: Diagnosis) -> list[dict[str, Any]]:

@@ -49,7 +49,7 @@ class Contender:
     gained: float = 0.0
 
 
-def _odds(contender: Contender) -> float:
+def odds(contender: Contender) -> float:
     """Twice the negative log of the odds, the smaller the better."""
     return contender.cost - 2.0 * contender.evidence
 
@@ -176,17 +176,17 @@ class _Search:
             return None
         self.say(f"fitting {len(top)} leaders")
         fitted = [self._contender(model, item, noise) for item in top]
-        best = min(fitted, key=_odds)
+        best = min(fitted, key=odds)
         # what the noise model had taken for noise: estimated again with the best leader in place
         tighter = self.fitter.estimated(best.model, noise, 80)
         reference = min(self.fitter.fit(model, tighter, 3).cost, self.fitter.cost(model.residual, model.z, noise))
         fitted = [self._gained(self._again(c, tighter), item, reference) for c, item in zip(fitted, top, strict=True)]
-        clear = sorted((c for c in fitted if c.gained >= found.least_gain), key=_odds)
+        clear = sorted((c for c in fitted if c.gained >= found.least_gain), key=odds)
         if not clear:
             most = max(fitted, key=lambda c: c.gained)
             self.say(f"{most.term.candidate.name} gains {most.gained:.1f}, {found.least_gain:.1f} is asked")
             return None
-        better = min(fitted, key=_odds)
+        better = min(fitted, key=odds)
         least = found.least_gain
         standing = [c for c in clear if c is better or self._stands_beside(better, c, tighter, least)]
         if not standing:
@@ -195,13 +195,13 @@ class _Search:
         best = standing[0]
         polished = self.fitter.fit(best.model, tighter, 4, self.settings.relinearise)
         polished, tighter = self.fitter.settle(polished, tighter, 2, 60)
-        rest = sorted((c for c in fitted if c is not best and (c in clear or _odds(c) >= _odds(best))), key=_odds)
+        rest = sorted((c for c in fitted if c is not best and (c in clear or odds(c) >= odds(best))), key=odds)
         first = replace(best, model=polished, term=polished.terms[-1])
         return polished, tighter, [first, *rest]
 
     def _stands_beside(self, better: Contender, clear: Contender, noise: Noise, least: float) -> bool:
         """Whether a cause that is beyond doubt is so even when a better one, which is not, is let in as an error."""
-        if _odds(clear) - _odds(better) < TIED:
+        if odds(clear) - odds(better) < TIED:
             return True
         joint = self.fitter.at(better.model.z, (*better.model.terms, clear.term), noise)
         both = self.fitter.fit(joint, noise, 2, self.settings.relinearise)
@@ -254,4 +254,4 @@ def _independent(found: Sequence[Score]) -> int:
     return max(1, round(1.5 * len(names)))
 
 
-__all__ = ["ALPHA", "TIED", "Contender", "Diagnosis", "Settings", "diagnose", "score"]
+__all__ = ["ALPHA", "TIED", "Contender", "Diagnosis", "Settings", "diagnose", "odds", "score"]

@@ -55,12 +55,12 @@ def extended_scenario(name: str, extension: Path, folder: Path) -> Path:
 
 def _copy_tables(value: Any, source: Path | Traversable, folder: Path) -> None:
     """The CSV files that a scenario names, beside the new one."""
-    if isinstance(value, Mapping):
+    if isinstance(value, dict):
         name = value.get("csv")
         if isinstance(name, str):
             beside = source.parent if isinstance(source, Path) else Path(str(source)).parent
             (folder / Path(name).name).write_bytes((beside / name).read_bytes())
-            value["csv"] = Path(name).name  # type: ignore[index]
+            value["csv"] = Path(name).name
         for item in value.values():
             _copy_tables(item, source, folder)
     elif isinstance(value, list):

@@ -263,8 +263,8 @@ class Rig:
         return max(told, 0.0) * float(world.p[P.wheel_rolling_radius_m])
 
     def _drive(self, number: int, drive: Drive, world: World) -> Stack:
-        kept = self._kept is not None and _moves_alike(world, self._kept[0])
-        raw = self._kept[1][number] if self._kept is not None and kept else self._raw(drive, world)
+        kept = self._kept
+        raw = kept[1][number] if kept is not None and _moves_alike(world, kept[0]) else self._raw(drive, world)
         stack = sensed(raw, _along(world.theta, drive.log.direction), ROW_S)
         for group, values in stack.items():
             late = world.late_s[_NODE[group]] if group in _NODE else 0.0

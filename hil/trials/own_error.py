@@ -54,7 +54,7 @@ def ratios(gains: Gains) -> dict[str, dict[str, float]]:
 
 def as_toml(table: dict[str, dict[str, float]], count: int, seed: int) -> str:
     """The file's text."""
-    lines = [f"# {count} null cases, seed {seed}; regenerate: brakebench trials --own-error FILE", "[ratio]"]
+    lines = [f"# made by: brakebench trials --own-error FILE --count {count} --seed {seed}", "[ratio]"]
     for effect, numbers in table.items():
         lines.append(f"{effect} = {{ {', '.join(f'{name} = {value}' for name, value in numbers.items())} }}")
     return "\n".join(lines) + "\n"
