@@ -13,7 +13,9 @@ from hil.trials.run import run_case
 
 SEED = 7
 pytestmark = [pytest.mark.slow, pytest.mark.long, pytest.mark.timeout(1200)]
-ALARM = pytest.mark.xfail(reason="explain names iwm_gain (car) where nothing is hidden: what is asked is not calibrated")
+ALARM = pytest.mark.xfail(
+    reason="explain names iwm_gain (car) where nothing is hidden: what is asked is not calibrated"
+)
 MISSED = pytest.mark.xfail(reason="explain answers none at SNR 15: the model's own error takes most of the signal")
 SINGLES = [kind.name for kind in SEPARABLE]
 
