@@ -8,24 +8,34 @@ from typing import Any
 
 from hil.errors import BrakebenchError
 from hil.hide.case import Case
-from hil.hide.cases import draw
+from hil.hide.cases import draw, followed_by
 from hil.hide.files import read_answer, write
+from hil.study.answer import Answer
 from hil.study.diagnose import Settings
 from hil.study.explain import explain
+from hil.study.table import UnusableError
+from hil.trials import oracle
 
-SIZES = (3.0, 5.0, 8.0, 15.0)
-"""Signal-to-noise ratios of the family of single causes."""
+SIZES = (15.0, 8.0, 5.0, 3.0)
+"""Signal-to-noise ratios of the family of single causes, in the order they are run."""
+SURE = (15.0, 8.0)
+"""Those at which parameters, gain and calibration are scored."""
 Record = dict[str, Any]
 Say = Callable[[str], None]
 
 
 def plan(family: str, count: int) -> list[tuple[str, int, float | None]]:
-    """Cases of a family: which family they are drawn from, number, size."""
-    if family == "null":
-        return [("null", k, None) for k in range(count)]
+    """Cases of a family in the order they are run: which family they are drawn from, number, size.
+
+    ``single`` has ``count`` cases a size, effects in turn. ``parameters``, ``gain`` and ``calibration`` have ``count``
+    in all, half of them at each size of `SURE`, and share them with ``single``.
+    """
     if family == "single":
-        return [("single", k, size) for k in range(count) for size in SIZES]
-    return [("single", k, 8.0 if k % 2 else 15.0) for k in range(count)]  # parameters, gain
+        return [("single", k, size) for size in SIZES for k in range(count)]
+    if family in ("parameters", "gain", "calibration"):
+        halves = ((count + 1) // 2, count // 2)
+        return [("single", k, size) for size, half in zip(SURE, halves, strict=True) for k in range(half)]
+    return [(family, k, None) for k in range(count)]
 
 
 def run_family(
@@ -62,17 +72,44 @@ def _read(path: Path) -> list[Record]:
 
 
 def run_case(case: Case, seed: int, size: float | None, settings: Settings | None = None) -> Record:
-    """Hide, explain, open; ``seed`` is the trials', ``size`` the signal-to-noise ratio asked for."""
+    """Hide, explain, open; ``seed`` is the trials', ``size`` the signal-to-noise ratio asked for.
+
+    Where ``oracle`` is given, it is the held-out error of a model that knows what is hidden (`hil.trials.oracle`).
+    A confounded case has ``follow_up``: what is said of the manoeuvres that decide, by themselves.
+    """
     with TemporaryDirectory() as folder:
-        logs = Path(folder) / "logs"
-        write(case, logs)
-        found = explain(logs, logs / "vehicle.toml", out=Path(folder) / "out", settings=settings).json
-        truth = read_answer(logs)
-    return {
+        answered, said = _explained(case, Path(folder), settings)
+        truth = read_answer(Path(folder) / "logs")
+    record = {
         "family": case.family, "index": case.index, "seed": seed, "size": size,
         "snr": truth["snr"], "reached": truth["reached"], "noise": case.noise_level,
-        "hidden": truth["causes"], "verdict": found["verdict"],
-        "named": [cause["effect"] for cause in found["causes"]], "causes": found["causes"],
-        "rivals": [rival["effect"] for rival in found["rivals"]], "not_testable": found["not_testable"],
-        "gain": found["gain"],
+        "hidden": truth["causes"], **said,
+    }  # fmt: skip
+    if case.family == "single" and size in SURE and answered is not None:
+        record["oracle"] = oracle.told(answered.found, truth["causes"][0])
+    if case.family == "unlisted":
+        record["oracle"] = oracle.untouched(case)
+    if case.family == "confounded":
+        with TemporaryDirectory() as folder:
+            record["follow_up"] = _explained(followed_by(case), Path(folder), settings)[1]
+    return record
+
+
+def _explained(case: Case, folder: Path, settings: Settings | None) -> tuple[Answer | None, Record]:
+    """What `explain` says of the case's logs; data that nothing can be concluded from are an answer too."""
+    logs = folder / "logs"
+    write(case, logs)
+    try:
+        answered = explain(logs, logs / "vehicle.toml", out=folder / "out", settings=settings)
+    except UnusableError as error:
+        return None, {
+            "verdict": "unusable", "why": str(error), "named": [], "causes": [], "rivals": [], "not_testable": [],
+            "gain": {},
+        }  # fmt: skip
+    assert isinstance(answered, Answer)  # the hidden car's logs tell forces
+    found = answered.json
+    return answered, {
+        "verdict": found["verdict"], "named": [cause["effect"] for cause in found["causes"]],
+        "causes": found["causes"], "rivals": [rival["effect"] for rival in found["rivals"]],
+        "not_testable": found["not_testable"], "gain": found["gain"],
     }  # fmt: skip

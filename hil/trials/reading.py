@@ -1,0 +1,42 @@
+"""What a record says: which of the hidden causes were named, and whether one cause was claimed."""
+
+from hil.trials.metrics import Record
+from plant.effects.theta import THETA
+
+_LISTED = frozenset(effect.name for effect in THETA.effects)
+
+
+def hidden_names(record: Record) -> set[str]:
+    """Names of what was hidden."""
+    return {cause["effect"] for cause in record["hidden"]}
+
+
+def is_top(record: Record) -> bool:
+    """Whether the first named effect is the hidden one."""
+    return bool(record["named"]) and record["named"][0] == record["hidden"][0]["effect"]
+
+
+def is_found(record: Record) -> bool:
+    """Whether the hidden effect is among the named ones."""
+    return record["hidden"][0]["effect"] in record["named"]
+
+
+def in_set(record: Record) -> bool:
+    """Whether the hidden effect is among the named ones and their rivals."""
+    return record["hidden"][0]["effect"] in {*record["named"], *record["rivals"]}
+
+
+def claims(record: Record) -> bool:
+    """Whether a cause is claimed, not a set of which one may be true."""
+    return record["verdict"] in ("named", "unlisted")
+
+
+def right_joint(record: Record) -> bool:
+    """Whether the first cause acts where the hidden law does."""
+    return bool(record["causes"]) and record["causes"][0]["joint"] == record["hidden"][0]["joint"]
+
+
+def names_listed_elsewhere(record: Record) -> bool:
+    """Whether an effect of the list is claimed that does not act where the hidden law does."""
+    joint = record["hidden"][0]["joint"]
+    return claims(record) and any(c["effect"] in _LISTED and c["joint"] != joint for c in record["causes"])
