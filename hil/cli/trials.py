@@ -4,10 +4,10 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 from hil.cli.options import add_json, add_seed
-
-FAMILIES = ("null", "single", "parameters", "gain")
+from hil.trials import FAMILIES
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -17,11 +17,21 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="blind trials of explain: hide, explain, open the answer, score",
         description="Draws cases of a family from a car that shares no code with the plant, lets explain look at the "
         "logs alone, opens the sealed answer and scores it. Every finished case is appended to DIR/cases.jsonl; a "
-        "second run goes on where the first one ended.",
+        "second run goes on where the first one ended. DIR/table.json has the scores of all families run with this "
+        "seed, DIR/confusion.png what was named for what was hidden. A case takes about a minute.",
+        epilog="families: null, nothing hidden; single, one effect at signal-to-noise 15, 8, 5 and 3; two and three at "
+        "once; onset, one that begins in the middle; unlisted, a law in no list; confounded, straight stops that leave "
+        "the cause open, then the manoeuvres that decide; twin, a sensor against its physical twin; not_testable, what "
+        "the drive does not excite; parameters, gain and calibration score cases of single at 15 and 8 and run those "
+        "alone that single has not run yet.",
     )
-    parser.add_argument("--family", choices=FAMILIES, help="one family (default: all)")
+    parser.add_argument("--family", choices=FAMILIES, metavar="F", help="one of the families below (default: all)")
     parser.add_argument(
-        "--count", type=int, default=12, metavar="N", help="cases a family, single: a size (default: 12)"
+        "--count",
+        type=_positive,
+        default=12,
+        metavar="N",
+        help="cases of a family; of single: at each signal-to-noise ratio, effects in turn (default: 12)",
     )
     add_seed(parser)
     parser.add_argument(
@@ -30,36 +40,74 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         metavar="FILE",
         help="instead: measure the model's own error on N null cases into FILE",
     )
-    parser.add_argument("--out", type=Path, default=Path("trials"), metavar="DIR", help="where cases and table go")
+    parser.add_argument(
+        "--out", type=Path, default=Path("trials"), metavar="DIR", help="cases, table and figure (default: trials)"
+    )
     add_json(parser)
     parser.set_defaults(run=run)
 
 
+def _positive(text: str) -> int:
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"expected a whole number of cases, 1 or more, got {text!r}")
+    return int(text)
+
+
 def run(args: argparse.Namespace) -> int:
     """Run the trials and print the table."""
+    from hil.trials.confusion import draw
     from hil.trials.run import run_family
     from hil.trials.score import table_of
 
     if args.own_error is not None:
         from hil.trials.own_error import as_toml, measure, ratios
 
-        gains = measure(args.count, args.seed, lambda text: print(text, file=sys.stderr))
+        gains = measure(args.count, args.seed, _say)
         args.own_error.write_text(as_toml(ratios(gains), args.count, args.seed), encoding="utf-8")
         return 0
     families = FAMILIES if args.family is None else (args.family,)
-    result = {}
+    scored: dict[str, Any] = {}
+    singles: dict[tuple[int, float], Any] = {}
     for family in families:
-        records = run_family(family, args.count, args.seed, args.out, lambda text: print(text, file=sys.stderr))
-        result[family] = table_of(family, records)
-    content = {"seed": args.seed, "families": result}
-    (args.out / "table.json").write_text(json.dumps(content, indent=2), encoding="utf-8")
+        records = run_family(family, args.count, args.seed, args.out, _say)
+        scored[family] = table_of(family, records)
+        singles |= {(r["index"], r["size"]): r for r in records if r["family"] == "single"}
+        _keep(args.out / "table.json", args.seed, scored)
+    draw(list(singles.values()), args.out / "confusion.png")
     if args.json:
-        print(json.dumps(content, indent=2))
-        return 0
-    for family, entry in result.items():
-        print(f"{family}: {entry['n']} cases")
-        for name, m in entry["metrics"].items():
-            mark = "" if m["met"] is None else ("  met" if m["met"] else "  MISSED")
-            asked = "" if m["pass_mark"] is None else f"  asked {m['pass_mark']}"
-            print(f"  {name:<28} {m['value']:.3f}  [{m['low']:.3f}, {m['high']:.3f}]{asked}{mark}")
+        print(json.dumps({"seed": args.seed, "families": scored}, indent=2))
+    else:
+        for family, entry in scored.items():
+            print("\n".join(_lines(family, entry)))
     return 0
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr)
+
+
+def _keep(path: Path, seed: int, scored: dict[str, Any]) -> None:
+    """Write the scores beside those of other families with the same seed."""
+    before: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    others = before["families"] if before.get("seed") == seed else {}
+    found = {**others, **scored}
+    content = {"seed": seed, "families": {name: found[name] for name in FAMILIES if name in found}}
+    path.write_text(json.dumps(content, indent=2), encoding="utf-8")
+
+
+def _lines(family: str, entry: dict[str, Any]) -> list[str]:
+    """The table of a family as text."""
+    lines = [f"{family}: {entry['n']} cases"]
+    for name, m in entry["metrics"].items():
+        if m["value"] is None:
+            lines.append(f"  {name:<28}     -  no case tells")
+            continue
+        mark = "" if m["met"] is None else ("  met" if m["met"] else "  MISSED")
+        asked = "" if m["pass_mark"] is None else f"  asked {m['pass_mark']}"
+        lines.append(f"  {name:<28} {m['value']:.3f}  [{m['low']:.3f}, {m['high']:.3f}]{asked}{mark}")
+    limits = entry.get("detection_limits", {})
+    by_limit = {limit: [name for name, own in limits.items() if own == limit] for limit in set(limits.values())}
+    for limit in sorted(by_limit, key=lambda value: float("inf") if value is None else value):
+        words = "never named" if limit is None else f"named from {limit:g}"
+        lines.append(f"  {words:<28} {', '.join(by_limit[limit])}")
+    return lines

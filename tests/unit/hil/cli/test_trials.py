@@ -1,0 +1,71 @@
+"""``brakebench trials`` from its words to its files, on cases that are on file already."""
+
+import argparse
+import json
+
+import pytest
+
+from hil.cli import trials
+from hil.trials.run import plan
+
+
+def run(*words):
+    parser = argparse.ArgumentParser()
+    trials.add_parser(parser.add_subparsers())
+    args = parser.parse_args(["trials", *map(str, words)])
+    return args.run(args)
+
+
+def keep(folder, *families, count=2):
+    """Cases on file, every cause found at 15 and 8."""
+    records = {}
+    for family in families:
+        for drawn, index, size in plan(family, count):
+            named = ["road_grade"] if (size or 0.0) >= 8.0 else []
+            records[drawn, index, size] = {
+                "family": drawn, "index": index, "size": size, "seed": 1, "reached": True, "noise": "low",
+                "hidden": [{"effect": "road_grade", "wheel": "car", "parameters": {"grade": {"value": 0.01}}}],
+                "verdict": "named" if named else "none", "named": named, "rivals": [], "not_testable": [], "gain": {},
+                "causes": [{"effect": e, "parameters": {}, "wheel": "car", "probability": 0.9} for e in named],
+            }  # fmt: skip
+    lines = "".join(json.dumps(record) + "\n" for record in records.values())
+    (folder / "cases.jsonl").write_text(lines, encoding="utf-8")
+
+
+def test_json_stands_alone_and_files_are_written(tmp_path, capsys):
+    keep(tmp_path, "single")
+    assert run("--family", "single", "--count", 2, "--out", tmp_path, "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["seed"] == 1
+    single = told["families"]["single"]
+    assert single["n"] == 8
+    assert single["metrics"]["top1_snr8"]["value"] == 1.0
+    assert single["detection_limits"] == {"road_grade": 8.0}
+    assert json.loads((tmp_path / "table.json").read_text()) == told
+    assert (tmp_path / "confusion.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_families_run_one_by_one_share_a_table(tmp_path, capsys):
+    keep(tmp_path, "null", "single", count=3)
+    run("--family", "calibration", "--count", 2, "--out", tmp_path)
+    run("--family", "null", "--count", 3, "--out", tmp_path)
+    table = json.loads((tmp_path / "table.json").read_text())
+    assert list(table["families"]) == ["null", "calibration"]
+    assert table["families"]["null"]["n"] == 3
+
+
+def test_the_text_says_what_was_asked_and_what_was_missed(tmp_path, capsys):
+    keep(tmp_path, "single")
+    run("--family", "single", "--count", 2, "--out", tmp_path)
+    text = capsys.readouterr().out
+    assert "top1_snr15                   1.000  [0.342, 1.000]  asked 0.97  met" in text
+    assert "named from 8                 road_grade" in text
+    run("--family", "gain", "--count", 2, "--out", tmp_path)
+    assert "no case tells" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("count", ["0", "-3", "many"])
+def test_a_count_of_no_cases_is_refused(count, capsys):
+    with pytest.raises(SystemExit):
+        run("--count", count)
+    assert "expected a whole number of cases, 1 or more" in capsys.readouterr().err
