@@ -14,7 +14,14 @@ from plant.effects.plugin import NO_PLUGINS
 from plant.effects.theta import THETA
 from plant.equations import derivative
 from plant.friction import mu_equilibrium
-from plant.integrate import SEMI_IMPLICIT, WORK_SHAPE, runge_kutta_step, semi_implicit_step
+from plant.integrate import (
+    EXPONENTIAL_4,
+    SEMI_IMPLICIT,
+    WORK_SHAPE,
+    exponential_step,
+    runge_kutta_step,
+    semi_implicit_step,
+)
 from plant.layout import flatten
 from plant.parameters.plant import PlantParameters
 from plant.road import DRY, road_table
@@ -133,6 +140,8 @@ def simulate(
                 angles[i] = x[X.wheel_angle_rad + i]
             if method == SEMI_IMPLICIT:
                 semi_implicit_step(x, now, cut, switch, q, road, step_s, y)
+            elif method == EXPONENTIAL_4:
+                exponential_step(x, now, cut, switch, q, road, step_s, work, y)
             else:
                 runge_kutta_step(x, now, cut, switch, q, road, step_s, work, y)
             x[X.time_s] += step_s

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant.integrate import RUNGE_KUTTA_4
+from plant.integrate import EXPONENTIAL_4, RUNGE_KUTTA_4, SEMI_IMPLICIT
 from plant.model import NEUTRAL, advance, column_indices, compile_model, healthy, initial_state, pack, replay, simulate
 from plant.road import DRY, RoadSegment, road_table
 from plant.vectors import CUT, INPUT, OUTPUT, STATE, SWITCH, U, X, Y
@@ -106,11 +106,29 @@ def test_unknown_columns_are_named():
         column_indices(["speed_mps", "spede_mps"])
 
 
-@pytest.mark.parametrize("method", [0, RUNGE_KUTTA_4])
+@pytest.mark.parametrize("method", [SEMI_IMPLICIT, RUNGE_KUTTA_4, EXPONENTIAL_4])
 def test_a_straight_stop_stays_straight(stop, method):
     start, inputs, p = stop
     table = replay(start, inputs, p, ["lateral_speed_mps", "yaw_rate_rad_s", "y_m"], method=method)[0]
     assert np.abs(table).max() < 1e-9
+
+
+def test_long_exponential_steps_beat_short_simple_ones(stop):
+    """Demands without edges: twice the step of the semi-implicit method, a fifth of its error and less."""
+    start, inputs, p = stop
+    wave = 1.0 - np.cos(np.arange(ROWS) * 0.01 * 2.0 * math.pi)[:, None]
+    smooth = inputs.copy()
+    smooth[:, INPUT.slice("pressure_demand_pa")] = 8e5 * wave
+    smooth[:, INPUT.slice("motor_demand_nm")] = -60.0 * wave
+    columns = ["state.speed_mps", "state.wheel_speed_rad_s_fl", "state.pressure_pa_fl", "state.imu_longitudinal_mps2"]
+
+    def driven(method, steps):
+        return replay(start, smooth, p, columns, steps=steps, step_s=0.01 / steps, method=method)[0]
+
+    exact = driven(RUNGE_KUTTA_4, 20)
+    long_steps = np.sqrt(((driven(EXPONENTIAL_4, 2) - exact) ** 2).mean(axis=0))
+    short_steps = np.sqrt(((driven(SEMI_IMPLICIT, 4) - exact) ** 2).mean(axis=0))
+    assert (long_steps < 0.2 * short_steps).all(), (long_steps, short_steps)
 
 
 def test_left_and_right_bends_mirror_each_other(stop):
@@ -189,10 +207,10 @@ def test_nothing_goes_wild_far_from_the_road(paper_car):
     inputs[:, U.steering_wheel_rad] = 8.0
     start = initial_state(paper_car, 60.0, 423.15, 0.7)
     road = road_table((RoadSegment(-1e9, 0.3, 0.05), RoadSegment(200.0, 1.0, 0.6, 0.1)))
-    for method in (0, RUNGE_KUTTA_4):
+    for method, steps in ((SEMI_IMPLICIT, 10), (RUNGE_KUTTA_4, 10), (EXPONENTIAL_4, 2)):
         x, y = start.copy(), OUTPUT.zeros()
         for row in inputs:
-            advance(x, row, CUT.zeros(), healthy(), pack(paper_car), road, y, 10, 1e-3, method)
+            advance(x, row, CUT.zeros(), healthy(), pack(paper_car), road, y, steps, 0.01 / steps, method)
             assert np.isfinite(x).all()
             assert np.isfinite(y).all()
         assert math.hypot(x[X.speed_mps], x[X.lateral_speed_mps]) < 40.0
