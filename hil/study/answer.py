@@ -1,13 +1,20 @@
 """The answer as one plain object: verdict, causes, rivals, what to drive, what was wrong, what is gained."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from hil.study.decide import decide_with, write
 from hil.study.diagnose import TIED, Contender, Diagnosis, odds
+from hil.study.fit import Term
+from hil.study.linear import project
 from hil.study.measure import Gain, intervals, probabilities
 from hil.study.patterns import WORDS, Wrong
-from plant.effects.theta import THETA
+from hil.study.tied import Tied, tied_set
 
+_MOST_TIED = 5
 _CERTAIN = 4.6
 """Difference in chi2 (ten to one) below which a cause of another name is not told apart."""
 
@@ -23,19 +30,22 @@ class Answer:
 
 
 def answer(
-    found: Diagnosis, gains: list[Gain], wrongs: list[Wrong], extension: str | None, remarks: list[str]
-) -> Answer:
-    """Put the answer together."""
-    causes = _causes(found)
-    rivals = [_rival(c, p) for _, c, p in _rivals(found)]
-    verdict = _verdict(found, causes)
-    tied = [c["effect"] for c in (*causes, *rivals)]
+    found: Diagnosis, gains: list[Gain], wrongs: list[Wrong], extension: str | None, remarks: list[str],
+    out: Path | None = None,
+) -> Answer:  # fmt: skip
+    """Put the answer together; manoeuvres to drive next are written into ``out``."""
+    causes, tied = _causes(found), _tied(found)
+    fitted = _rivals(found)
+    rivals = [_rival(c, p) for _, c, p in fitted]
+    known = {c["effect"] for c in (*causes, *rivals)}
+    rivals += [entry for entry in _imitations(found, tied) if entry["effect"] not in known]
+    verdict = _verdict(found, causes, tied)
     content = {
         "verdict": verdict,
         "causes": causes,
         "rivals": rivals,
         "not_testable": found.untestable,
-        "decide_with": _decide_with(tied) if verdict == "cannot_tell_apart" else [],
+        "decide_with": _decide_with(found, tied, fitted, out) if verdict == "cannot_tell_apart" else [],
         "wrong": [
             {"channel": w.channel, "rms": w.rms, "noise": w.noise, "unit": w.unit, "pattern": w.pattern} for w in wrongs
         ],
@@ -53,9 +63,11 @@ def answer(
     return Answer(content, found, gains, wrongs)
 
 
-def _verdict(found: Diagnosis, causes: list[dict[str, Any]]) -> str:
+def _verdict(found: Diagnosis, causes: list[dict[str, Any]], tied: Tied | None) -> str:
     if not causes:
         return "none"
+    if tied is not None and tied.indices:
+        return "cannot_tell_apart"
     for listed in found.contenders:
         best = listed[0]
         for other in listed[1:]:
@@ -116,7 +128,41 @@ def _rival(contender: Contender, chance: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _decide_with(tied: list[str]) -> list[str]:
-    """Manoeuvres that show the tied effects, most wanted first."""
-    wanted = [THETA.effect(name).manoeuvre for name in dict.fromkeys(tied)]
-    return sorted(dict.fromkeys(wanted), key=lambda m: -wanted.count(m))
+def _tied(found: Diagnosis) -> Tied | None:
+    """What imitates the first cause within the noise, from the joint information of the data."""
+    if not found.final.terms or found.sums is None:
+        return None
+    term, listed = found.final.terms[0], [score.candidate for score in found.screened]
+    projected = project(found.sums.total(), found.sums.nuisances, (), found.base.z)
+    return tied_set(projected.q, listed, listed.index(term.candidate), term.value)
+
+
+def _imitations(found: Diagnosis, tied: Tied | None) -> list[dict[str, Any]]:
+    """Tied causes as rivals, with the values that imitate, one entry an effect."""
+    if tied is None:
+        return []
+    together = dict(zip(tied.members, tied.values, strict=True))
+    apart = {**dict.fromkeys(tied.members, tied.apart), **dict(tied.pairs)}
+    entries: dict[str, dict[str, Any]] = {}
+    for index in tied.indices:
+        score = found.screened[index]
+        value = together.get(index, score.value)
+        contender = Contender(Term(score.candidate, value), found.base, 0.0, 0.0, score.information)
+        odds_against = float(np.exp(-0.5 * apart[index] ** 2))
+        entries.setdefault(score.candidate.effect.name, _rival(contender, odds_against / (1.0 + odds_against)))
+    return list(entries.values())
+
+
+def _decide_with(
+    found: Diagnosis, tied: Tied | None, fitted: list[tuple[int, Contender, float]], out: Path | None
+) -> list[dict[str, Any]]:
+    """Scenarios that tell the tied causes apart, the best first."""
+    names = [term.candidate.name for term in found.final.terms[:1]]
+    names += [contender.term.candidate.name for _, contender, _ in fitted]
+    names += [found.screened[k].candidate.name for k in (() if tied is None else tied.indices)]
+    unique = {name.split("@")[0].split(".")[0]: name for name in reversed(names)}  # the first of each effect
+    if len(unique) < 2:
+        return []
+    advice = decide_with(list(unique.values())[::-1][:_MOST_TIED])
+    paths = write(advice, out) if out is not None else [None] * len(advice)
+    return [one.as_json(path) for one, path in zip(advice, paths, strict=True)]

@@ -1,6 +1,6 @@
 """What may be wrong: every listed effect, each of its numbers, at each place where it can act."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 from hil.study.table import Floats
@@ -9,6 +9,8 @@ from plant.effects.effect import NODES, Effect, Parameter, Scope
 from plant.effects.theta import THETA
 
 _SHARE = 0.05
+_SHARES = {"sus_compliance": 0.5}
+"""Of what is usual, for a finite difference; stiffer hubs would swing too fast for the replay's steps."""
 _GROUPS: Mapping[Scope, Mapping[str, tuple[int, ...]]] = {
     Scope.CAR: {"car": (0,)},
     Scope.AXLE: {"car": (0, 1), "front": (0,), "rear": (1,)},
@@ -36,7 +38,8 @@ class Column:
     @property
     def step(self) -> float:
         """A small share of what is met on real cars, on the side that is allowed: many effects show long before."""
-        return self.parameter.typical * _SHARE if self.parameter.typical else 0.3 * _SHARE * self.parameter.high
+        share = _SHARES.get(self.effect.name, _SHARE)
+        return self.parameter.typical * share if self.parameter.typical else 0.3 * share * self.parameter.high
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,22 +71,24 @@ class Candidate:
         return replace(world, theta=theta)
 
 
-def columns() -> list[Column]:
-    """Every strength of every effect at every member."""
+def columns(without: Collection[str] = ()) -> list[Column]:
+    """Every strength of every effect at every member, but for the effects ``without``."""
     found = []
     for effect in THETA.effects:
+        if effect.name in without:
+            continue
         for parameter in effect.strengths:
             found += [Column(effect, parameter, member) for member in range(parameter.size(effect.scope))]
     return found
 
 
 def candidates(of: list[Column]) -> list[Candidate]:
-    """All places of all strengths."""
+    """All places of all strengths that have columns."""
     index: Mapping[tuple[str, str, int], int] = {
         (column.effect.name, column.parameter.name, column.member): k for k, column in enumerate(of)
     }
     found = []
-    for effect in THETA.effects:
+    for effect in dict.fromkeys(column.effect for column in of):
         groups = _GROUPS[effect.scope]
         for parameter in effect.strengths:
             for place, members in groups.items():

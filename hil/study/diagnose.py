@@ -22,6 +22,9 @@ MOST_CAUSES = 3
 LEADERS = 6
 _OF_SCREEN = 1.5
 TIED = 9.2
+_TURNS, _ANEW, _SETTLED = 7, (0, 1, 3), 3.0
+_COARSE, _FINE = 0.5, 3.0
+"""Finite differences of the vehicle's numbers: in standard deviations of what is known before, and of what data say."""
 
 
 @dataclass(frozen=True)
@@ -93,10 +96,10 @@ class _Search:
         self.frame = Frame.of(self.rig.case)
         self.nuisances = (*vehicle.nuisances, *start_nuisances())
         self.base_world = base
-        self.columns: list[Column] = columns()
+        self.columns: list[Column] = columns(vehicle.untold)
         self.candidates: list[Candidate] = candidates(self.columns)
         self.fitter: Fitter
-        self.now: Floats = np.zeros(0)
+        self.steps: Floats = np.full(len(self.nuisances), _COARSE)
 
     def run(self) -> Diagnosis:
         """All of it."""
@@ -104,19 +107,14 @@ class _Search:
         self._nuisance_columns(np.zeros(len(self.nuisances)))
         nominal, noise = self.fitter.start(self.settings.noise_model)
         self.say("noise, and the vehicle's numbers within their tolerance")
-        model = self.fitter.fit(nominal, noise, 1)
-        model, noise = self.fitter.settle(model, noise, 1, 60)
-        if self.settings.relinearise and np.abs(model.z).max() > 1.5:
-            self._nuisance_columns(model.z)
-        model, noise = self.fitter.settle(model, noise, 1, 100)
-        model = self.fitter.fit(model, noise, 4)
+        model, noise = self._vehicle(nominal, noise)
         self.say(f"sensitivities of {len(self.candidates)} candidates")
         effect_columns = self._effect_columns(model)
         found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, noise, noise, nominal, model, model)
         sums = self.fitter.screen(model, effect_columns, noise)
         found.sums = sums
         found.screened = self._scores(sums, model)
-        found.untestable = not_testable(found.screened)
+        found.untestable = sorted({*not_testable(found.screened), *self.rig.vehicle.untold})
         found.looks = _independent(found.screened)
         found.least_gain = threshold(found.looks, self.settings.alpha) * inflation(found.screened)
         while len(model.terms) < self.settings.most_causes:
@@ -133,15 +131,32 @@ class _Search:
             self._backward(found)
         return found
 
+    def _vehicle(self, nominal: Model, noise: Noise) -> tuple[Model, Noise]:
+        """The vehicle's numbers and the noise in turn, with sensitivities taken anew until neither moves.
+
+        What the numbers have not explained yet counts as noise, so the first steps are forgiving.
+        """
+        model, cost = nominal, np.inf
+        for turn in range(_TURNS):
+            noise = self.fitter.estimated(model, noise, 60)
+            model = self.fitter.fit(model, noise, 4)
+            if turn >= 2 and cost - model.cost < _SETTLED:
+                break
+            cost = model.cost
+            if self.settings.relinearise and turn in _ANEW:
+                information = np.diag(self.fitter.products(noise))
+                self.steps = np.clip(_FINE / np.sqrt(np.maximum(information, 1e-9)), 0.03, _COARSE)
+                self._nuisance_columns(model.z)
+        return model, noise
+
     def _nuisance_columns(self, z: Floats) -> None:
         world = self.base_world.shifted(self.nuisances, z)
-        base, step = self.rig.run(world), 0.5
-        worlds = []
-        for k in range(len(self.nuisances)):
+        base, worlds = self.rig.run(world), []
+        for k, step in enumerate(self.steps):
             moved = z.copy()
             moved[k] += step
             worlds.append(self.base_world.shifted(self.nuisances, moved))
-        tracks = track_columns(self.rig, self.frame, base, worlds, [step] * len(worlds))
+        tracks = track_columns(self.rig, self.frame, base, worlds, self.steps.tolist())
         self.fitter = Fitter(self.rig, self.frame, self.base_world, self.nuisances, tracks)
 
     def _effect_columns(self, model: Model) -> Tracks:

@@ -14,6 +14,7 @@ from hil.study.world import Rig, Stack, World
 
 Tracks = dict[str, Floats]
 _LARGEST_STEP, _FARTHEST = 8.0, 8.0
+_DAMPING = (0.0, 0.1, 1.0, 10.0)
 _DIVERGED = 1e15
 
 
@@ -116,12 +117,13 @@ class Fitter:
 
     def _step(self, model: Model, own: Tracks, noise: Noise) -> Model | None:
         count = len(self.nuisances)
-        change, covariance = solve(self._total(model, own, noise), count, range(len(model.terms)), model.z)
-        for share in (1.0, 0.4, 0.1):
-            dz = np.clip(change[:count] * share, -_LARGEST_STEP, _LARGEST_STEP)
+        total = self._total(model, own, noise)
+        for damping in _DAMPING:
+            change, covariance = solve(total, count, range(len(model.terms)), model.z, damping)
+            dz = np.clip(change[:count], -_LARGEST_STEP, _LARGEST_STEP)
             z = np.clip(model.z + dz, -_FARTHEST, _FARTHEST)
             terms = tuple(
-                Term(term.candidate, _bounded(term.candidate, term.value + share * float(step)))
+                Term(term.candidate, _bounded(term.candidate, term.value + float(step)))
                 for term, step in zip(model.terms, change[count:], strict=True)
             )
             moved = self.at(z, terms, noise)
@@ -129,13 +131,18 @@ class Fitter:
                 return replace(moved, covariance=covariance)
         return replace(model, covariance=covariance) if model.terms and not model.covariance.size else None
 
-    def _total(self, model: Model, own: Tracks, noise: Noise) -> Floats:
-        """Products of [residual, nuisances, own columns], the nuisances' from memory."""
+    def products(self, noise: Noise) -> Floats:
+        """Information of the nuisances, (nuisances, nuisances)."""
         if self._white_for is not noise:
             white, _ = whiten({k: v.astype(np.float64) for k, v in self.nuisance_columns.items()}, self.frame, noise)
             self._white = np.concatenate([white[name] for name in self.frame.names]).astype(np.float32)
             self._products = np.asarray(self._white.T @ self._white, np.float64)
             self._white_for = noise
+        return self._products
+
+    def _total(self, model: Model, own: Tracks, noise: Noise) -> Floats:
+        """Products of [residual, nuisances, own columns], the nuisances' from memory."""
+        products = self.products(noise)
         joined = {
             name: np.hstack([values, own[name].astype(np.float64)]) if own else values
             for name, values in model.residual.items()
@@ -146,7 +153,7 @@ class Fitter:
         count, width = len(self.nuisances), outer.shape[1]
         total = np.empty((count + width, count + width))
         at = [0, *range(1 + count, count + width)]
-        total[1 : 1 + count, 1 : 1 + count] = self._products
+        total[1 : 1 + count, 1 : 1 + count] = products
         cross = np.asarray(self._white.T @ outer.astype(np.float32), np.float64)
         total[np.ix_(range(1, 1 + count), at)] = cross
         total[np.ix_(at, range(1, 1 + count))] = cross.T

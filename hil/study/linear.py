@@ -101,8 +101,11 @@ def project(total: Floats, nuisances: int, free: Sequence[int] = (), z: Floats |
     return Projected(np.asarray(left[0, keep:]), np.asarray(left[keep:, keep:]), float(left[0, 0]) + prior)
 
 
-def solve(total: Floats, nuisances: int, free: Sequence[int], z: Floats) -> tuple[Floats, Floats]:
-    """Steps of the nuisances and of the columns ``free``, and the covariance of the latter."""
+def solve(total: Floats, nuisances: int, free: Sequence[int], z: Floats, damping: float = 0.0) -> tuple[Floats, Floats]:
+    """Steps of the nuisances and of the columns ``free``, and the covariance of the latter.
+
+    ``damping`` shortens the step in proportion to each number's own information (Marquardt 1963).
+    """
     taken = [1 + k for k in range(nuisances)] + [1 + nuisances + k for k in free]
     a = total[np.ix_(taken, taken)].copy()
     right = total[taken, 0].copy()
@@ -110,4 +113,8 @@ def solve(total: Floats, nuisances: int, free: Sequence[int], z: Floats) -> tupl
     right[:nuisances] -= z
     a[range(len(a)), range(len(a))] += 1e-9 * (1.0 + np.diag(a))
     inverse = np.linalg.inv(a)
-    return np.asarray(inverse @ right), np.asarray(inverse[nuisances:, nuisances:])
+    covariance = np.asarray(inverse[nuisances:, nuisances:])
+    if damping > 0.0:
+        a[range(len(a)), range(len(a))] *= 1.0 + damping
+        return np.linalg.solve(a, right), covariance
+    return np.asarray(inverse @ right), covariance

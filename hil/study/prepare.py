@@ -1,7 +1,7 @@
 """Logs into what the plant replays: inputs on a 10 ms grid, cut points, segments, and the tracks to compare."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -23,6 +23,7 @@ SLOW_MPS = 2.0  # below, wheel sensors and the contact's low-speed terms say lit
 SETTLE_S = 1.0
 SHORTEST_S, LONGEST_S = 8.0, 25.0
 _RELEASED_PA, _RELEASED_NM = 1e5, 20.0
+_CONTRADICTED = 0.8
 _TRACK = {
     "wheel": WHEEL_SPEED, "pressure": PRESSURE, "motor": MOTOR_TORQUE,
     "ax": ("ax_mps2",), "ay": ("ay_mps2",), "yaw": ("yaw_rate_rad_s",), "gps": ("speed_mps",),
@@ -104,6 +105,7 @@ def prepare(logs: Sequence[Log], radius_m: float) -> Case:
     UnusableError
         Nothing that moves or nothing that drives the brakes is measured.
     """
+    logs = _without_contradicted(logs)
     there = set.intersection(*(set(log.channels) for log in logs))
     if not (set(WHEEL_SPEED) & there or "speed_mps" in there):
         raise UnusableError("neither wheel speeds nor a speed in every log; nothing says how the car moved")
@@ -133,6 +135,36 @@ def prepare(logs: Sequence[Log], radius_m: float) -> Case:
     if moving < 4.0:
         raise UnusableError(f"the car moves for {moving:.1f} s in all; expected 4 s or more above {SLOW_MPS:g} m/s")
     return Case(drives, cut, tuple(groups), stride * ROW_S, tuple(_costs(there)))
+
+
+def _without_contradicted(logs: Sequence[Log]) -> Sequence[Log]:
+    """Logs without the demands that any of them contradicts: brakes or motors that act for long with nothing asked.
+
+    Who sent what acted is then not in the log, and its demands would accuse the actuators.
+    """
+    dropped: set[str] = set()
+    for demands, measured, none, much in (
+        (PRESSURE_DEMAND, PRESSURE, _RELEASED_PA, 5.0 * _RELEASED_PA),
+        (MOTOR_DEMAND, MOTOR_TORQUE, _RELEASED_NM, 5.0 * _RELEASED_NM),
+    ):
+        for log in logs:
+            if log.has(*demands, *measured):
+                asked = np.max([np.abs(log.channels[name]) for name in demands], axis=0)
+                given = np.max([np.abs(log.channels[name]) for name in measured], axis=0)
+                acting = given > much
+                if acting.any() and (asked[acting] < none).mean() > _CONTRADICTED:
+                    dropped |= set(demands)
+    if not dropped:
+        return logs
+    remark = "demands left out: the brakes or motors act while nothing is asked of them"
+    return [
+        replace(
+            log,
+            channels={name: values for name, values in log.channels.items() if name not in dropped},
+            remarks=(*log.remarks, remark),
+        )
+        for log in logs
+    ]
 
 
 def _costs(there: set[str]) -> list[str]:

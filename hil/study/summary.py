@@ -1,6 +1,7 @@
 """The report of a diagnosis: measured against simulated, what is left over, who was in the race, what it gains."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -266,5 +267,5 @@ def _limits(answer: Answer) -> Section:
     rows += [("missing channel", text) for text in content["missing"]]
     rows += [("remark", text) for text in content["remarks"]]
     if content["decide_with"]:
-        rows.append(("drive this instead", ", ".join(content["decide_with"])))
+        rows.append(("drive this instead", ", ".join(Path(one["scenario"]).stem for one in content["decide_with"])))
     return Section("What these data cannot show", tables=(Table("Limits", ("what", "which"), tuple(rows)),))

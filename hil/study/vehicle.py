@@ -11,7 +11,7 @@ import numpy as np
 
 from hil.parameters import load_set, override
 from hil.study.table import Floats, UnusableError
-from hil.study.vehicle_keys import ALIASES, DERIVED, SPECIAL, WIDE
+from hil.study.vehicle_keys import ALIASES, DERIVED, OF_SECTION, SPECIAL, UNLIMITED, WIDE
 from plant.friction import mu_equilibrium
 from plant.layout import Layout
 from plant.model import pack
@@ -57,6 +57,7 @@ class Vehicle:
     nuisances : what may be off, by tolerance.
     pad_temperature_matters : False where the brake has one gain and no friction model.
     remarks : unknown keys and defaults taken, for the report.
+    untold : effects on what the set says nothing of, so that no deviation can be told.
     """
 
     parameters: PlantParameters
@@ -64,6 +65,7 @@ class Vehicle:
     nuisances: tuple[Nuisance, ...]
     pad_temperature_matters: bool
     remarks: tuple[str, ...] = ()
+    untold: tuple[str, ...] = ()
 
 
 def paper_car() -> Vehicle:
@@ -128,6 +130,13 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
     source = resources.files("plant") / "parameters" / "paper_car.toml"
     shipped = _tolerances(tomllib.loads(source.read_text(encoding="utf-8")))
     changes, gains = _changes(numbers, base, where)
+    unlimited = [section for section in UNLIMITED if section not in changes]
+    for section in unlimited:
+        changes[section] = dict(UNLIMITED[section])
+        for name in UNLIMITED[section]:
+            shipped.pop(f"{section}_{name}", None)
+    if unlimited:
+        remarks.append(f"{where}: nothing said of {', '.join(unlimited)}, so no limits of theirs are simulated")
     parameters = override(base, changes, where)
     friction = any(name.startswith("pad_") for name in numbers)
     if gains and not friction:
@@ -150,7 +159,8 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
     if missing:
         remarks.append(f"{where}: not given, so a usual value with wide uncertainty: {', '.join(missing)}")
     tolerance |= {n: max(t, shipped.get(n, 0.0)) if n.startswith("suspension") else t for n, t in tolerances.items()}
-    return _vehicle(parameters, tolerance, friction or not gains, tuple(remarks))
+    untold = tuple(effect for section in unlimited for effect in OF_SECTION[section])
+    return replace(_vehicle(parameters, tolerance, friction or not gains, tuple(remarks)), untold=untold)
 
 
 def _derive(
@@ -261,7 +271,8 @@ def _nuisances(p: Floats, tolerance: Mapping[str, float], layout: Layout) -> lis
         "vehicle_mass_kg", "vehicle_cog_height_m", "vehicle_drag_coefficient", "vehicle_rolling_resistance",
         "wheel_rolling_radius_m", "wheel_inertia_kg_m2", "tyre_lkx", "tyre_lsgkp", "ehb_natural_frequency_hz",
         "ehb_damping_ratio", "ehb_dead_time_s", "ehb_build_rate_pa_s", "ehb_release_rate_pa_s",
-        "tyre_lmux", "friction_brake_threshold_pressure_pa", "motor_time_constant_s", "motor_peak_torque_nm",
+        "tyre_lmux", "friction_brake_threshold_pressure_pa", "motor_time_constant_s",
+        "motor_rate_limit_nm_s", "motor_peak_torque_nm",
         "motor_fade_end_mps", "motor_fade_start_mps", "battery_charge_power_w", "sensor_imu_cutoff_hz",
         "tyre_lky", "vehicle_yaw_inertia_kg_m2", "vehicle_steering_ratio",
     ):  # fmt: skip

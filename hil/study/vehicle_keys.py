@@ -79,5 +79,32 @@ WIDE: Final = {
     "vehicle_yaw_inertia_kg_m2": 0.3,
     "tyre_lky": 0.4,
     "friction_brake_threshold_pressure_pa": 1.0,
+    "ehb_natural_frequency_hz": 0.8,
+    "ehb_damping_ratio": 0.8,
+    "ehb_dead_time_s": 1.0,
+    "motor_time_constant_s": 0.8,
+    "sensor_imu_cutoff_hz": 1.0,
+    "tyre_lsgkp": 0.6,
+    "suspension_ride_rate_n_m": 2.0,
+    "suspension_damping_ns_m": 1.0,
 }
 """Half width as a share of the usual value, where a set does not say."""
+
+UNLIMITED: Final = {
+    "ehb": {"build_rate_pa_s": 5e8, "release_rate_pa_s": 5e8},
+    "motor": {
+        "peak_torque_nm": 5e3, "peak_power_w": 5e5, "rate_limit_nm_s": 1e6, "fade_end_mps": 0.0, "fade_start_mps": 0.1,
+    },
+    "battery": {"charge_power_w": 1e6, "discharge_power_w": 1e6},
+}  # fmt: skip
+"""Limits that do not act, for a section of which a set says nothing: another car's limits would be wrong."""
+
+OF_SECTION: Final = {
+    "ehb": (
+        "ehb_dead_time", "ehb_bandwidth", "ehb_rate_limit", "ehb_deadband", "fluid_temp", "accumulator", "air_in_line",
+        "blend_sync",
+    ),
+    "motor": ("motor_tau", "regen_fadeout", "iwm_derating", "iwm_field", "cogging", "current_torque"),
+    "battery": ("battery_soc",),
+}  # fmt: skip
+"""Effects that change what a section states: where it states nothing, nothing can be told from it."""

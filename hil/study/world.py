@@ -14,15 +14,13 @@ from hil.study.vehicle import Nuisance, Vehicle, rest_friction
 from plant.effects.bank import NO_TERMS
 from plant.effects.plugin import NO_PLUGINS
 from plant.effects.theta import THETA
-from plant.integrate import SEMI_IMPLICIT
+from plant.integrate import EXPONENTIAL_4
 from plant.model import column_indices, healthy, initial_state, simulate
 from plant.road import DRY, road_table
 from plant.vectors import INPUT, OUTPUT, STATE, P, X
 
-STEPS, FINE_STEPS = 4, 8
+STEPS = 2
 WORKERS = 2
-_STIFF = (("sus_compliance", "compliance_m_n"),)
-"""What swings so fast that it wants finer steps."""
 DISC_K = 350.0
 _SUFFIX = ("fl", "fr", "rl", "rr")
 _SOURCE = {
@@ -88,6 +86,13 @@ def _within(now: float, wanted: float) -> float:
 def nominal(vehicle: Vehicle) -> World:
     """The car as handed in."""
     return World(vehicle.p, THETA.neutral())
+
+
+def _radius_m(world: World) -> Floats:
+    """Rolling radius of each wheel, (4,), effects that change it included: no slip at the start that nobody drove."""
+    worn = 1.0 + world.theta[THETA.slice("tyre_radius", "gain")]
+    flat = 1.0 - 0.01 * world.theta[THETA.slice("tyre_pressure_loss", "share")]
+    return np.asarray(float(world.p[P.wheel_rolling_radius_m]) * worn * flat)
 
 
 _INPUTS = (("pressure", "pressure_pa"), ("motor", "motor_torque_nm"))
@@ -250,7 +255,7 @@ class Rig:
             x[STATE.slice("pad_friction")] = rest_friction(self.vehicle.parameters, ambient)
         speed = self._speed(drive, first, world)
         x[X.speed_mps] = speed
-        x[STATE.slice("wheel_speed_rad_s")] = speed / world.p[P.wheel_rolling_radius_m]
+        x[STATE.slice("wheel_speed_rad_s")] = speed / _radius_m(world)
         x[STATE.slice("pressure_pa")] = np.clip(drive.inputs[0, INPUT.slice("pressure_pa")], 0.0, None)
         x[STATE.slice("motor_torque_nm")] = drive.inputs[0, INPUT.slice("motor_torque_nm")]
         return x
@@ -260,7 +265,7 @@ class Rig:
         if segment.start_speed_mps is not None:
             return max(segment.start_speed_mps, 0.0)
         told = wheel_speed_before(segment.start_wheel_rad_s, _along(world.theta, drive.log.direction))
-        return max(told, 0.0) * float(world.p[P.wheel_rolling_radius_m])
+        return max(told, 0.0) * float(np.median(_radius_m(world)))
 
     def _drive(self, number: int, drive: Drive, world: World) -> Stack:
         kept = self._kept
@@ -280,7 +285,7 @@ class Rig:
     def _tooth_rows(self, omega_rad_s: Floats) -> Floats:
         """Half the time between two teeth, rows; two rows at most."""
         pitch = 2.0 * np.pi / self.vehicle.parameters.sensor.teeth
-        return np.minimum(0.5 * pitch / np.maximum(np.abs(omega_rad_s), 0.1) / ROW_S, _TOOTH_ROWS)
+        return np.minimum(0.5 * pitch / np.fmax(np.abs(omega_rad_s), 0.1) / ROW_S, _TOOTH_ROWS)
 
     def _at_measured_speed(self, found: Stack, drive: Drive, slope: Floats | None) -> None:
         """What answers the speed, as it is at the measured speed: limited motors, a_y as v^2, yaw rate as v."""
@@ -300,13 +305,12 @@ class Rig:
         inputs = _in_time(inputs, world.late_s)
         table = np.empty((len(inputs), len(self._columns)))
         cut, switch, y = self.case.cut, healthy(), OUTPUT.zeros()
-        steps = FINE_STEPS if any(theta[THETA.slice(*stiff)].any() for stiff in _STIFF) else STEPS
         for number, segment in enumerate(drive.segments):
             if number:
                 self._restart(x, self._speed(drive, segment, world))
             simulate(
-                x, inputs[segment.first : segment.last], cut, switch, world.p, self._road, ROW_S / steps, steps,
-                SEMI_IMPLICIT, self._columns, table[segment.first : segment.last], y, theta, world.terms, NO_PLUGINS,
+                x, inputs[segment.first : segment.last], cut, switch, world.p, self._road, ROW_S / STEPS, STEPS,
+                EXPONENTIAL_4, self._columns, table[segment.first : segment.last], y, theta, world.terms, NO_PLUGINS,
             )  # fmt: skip
         stack: Stack = {}
         at = 0
