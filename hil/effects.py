@@ -7,10 +7,15 @@ from functools import cache
 from importlib.metadata import entry_points
 from typing import Any
 
+import numpy as np
+
 from hil.errors import BrakebenchError
 from plant.effects.apply import SIZE
-from plant.effects.bank import NO_TERMS
-from plant.effects.effect import Effect
+from plant.effects.bank import NO_TERMS, Shape, Variable, term
+from plant.effects.effect import Effect, Scope
+from plant.effects.joints import J
+from plant.effects.places import JOINTS
+from plant.effects.places import field as place
 from plant.effects.plugin import NO_PLUGINS, table
 from plant.effects.theta import THETA, Theta
 from plant.layout import Vector
@@ -93,7 +98,9 @@ def read_effects(tables: Mapping[str, Any], where: str) -> Effects:
     EffectError
         No such effect or parameter, a number out of bounds.
     """
-    if not tables:
+    tables = dict(tables)
+    terms = read_laws(tables.pop("laws", []), f"{where}.laws")
+    if not tables and not len(terms):
         return NONE
     effects = layout()
     theta = effects.neutral()
@@ -108,7 +115,50 @@ def read_effects(tables: Mapping[str, Any], where: str) -> Effects:
             effects.set(theta, name, _filled(effects.effect(name), values, f"{where}.{name}"))
         except (KeyError, ValueError, TypeError) as error:
             raise EffectError(f"{where}.{name}: {error.args[0] if error.args else error}") from error
-    return Effects(tuple(tables), theta, effects, NO_TERMS, plugin_table(effects))
+    return Effects(tuple(tables), theta, effects, terms, plugin_table(effects))
+
+
+def read_laws(laws: Any, where: str) -> Vector:
+    """Rows of the basis bank out of a list of tables: hats of one variable at a joint.
+
+    Each has ``joint``, ``variable`` (of `plant.effects.bank.Variable`, lower case), ``centre``, ``width``, ``value``,
+    ``adds`` (to the joint, else a share of it) and, at joints of the wheels, ``at``, the wheels.
+
+    Raises
+    ------
+    EffectError
+        No such joint or variable, a number missing or no number.
+    """
+    rows = []
+    for k, law in enumerate(laws if isinstance(laws, list) else [laws]):
+        try:
+            members = [Scope.WHEEL.members.index(wheel) for wheel in law.get("at", [])]
+            value = float(law["value"])
+            coefficient = [value if i in members else 0.0 for i in range(4)] if "at" in law else value
+            shaped = (Variable[str(law["variable"]).upper()], Shape.HAT, float(law["centre"]), float(law["width"]))
+            rows.append(term(law["joint"], coefficient, shaped, add=bool(law.get("adds", False))))
+        except KeyError as error:
+            raise EffectError(f"{where}[{k}]: {error.args[0]!r} is missing or unknown") from error
+        except (ValueError, TypeError, AttributeError) as error:
+            raise EffectError(f"{where}[{k}]: {error.args[0] if error.args else error}") from error
+    return np.array(rows) if rows else NO_TERMS.copy()
+
+
+def written_laws(terms: Vector) -> list[dict[str, Any]]:
+    """Tables that `read_laws` makes the same rows of."""
+    begins = {int(getattr(J, place(joint))): joint for joint in JOINTS}
+    laws = []
+    for row in terms:
+        target, size, adds = int(row[0]), int(row[1]), bool(row[2] > 0.5)
+        law: dict[str, Any] = {"joint": begins[target - (size if adds else 0)]}
+        law |= {"variable": Variable(int(row[7])).name.lower(), "adds": adds}
+        law |= {"centre": float(row[9]), "width": float(row[10]), "value": float(row[3])}
+        if size == len(Scope.WHEEL.members):
+            acting = np.flatnonzero(row[3 : 3 + size])
+            law |= {"value": float(row[3 + acting[0]]) if acting.size else 0.0}
+            law |= {"at": [Scope.WHEEL.members[k] for k in acting]}
+        laws.append(law)
+    return laws
 
 
 def _filled(effect: Effect, values: Mapping[str, Any], where: str) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from hil.study.basis import NAME, Piece, shown
 from hil.study.decide import decide_with, write
 from hil.study.diagnose import TIED, Contender, Diagnosis, odds
 from hil.study.fit import Term
@@ -66,6 +67,8 @@ def answer(
 def _verdict(found: Diagnosis, causes: list[dict[str, Any]], tied: Tied | None) -> str:
     if not causes:
         return "none"
+    if any(isinstance(term.candidate, Piece) for term in found.final.terms):
+        return "unlisted"
     if tied is not None and tied.indices:
         return "cannot_tell_apart"
     for listed in found.contenders:
@@ -82,6 +85,9 @@ def _causes(found: Diagnosis) -> list[dict[str, Any]]:
     merged: dict[str, dict[str, Any]] = {}
     for term, interval, listed in zip(found.final.terms, intervals(found), found.contenders, strict=True):
         effect, candidate = term.candidate.effect, term.candidate
+        if isinstance(candidate, Piece):
+            merged.setdefault(effect.name, _unlisted(found, candidate, listed))
+            continue
         chances = probabilities(listed)
         own = sum(
             p for c, p in zip(listed, chances, strict=True) if c.term.candidate.effect.name == effect.name
@@ -101,9 +107,25 @@ def _causes(found: Diagnosis) -> list[dict[str, Any]]:
     return list(merged.values())
 
 
+def _unlisted(found: Diagnosis, piece: Piece, listed: list[Contender]) -> dict[str, Any]:
+    """The entry of a law in no list: where, on what, and the curve with its band."""
+    terms, covariance = found.final.terms, found.final.covariance
+    own = [k for k, term in enumerate(terms) if isinstance(term.candidate, Piece)]
+    known = covariance[np.ix_(own, own)] if covariance.shape[0] == len(terms) else np.zeros((len(own), len(own)))
+    pieces = [term.candidate for term in terms if isinstance(term.candidate, Piece)]
+    return {
+        "effect": NAME, "title": piece.effect.title, "joint": piece.law.joint, "wheel": piece.place, "parameters": {},
+        "probability": probabilities(listed)[0], "onset": None, "onset_s": None, "variables": [piece.variable],
+        "curve": shown(pieces, [terms[k].value for k in own], known),
+    }  # fmt: skip
+
+
 def _rivals(found: Diagnosis) -> list[tuple[int, Contender, float]]:
     rivals = []
+    laws = [isinstance(term.candidate, Piece) for term in found.final.terms]
     for k, listed in enumerate(found.contenders):
+        if laws[k] and any(laws[:k]):
+            continue  # the pieces of a law share their rivals
         chances = probabilities(listed)
         named = {term.candidate.effect.name for term in found.final.terms}
         for contender, chance in list(zip(listed, chances, strict=True))[1:]:
@@ -130,7 +152,7 @@ def _rival(contender: Contender, chance: float) -> dict[str, Any]:
 
 def _tied(found: Diagnosis) -> Tied | None:
     """What imitates the first cause within the noise, from the joint information of the data."""
-    if not found.final.terms or found.sums is None:
+    if not found.final.terms or found.sums is None or isinstance(found.final.terms[0].candidate, Piece):
         return None
     term, listed = found.final.terms[0], [score.candidate for score in found.screened]
     projected = project(found.sums.total(), found.sums.nuisances, (), found.base.z)

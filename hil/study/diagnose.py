@@ -5,12 +5,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from hil.study.basis import LAWS, Piece
 from hil.study.candidates import Candidate, Column, candidates, columns
 from hil.study.fit import Fitter, Model, Term, Tracks
 from hil.study.linear import Sums, project, track_columns
 from hil.study.noise import Frame, Noise
 from hil.study.own_error import variance_of
 from hil.study.prepare import Case
+from hil.study.race import LawRace, least_gain, occam
 from hil.study.screen import Score, inflation, leaders, not_testable, score, scores, threshold
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
@@ -22,6 +24,7 @@ MOST_CAUSES = 3
 LEADERS = 6
 _OF_SCREEN = 1.5
 TIED = 9.2
+_CLEARER = 5.0
 _TURNS, _ANEW, _SETTLED = 7, (0, 1, 3), 3.0
 _COARSE, _FINE = 0.5, 3.0
 """Finite differences of the vehicle's numbers: in standard deviations of what is known before, and of what data say."""
@@ -33,6 +36,7 @@ class Settings:
 
     noise_model: bool = True
     relinearise: bool = True
+    dictionary: bool = True
     alpha: float = ALPHA
     most_causes: int = MOST_CAUSES
 
@@ -55,6 +59,12 @@ class Contender:
 def odds(contender: Contender) -> float:
     """Twice the negative log of the odds, the smaller the better."""
     return contender.cost - 2.0 * contender.evidence
+
+
+def causes_in(model: Model) -> int:
+    """How many causes a model has; the pieces of a law in no list are one."""
+    laws = {term.candidate.name.rsplit(".", 1)[0] for term in model.terms if isinstance(term.candidate, Piece)}
+    return sum(not isinstance(term.candidate, Piece) for term in model.terms) + len(laws)
 
 
 @dataclass(eq=False)
@@ -99,6 +109,7 @@ class _Search:
         self.columns: list[Column] = columns(vehicle.untold)
         self.candidates: list[Candidate] = candidates(self.columns)
         self.fitter: Fitter
+        self.race: LawRace | None = None
         self.steps: Floats = np.full(len(self.nuisances), _COARSE)
 
     def run(self) -> Diagnosis:
@@ -117,17 +128,17 @@ class _Search:
         found.untestable = sorted({*not_testable(found.screened), *self.rig.vehicle.untold})
         found.looks = _independent(found.screened)
         found.least_gain = threshold(found.looks, self.settings.alpha) * inflation(found.screened)
-        while len(model.terms) < self.settings.most_causes:
+        while causes_in(model) < self.settings.most_causes:
             if model.terms:
                 sums = self.fitter.screen(model, effect_columns, noise)
             accepted = self._next(found, model, noise, sums)
             if accepted is None:
                 break
-            model, noise, list_of = accepted
-            found.contenders.append(list_of)
+            before, (model, noise, list_of) = len(model.terms), accepted
+            found.contenders += [list_of] * (len(model.terms) - before)
             self.say(f"accepted {model.terms[-1].candidate.name} = {model.terms[-1].value:.4g}")
         found.final, found.noise = model, noise
-        if len(model.terms) > 1:
+        if causes_in(model) > 1:
             self._backward(found)
         return found
 
@@ -197,6 +208,11 @@ class _Search:
         reference = min(self.fitter.fit(model, tighter, 3).cost, self.fitter.cost(model.residual, model.z, noise))
         fitted = [self._gained(self._again(c, tighter), item, reference) for c, item in zip(fitted, top, strict=True)]
         clear = sorted((c for c in fitted if c.gained >= found.least_gain), key=odds)
+        law = self._unlisted(found, model, tighter, reference, min(clear, key=odds, default=None))
+        if law is not None:
+            polished, tighter = self.fitter.settle(law.model, tighter, 1, 60)
+            first = replace(law, model=polished)
+            return polished, tighter, [first, *sorted(clear, key=odds)]
         if not clear:
             most = max(fitted, key=lambda c: c.gained)
             self.say(f"{most.term.candidate.name} gains {most.gained:.1f}, {found.least_gain:.1f} is asked")
@@ -213,6 +229,27 @@ class _Search:
         rest = sorted((c for c in fitted if c is not best and (c in clear or odds(c) >= odds(best))), key=odds)
         first = replace(best, model=polished, term=polished.terms[-1])
         return polished, tighter, [first, *rest]
+
+    def _unlisted(
+        self, found: Diagnosis, model: Model, noise: Noise, reference: float, listed: Contender | None
+    ) -> Contender | None:
+        """A law in no list that explains clearly more than the best listed cause, if there is one."""
+        if not self.settings.dictionary or any(isinstance(term.candidate, Piece) for term in model.terms):
+            return None
+        if self.race is None:
+            self.say("curves in no list")
+            self.race = LawRace(self.fitter, self.fitter.world(model.z, model.terms), model)
+        best = self.race.entries(self.fitter, model, noise)[0]
+        rival = 0.0 if listed is None else 0.5 * (reference - odds(listed))
+        least = least_gain(found.looks + len(LAWS), self.settings.alpha) * inflation(found.screened)
+        if best.gain < least or best.evidence < rival + _CLEARER:
+            return None
+        fitted = self.fitter.fit(self.fitter.at(model.z, (*model.terms, *best.terms), noise), noise, 3)
+        law = Contender(fitted.terms[-1], fitted, fitted.cost, occam(best, fitted.covariance), 0.0)
+        law = replace(law, gained=reference - law.cost)
+        if law.gained < least or 0.5 * (reference - odds(law)) < rival + _CLEARER:
+            return None
+        return law
 
     def _stands_beside(self, better: Contender, clear: Contender, noise: Noise, least: float) -> bool:
         """Whether a cause that is beyond doubt is so even when a better one, which is not, is let in as an error."""
@@ -254,6 +291,8 @@ class _Search:
         """Take out each cause in turn; what is not missed stays out."""
         model = found.final
         for k in reversed(range(len(model.terms))):
+            if isinstance(model.terms[k].candidate, Piece):
+                continue
             rest = tuple(term for j, term in enumerate(model.terms) if j != k)
             without = self.fitter.fit(self.fitter.at(model.z, rest, found.noise), found.noise, 2)
             if without.cost - model.cost < found.least_gain * variance_of(model.terms[k].candidate):

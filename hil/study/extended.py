@@ -31,7 +31,7 @@ def extended_scenario(name: str, extension: Path, folder: Path) -> Path:
     load_extension(extension)  # refuses what no car can have
     taught = tomllib.loads(extension.read_text(encoding="utf-8"))
     effects, numbers = taught.get("effects", {}), taught.get("parameters", {})
-    if not (effects or numbers):
+    if not (effects or numbers or taught.get("laws")):
         raise UnusableError(
             f"{extension}: nothing to simulate: no [effects] and no [parameters]; what it holds is of sensors that the "
             "simulated car has not (see its comments)"
@@ -41,6 +41,8 @@ def extended_scenario(name: str, extension: Path, folder: Path) -> Path:
     own = scenario.setdefault("effects", {})
     for effect, values in effects.items():
         own[effect] = own.get(effect, {}) | values
+    if taught.get("laws"):
+        own["laws"] = [*own.get("laws", []), *taught["laws"]]
     plant = scenario.setdefault("plant", {})
     for flat, value in numbers.items():
         section = next(s for s in _SECTIONS if flat.startswith(s + "_"))

@@ -3,24 +3,27 @@
 import json
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from hil.effects import EffectError, read_laws, written_laws
 from hil.study.fit import Model
 from hil.study.table import Floats, UnusableError
 from hil.study.world import World
+from plant.effects.bank import NO_TERMS
 from plant.effects.theta import THETA
 from plant.vectors import PARAMETER
 
 
 @dataclass(frozen=True, eq=False)
 class Extension:
-    """Theta of the effects, and numbers of the vehicle by flat name and place that the fit moved."""
+    """Theta of the effects, numbers of the vehicle by flat name and place that the fit moved, rows of unlisted laws."""
 
     theta: Floats
     parameters: Mapping[str, list[float]]
+    terms: Floats = field(default_factory=NO_TERMS.copy)
 
     def applied(self, world: World) -> World:
         """A world with the extension."""
@@ -31,7 +34,7 @@ class Extension:
         moved = self.theta != neutral
         theta = world.theta.copy()
         theta[moved] = self.theta[moved]
-        return replace(world, p=p, theta=theta)
+        return replace(world, p=p, theta=theta, terms=np.vstack([world.terms, self.terms]))
 
 
 def write_extension(path: Path, handed_in: World, extended: World, model: Model, note: str) -> None:
@@ -60,6 +63,8 @@ def write_extension(path: Path, handed_in: World, extended: World, model: Model,
                 entries.append(f"{time} = {value!r}")
         if entries:
             lines += [f"[effects.{effect.name}]", *entries, ""]
+    for law in written_laws(extended.terms):
+        lines += ["[[laws]]", *(f"{name} = {json.dumps(value)}" for name, value in law.items()), ""]
     moved = extended.p != handed_in.p
     if moved.any():
         lines.append("[parameters]")
@@ -99,4 +104,8 @@ def load_extension(path: Path) -> Extension:
                 f"{path}: parameters.{name}: expected {PARAMETER.sizes[name]} numbers, got {len(numbers)}"
             )
         parameters[name] = numbers
-    return Extension(theta, parameters)
+    try:
+        terms = read_laws(table.get("laws", []), f"{path}: laws")
+    except EffectError as error:
+        raise UnusableError(str(error)) from error
+    return Extension(theta, parameters, terms)

@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from hil.study.prepare import ROW_S, SLOW_MPS, Case, Drive, Segment, averaged
@@ -298,20 +299,13 @@ class Rig:
             if group in found:
                 found[group] *= 1.0 + power * share
 
+    def states(self, world: World, names: Sequence[str]) -> Floats:
+        """States and outputs by name (`plant.model.column_indices`) over all drives, (rows, names)."""
+        columns = column_indices(list(names))
+        return np.concatenate([self._replayed(drive, world, columns) for drive in self.case.drives])
+
     def _raw(self, drive: Drive, world: World) -> Stack:
-        x = self._start(drive, world)
-        theta = _along(world.theta, drive.log.direction)
-        inputs = inverted(drive.inputs, theta, ROW_S)
-        inputs = _in_time(inputs, world.late_s)
-        table = np.empty((len(inputs), len(self._columns)))
-        cut, switch, y = self.case.cut, healthy(), OUTPUT.zeros()
-        for number, segment in enumerate(drive.segments):
-            if number:
-                self._restart(x, self._speed(drive, segment, world))
-            simulate(
-                x, inputs[segment.first : segment.last], cut, switch, world.p, self._road, ROW_S / STEPS, STEPS,
-                EXPONENTIAL_4, self._columns, table[segment.first : segment.last], y, theta, world.terms, NO_PLUGINS,
-            )  # fmt: skip
+        table = self._replayed(drive, world, self._columns)
         stack: Stack = {}
         at = 0
         for group in self._groups:
@@ -319,6 +313,23 @@ class Rig:
             stack[group] = table[:, at : at + width]
             at += width
         return stack
+
+    def _replayed(self, drive: Drive, world: World, columns: NDArray[np.int64]) -> Floats:
+        """One drive, what ``columns`` ask for at every row."""
+        x = self._start(drive, world)
+        theta = _along(world.theta, drive.log.direction)
+        inputs = inverted(drive.inputs, theta, ROW_S)
+        inputs = _in_time(inputs, world.late_s)
+        table = np.empty((len(inputs), len(columns)))
+        cut, switch, y = self.case.cut, healthy(), OUTPUT.zeros()
+        for number, segment in enumerate(drive.segments):
+            if number:
+                self._restart(x, self._speed(drive, segment, world))
+            simulate(
+                x, inputs[segment.first : segment.last], cut, switch, world.p, self._road, ROW_S / STEPS, STEPS,
+                EXPONENTIAL_4, columns, table[segment.first : segment.last], y, theta, world.terms, NO_PLUGINS,
+            )  # fmt: skip
+        return table
 
     @staticmethod
     def _restart(x: Floats, speed_mps: float) -> None:
