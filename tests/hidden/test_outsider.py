@@ -1,0 +1,46 @@
+"""Logs of a car nobody here modelled, told by six numbers: nothing in nothing, and a law in no list by its joint."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from outsider import VEHICLE, logs
+
+from hil.study.diagnose import Settings
+from hil.study.explain import explain
+from hil.study.extension import load_extension
+
+
+def _plain(speed_mps: float, pressure_pa: np.ndarray) -> np.ndarray:
+    return np.ones(4)
+
+
+def _bump(speed_mps: float, pressure_pa: np.ndarray) -> np.ndarray:
+    """Pads that lose 30 % around 15 m/s."""
+    return np.full(4, 1.0 - 0.3 * np.exp(-(((speed_mps - 15.0) / 3.0) ** 2)))
+
+
+@pytest.mark.slow
+def test_nothing_is_named_where_the_car_is_only_simpler() -> None:
+    assert explain(logs(_plain), vehicle=VEHICLE).json["verdict"] == "none"
+
+
+@pytest.mark.slow
+def test_a_law_in_no_list_is_shown_with_joint_variable_and_curve(tmp_path: Path) -> None:
+    found = explain(logs(_bump), vehicle=VEHICLE, out=tmp_path).json
+    assert found["verdict"] == "unlisted"
+    cause = found["causes"][0]
+    assert (cause["effect"], cause["joint"], cause["variables"]) == ("unlisted", "friction.mu", ["speed"])
+    curve = cause["curve"]
+    lowest = min(curve, key=lambda point: point["y"])
+    assert 10.0 < lowest["x"] < 20.0
+    assert -0.45 < lowest["y"] < -0.12
+    assert all(point["low"] <= point["y"] <= point["high"] for point in curve)
+    assert len(load_extension(tmp_path / "extension.toml").terms) == 5
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_without_the_dictionary_a_law_in_no_list_is_missed() -> None:
+    found = explain(logs(_bump), vehicle=VEHICLE, settings=Settings(dictionary=False)).json
+    assert found["verdict"] != "unlisted"
