@@ -96,7 +96,7 @@ def _causes(found: Diagnosis) -> list[dict[str, Any]]:
             effect.name,
             {
                 "effect": effect.name, "title": effect.title, "joint": effect.joints[0] if effect.joints else "",
-                "wheel": candidate.place, "parameters": {}, "probability": own, "onset": None, "onset_s": None,
+                "wheel": candidate.place, "parameters": {}, "probability": own, **_onset(found, term),
                 "variables": [], "curve": [],
             },
         )  # fmt: skip
@@ -105,6 +105,17 @@ def _causes(found: Diagnosis) -> list[dict[str, Any]]:
         }  # fmt: skip
         entry["probability"] = max(entry["probability"], own)
     return list(merged.values())
+
+
+def _onset(found: Diagnosis, term: Term) -> dict[str, Any]:
+    """Where a cause begins, in its log and in the session: the logs in a row."""
+    if term.onset is None:
+        return {"onset": None, "onset_s": None}
+    number, since_s = term.onset
+    logs = [drive.log for drive in found.case.drives]
+    before = sum(float(log.t_s[-1] - log.t_s[0]) for log in logs[:number])
+    begin = {"log": logs[number].name, "t_s": float(logs[number].t_s[0]) + since_s}
+    return {"onset": begin, "onset_s": before + since_s}
 
 
 def _unlisted(found: Diagnosis, piece: Piece, listed: list[Contender]) -> dict[str, Any]:

@@ -10,13 +10,14 @@ from hil.study.candidates import Candidate, Column, candidates, columns
 from hil.study.fit import Fitter, Model, Term, Tracks
 from hil.study.linear import Sums, project, track_columns
 from hil.study.noise import Frame, Noise
+from hil.study.onset import with_onsets
 from hil.study.own_error import variance_of
 from hil.study.prepare import Case
 from hil.study.race import LawRace, least_gain, occam
 from hil.study.screen import Score, inflation, leaders, not_testable, score, scores, threshold
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
-from hil.study.world import Rig, World, start_nuisances
+from hil.study.world import Rig, Stack, World, start_nuisances
 
 Say = Callable[[str], None]
 ALPHA = 0.003
@@ -25,6 +26,7 @@ LEADERS = 6
 _OF_SCREEN = 1.5
 TIED = 9.2
 _CLEARER = 5.0
+_KINKED = ("late_demand", "ehb_dead_time_s")
 _TURNS, _ANEW, _SETTLED = 7, (0, 1, 3), 3.0
 _COARSE, _FINE = 0.5, 3.0
 """Finite differences of the vehicle's numbers: in standard deviations of what is known before, and of what data say."""
@@ -140,6 +142,9 @@ class _Search:
         found.final, found.noise = model, noise
         if causes_in(model) > 1:
             self._backward(found)
+        if found.final.terms:
+            self.say("when it begins")
+            found.final = with_onsets(self.fitter, found.final, found.noise)
         return found
 
     def _vehicle(self, nominal: Model, noise: Noise) -> tuple[Model, Noise]:
@@ -161,14 +166,32 @@ class _Search:
         return model, noise
 
     def _nuisance_columns(self, z: Floats) -> None:
-        world = self.base_world.shifted(self.nuisances, z)
-        base, worlds = self.rig.run(world), []
-        for k, step in enumerate(self.steps):
-            moved = z.copy()
-            moved[k] += step
-            worlds.append(self.base_world.shifted(self.nuisances, moved))
-        tracks = track_columns(self.rig, self.frame, base, worlds, self.steps.tolist())
-        self.fitter = Fitter(self.rig, self.frame, self.base_world, self.nuisances, tracks)
+        base = self.rig.run(self._shifted(z))
+        sides = np.array([self._side(k, z, base) for k in range(len(z))])
+        steps = np.where(sides == 0.0, 1.0, sides) * self.steps
+        worlds = [self._shifted(z + step * (np.arange(len(z)) == k)) for k, step in enumerate(steps)]
+        tracks = track_columns(self.rig, self.frame, base, worlds, steps.tolist())
+        self.fitter = Fitter(self.rig, self.frame, self.base_world, self.nuisances, tracks, sides)
+
+    def _shifted(self, z: Floats) -> World:
+        return self.base_world.shifted(self.nuisances, z)
+
+    def _side(self, k: int, z: Floats, base: Stack) -> float:
+        """Which side of 0 counts for what has a kink there (held demands by steps); 0 for all others."""
+        if self.nuisances[k].name not in _KINKED:
+            return 0.0
+        if z[k] != 0.0:
+            return float(np.sign(z[k]))
+        left = [
+            self._misfit(self._shifted(z + side * self.steps[k] * (np.arange(len(z)) == k))) for side in (1.0, -1.0)
+        ]
+        return 1.0 if left[0] <= left[1] else -1.0
+
+    def _misfit(self, world: World) -> float:
+        """What actuators asked and measured have apart, each as a share of its variance."""
+        stack, measured = self.rig.run(world), self.rig.measured()
+        groups = [group for group in ("pressure", "motor") if group in stack]
+        return sum(float(np.nanvar(measured[g] - stack[g]) / max(np.nanvar(measured[g]), 1e-12)) for g in groups)
 
     def _effect_columns(self, model: Model) -> Tracks:
         world = self.fitter.world(model.z, model.terms)

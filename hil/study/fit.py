@@ -20,10 +20,11 @@ _DIVERGED = 1e15
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """An effect in the model: candidate and its value."""
+    """An effect in the model: candidate and its value; where it begins, as drive and s in it, None: always there."""
 
     candidate: Candidate
     value: float
+    onset: tuple[int, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +45,18 @@ class Model:
 
 
 class Fitter:
-    """Fits models of one case."""
+    """Fits models of one case.
+
+    ``sides`` (nuisances,) is +1 or -1 where a nuisance's sensitivity only holds for values above or below 0.
+    """
 
     def __init__(
-        self, rig: Rig, frame: Frame, base: World, nuisances: Sequence[Nuisance], nuisance_columns: Tracks
-    ) -> None:
+        self, rig: Rig, frame: Frame, base: World, nuisances: Sequence[Nuisance], nuisance_columns: Tracks,
+        sides: Floats | None = None,
+    ) -> None:  # fmt: skip
         self.rig, self.frame, self.base = rig, frame, base
         self.nuisances, self.nuisance_columns = tuple(nuisances), nuisance_columns
+        self.sides = np.zeros(len(self.nuisances)) if sides is None else sides
         self.radius = float(rig.vehicle.parameters.wheel.rolling_radius_m)
         self._measured = rig.measured()
         self._white_for: Noise | None = None
@@ -62,6 +68,8 @@ class Fitter:
         world = self.base.shifted(self.nuisances, z)
         for term in terms:
             world = term.candidate.applied(world, term.value)
+            if term.onset is not None:
+                world = replace(world, onsets=(*world.onsets, (term.candidate.effect.name, *term.onset)))
         return world
 
     def at(self, z: Floats, terms: Sequence[Term], noise: Noise) -> Model:
@@ -118,18 +126,26 @@ class Fitter:
     def _step(self, model: Model, own: Tracks, noise: Noise) -> Model | None:
         count = len(self.nuisances)
         total = self._total(model, own, noise)
+        free, held = range(len(model.terms)), self._held(total, model)
         for damping in _DAMPING:
-            change, covariance = solve(total, count, range(len(model.terms)), model.z, damping)
+            change, covariance = solve(total, count, free, model.z, damping, held)
             dz = np.clip(change[:count], -_LARGEST_STEP, _LARGEST_STEP)
             z = np.clip(model.z + dz, -_FARTHEST, _FARTHEST)
+            z = np.where(self.sides * z < 0.0, 0.0, z)
             terms = tuple(
-                Term(term.candidate, _bounded(term.candidate, term.value + float(step)))
+                replace(term, value=_bounded(term.candidate, term.value + float(step)))
                 for term, step in zip(model.terms, change[count:], strict=True)
             )
             moved = self.at(z, terms, noise)
             if moved.cost < model.cost:
                 return replace(moved, covariance=covariance)
         return replace(model, covariance=covariance) if model.terms and not model.covariance.size else None
+
+    def _held(self, total: Floats, model: Model) -> list[int]:
+        """Nuisances at the end of their side that want to leave it."""
+        change, _ = solve(total, len(self.nuisances), range(len(model.terms)), model.z)
+        wanted = self.sides * (model.z + change[: len(self.nuisances)])
+        return [int(k) for k in np.flatnonzero((wanted < 0.0) & (self.sides * model.z <= 0.0))]
 
     def products(self, noise: Noise) -> Floats:
         """Information of the nuisances, (nuisances, nuisances)."""

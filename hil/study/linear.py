@@ -11,6 +11,7 @@ from hil.study.world import Rig, Stack, World
 
 _CHUNK = 48
 _HUBER = 6.0
+_HELD = 1e15
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,10 +102,13 @@ def project(total: Floats, nuisances: int, free: Sequence[int] = (), z: Floats |
     return Projected(np.asarray(left[0, keep:]), np.asarray(left[keep:, keep:]), float(left[0, 0]) + prior)
 
 
-def solve(total: Floats, nuisances: int, free: Sequence[int], z: Floats, damping: float = 0.0) -> tuple[Floats, Floats]:
+def solve(
+    total: Floats, nuisances: int, free: Sequence[int], z: Floats, damping: float = 0.0, held: Sequence[int] = ()
+) -> tuple[Floats, Floats]:
     """Steps of the nuisances and of the columns ``free``, and the covariance of the latter.
 
-    ``damping`` shortens the step in proportion to each number's own information (Marquardt 1963).
+    ``damping`` shortens the step in proportion to each number's own information (Marquardt 1963); nuisances that are
+    ``held`` do not move.
     """
     taken = [1 + k for k in range(nuisances)] + [1 + nuisances + k for k in free]
     a = total[np.ix_(taken, taken)].copy()
@@ -112,6 +116,8 @@ def solve(total: Floats, nuisances: int, free: Sequence[int], z: Floats, damping
     a[range(nuisances), range(nuisances)] += 1.0
     right[:nuisances] -= z
     a[range(len(a)), range(len(a))] += 1e-9 * (1.0 + np.diag(a))
+    a[list(held), list(held)] += _HELD
+    right[list(held)] = 0.0
     inverse = np.linalg.inv(a)
     covariance = np.asarray(inverse[nuisances:, nuisances:])
     if damping > 0.0:

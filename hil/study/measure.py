@@ -1,12 +1,12 @@
 """What the extension gains on manoeuvres that its fit never saw, beside doing nothing and the best wrong cause."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hil.study.diagnose import Contender, Diagnosis
-from hil.study.fit import Model, Term, Tracks
+from hil.study.fit import Model, Tracks
 from hil.study.linear import solve, sums
 from hil.study.noise import Frame
 from hil.study.table import Floats
@@ -61,7 +61,7 @@ def held_out(found: Diagnosis, model: Model) -> Tracks:
         change, _ = solve(of.total(weights), count, range(len(model.terms)), model.z)
         z = np.clip(model.z + np.clip(change[:count], -1.5, 1.5), -8.0, 8.0)
         terms = tuple(
-            Term(t.candidate, float(np.clip(t.value + step, t.candidate.parameter.low, t.candidate.parameter.high)))
+            replace(t, value=float(np.clip(t.value + step, t.candidate.parameter.low, t.candidate.parameter.high)))
             for t, step in zip(model.terms, change[count:], strict=True)
         )
         residual = fitter.residual(z, terms)

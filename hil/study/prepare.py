@@ -51,7 +51,7 @@ class Drive:
     inputs : (rows, INPUT.size), rows of 10 ms.  segments : in order, without gaps.
     measured : group of tracks -> (samples, channels); NaN where nothing is known.  stride : rows a sample.
     moving, resting : (samples,) where speeds, and where the body at rest is compared.
-    speed_mps, pressure_pa : (samples,) about the speed, and the largest pressure.
+    speed_mps, pressure_pa : (samples,) about the speed, and the largest pressure.  number : among the drives.
     """
 
     log: Log
@@ -63,6 +63,7 @@ class Drive:
     resting: Floats
     speed_mps: Floats
     pressure_pa: Floats
+    number: int = 0
 
     @property
     def samples(self) -> int:
@@ -130,7 +131,7 @@ def prepare(logs: Sequence[Log], radius_m: float) -> Case:
             groups.remove(name)  # nothing simulates it
     rate = max(float(np.median(np.diff(log.t_s))) for log in logs)
     stride = max(2, int(np.ceil(rate / ROW_S - 0.2)))
-    drives = tuple(_drive(log, groups, stride, radius_m) for log in logs)
+    drives = tuple(replace(_drive(log, groups, stride, radius_m), number=k) for k, log in enumerate(logs))
     moving = sum(float(drive.moving.sum()) for drive in drives) * stride * ROW_S
     if moving < 4.0:
         raise UnusableError(f"the car moves for {moving:.1f} s in all; expected 4 s or more above {SLOW_MPS:g} m/s")

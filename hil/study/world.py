@@ -41,6 +41,7 @@ Stack = dict[str, Floats]
 class World:
     """One car: flat parameters, theta, basis terms (rows as in `plant.effects.bank`), discs at the start, latencies.
 
+    ``onsets`` names effects that begin in the middle: number of the drive, and s in it.
     ``tooth_share`` multiplies the lag of a toothed wheel, half the time between two teeth: the speed is told when a
     tooth has passed.
     """
@@ -51,6 +52,20 @@ class World:
     disc_offset_k: float = 0.0
     late_s: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
     tooth_share: float = 1.0
+    onsets: tuple[tuple[str, int, float], ...] = ()
+
+    def theta_in(self, drive: Drive) -> Floats:
+        """Theta of one drive: direction along the road, and what begins later or within it."""
+        theta = _along(self.theta, drive.log.direction)
+        if self.onsets:
+            theta = theta.copy()
+        for name, number, since_s in self.onsets:
+            if drive.number < number:
+                for parameter in THETA.effect(name).strengths:
+                    theta[THETA.slice(name, parameter.name)] = 0.0
+            elif drive.number == number:
+                theta[THETA.slice(name, "onset_s")] = since_s
+        return theta
 
     def shifted(self, nuisances: Sequence[Nuisance], z: Floats) -> "World":
         """With nuisances ``z`` standard deviations off."""
@@ -174,6 +189,7 @@ def _moves_alike(one: World, other: World) -> bool:
         (one.p is other.p or np.array_equal(one.p, other.p))
         and np.array_equal(one.terms, other.terms)
         and one.disc_offset_k == other.disc_offset_k
+        and one.onsets == other.onsets
         and one.late_s[1:] == other.late_s[1:]
         and bool(np.isin(apart, WATCHING).all())
     )
@@ -265,13 +281,13 @@ class Rig:
         """Speed a segment starts with: what the sensors told, less what the world's sensors add."""
         if segment.start_speed_mps is not None:
             return max(segment.start_speed_mps, 0.0)
-        told = wheel_speed_before(segment.start_wheel_rad_s, _along(world.theta, drive.log.direction))
+        told = wheel_speed_before(segment.start_wheel_rad_s, world.theta_in(drive))
         return max(told, 0.0) * float(np.median(_radius_m(world)))
 
     def _drive(self, number: int, drive: Drive, world: World) -> Stack:
         kept = self._kept
         raw = kept[1][number] if kept is not None and _moves_alike(world, kept[0]) else self._raw(drive, world)
-        stack = sensed(raw, _along(world.theta, drive.log.direction), ROW_S)
+        stack = sensed(raw, world.theta_in(drive), ROW_S)
         for group, values in stack.items():
             late = world.late_s[_NODE[group]] if group in _NODE else 0.0
             if late:
@@ -317,7 +333,7 @@ class Rig:
     def _replayed(self, drive: Drive, world: World, columns: NDArray[np.int64]) -> Floats:
         """One drive, what ``columns`` ask for at every row."""
         x = self._start(drive, world)
-        theta = _along(world.theta, drive.log.direction)
+        theta = world.theta_in(drive)
         inputs = inverted(drive.inputs, theta, ROW_S)
         inputs = _in_time(inputs, world.late_s)
         table = np.empty((len(inputs), len(columns)))

@@ -56,7 +56,6 @@ def _logs(theta: np.ndarray, seed: int) -> list[dict[str, np.ndarray]]:
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_nothing_is_found_in_nothing() -> None:
     answer = explain(_logs(THETA.neutral(), 5))
     assert answer.json["verdict"] == "none"
@@ -65,7 +64,6 @@ def test_nothing_is_found_in_nothing() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_a_hidden_drag_is_named_extended_and_then_nothing_is_left(tmp_path: Path) -> None:
     theta = THETA.set(THETA.neutral(), "residual_drag", {"torque_nm": {"rl": 30.0}})
     logs = _logs(theta, 6)
@@ -76,6 +74,19 @@ def test_a_hidden_drag_is_named_extended_and_then_nothing_is_left(tmp_path: Path
     taught = load_extension(tmp_path / "extension.toml")
     assert taught.theta[THETA.slice("residual_drag", "torque_nm")][2] == pytest.approx(30.0, rel=0.3)
     assert explain(logs, extend=tmp_path / "extension.toml").json["causes"] == []
+
+
+@pytest.mark.slow
+def test_a_drag_that_begins_in_the_middle_is_named_with_its_time() -> None:
+    dragging = THETA.set(THETA.neutral(), "residual_drag", {"torque_nm": {"rl": 40.0}})
+    beginning = dragging.copy()
+    beginning[THETA.slice("residual_drag", "onset_s")] = 5.0
+    logs = [_frame(theta, 8, k) for k, theta in enumerate((THETA.neutral(), beginning, dragging))]
+    (cause,) = explain(logs).json["causes"]
+    assert (cause["effect"], cause["wheel"]) == ("residual_drag", "rl")
+    assert cause["onset"]["log"].endswith("1")
+    assert cause["onset"]["t_s"] == pytest.approx(5.0, abs=1.0)
+    assert cause["onset_s"] == pytest.approx(14.0 + 5.0, abs=1.0)
 
 
 def test_without_motion_or_torque_there_is_no_answer() -> None:

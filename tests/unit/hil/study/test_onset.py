@@ -1,0 +1,31 @@
+"""When a cause begins, from what each manoeuvre says of it."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hil.study.onset import begin_of
+
+
+def _products(value: float, begin: int, strength: list[float], seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Manoeuvres that see a cause with ``strength`` standard deviations each, there from ``begin`` on."""
+    q = np.square(strength) / value**2
+    there = np.arange(len(q)) >= begin
+    noise = np.random.default_rng(seed).standard_normal(len(q))
+    return q * value * there + np.sqrt(q) * noise, q
+
+
+@given(begin=st.integers(2, 8), seed=st.integers(0, 200), value=st.sampled_from([-3.0, 0.02, 40.0]))
+def test_a_clear_beginning_is_found(begin, seed, value):
+    b, q = _products(value, begin, [8.0] * 10, seed)
+    assert begin_of(b, q) == begin
+
+
+def test_what_was_always_there_has_none():
+    found = [begin_of(*_products(1.0, 0, [5.0] * 10, seed)) for seed in range(300)]
+    assert sum(one is not None for one in found) <= 5
+
+
+def test_manoeuvres_that_do_not_show_it_prove_no_beginning():
+    assert begin_of(*_products(1.0, 0, [0.1, 0.1, 0.1, 9.0, 9.0], 1)) is None
+    assert begin_of(*_products(1.0, 3, [0.1, 0.1, 0.1, 9.0, 9.0], 1)) is None
