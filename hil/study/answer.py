@@ -127,6 +127,7 @@ def _unlisted(found: Diagnosis, piece: Piece, listed: list[Contender]) -> dict[s
     return {
         "effect": NAME, "title": piece.effect.title, "joint": piece.law.joint, "wheel": piece.place, "parameters": {},
         "probability": probabilities(listed)[0], "onset": None, "onset_s": None, "variables": [piece.variable],
+        "adds": piece.law.adds,
         "curve": shown(pieces, [terms[k].value for k in own], known),
     }  # fmt: skip
 

@@ -12,6 +12,7 @@ from hil.study.fit import Model
 from hil.study.measure import Gain, probabilities
 from hil.study.patterns import UNITS, WORDS
 from hil.study.table import Floats
+from plant.effects.places import JOINTS
 
 _SENTENCE = {
     "none": "Nothing beyond noise and the stated tolerances.",
@@ -21,6 +22,11 @@ _SENTENCE = {
     "not_testable": "These manoeuvres excite too little to conclude anything.",
 }
 _SHOWN: dict[str, Unit] = {"wheel": Display("km/h", 3.6), "pressure": BAR, "motor": "N m"}
+_VARIABLES: dict[str, Unit] = {
+    "speed": Display("km/h", 3.6), "wheel_speed": "rad/s", "pressure": BAR, "disc_temperature": "K",
+    "time_since_on": "s", "time": "s", "motor_torque": "N m", "acceleration": "m/s²", "yaw_rate": "rad/s",
+    "distance": "m", "slip": "",
+}  # fmt: skip
 _PANELS = (
     ("wheel", "Wheel speed, mean of all wheels"),
     ("ax", "Longitudinal acceleration"),
@@ -37,7 +43,9 @@ def build_report(answer: Answer, sources: Sequence[str]) -> Report:
         verdict={"none": Verdict.PASSED, "named": None}.get(verdict, Verdict.INCOMPLETE),
         reason=_headline(content),
         numbers=tuple(_numbers(answer)),
-        sections=(_comparison(answer), _missed(answer), _race(answer), _gained(answer), _limits(answer)),
+        sections=(
+            _comparison(answer), _missed(answer), *_laws(answer), _race(answer), _gained(answer), _limits(answer),
+        ),
         provenance={
             "logs": list(sources), "segments": len(found.case.segments), "replays": found.fitter.rig.runs,
             "extension": content["extension"] or "not written", "remarks": content["remarks"],
@@ -49,7 +57,7 @@ def _headline(content: dict[str, object]) -> str:
     causes = content["causes"]
     text = _SENTENCE[str(content["verdict"])]
     if isinstance(causes, list) and causes:
-        named = "; ".join(f"{c['effect']} ({c['wheel']})" for c in causes)
+        named = "; ".join(f"{c['title'] if c['curve'] else c['effect']} ({c['wheel']})" for c in causes)
         text = f"{named}: {text[0].lower()}{text[1:]}"
     return text
 
@@ -186,11 +194,29 @@ def _binned(x: Floats, y: Floats, name: str) -> Curve | None:
     return Curve(name, centre, mean, mean - spread, mean + spread, group="rl" if name == "handed in" else "fl")
 
 
+def _laws(answer: Answer) -> list[Section]:
+    """The curve of a cause in no list, with its 95 % band."""
+    sections = []
+    for cause in answer.json["causes"]:
+        if not cause["curve"]:
+            continue
+        x, y, low, high = (np.array([point[key] for point in cause["curve"]]) for key in ("x", "y", "low", "high"))
+        (variable,) = cause["variables"]
+        unit = _VARIABLES.get(variable, "")
+        curve = Curve("found", x, y, low, high, group="fl")
+        added = JOINTS[cause["joint"]][1] if cause["adds"] else ""
+        label = f"added to {cause['joint']}" if cause["adds"] else f"change of {cause['joint']}, share"
+        chart = Chart(f"{cause['title']}, {cause['wheel']}", variable.replace("_", " "), unit, label, added, (curve,))
+        sections.append(Section("A cause in no list", charts=(chart,), text="The band is its 95 % interval."))
+    return sections
+
+
 def _race(answer: Answer) -> Section:
     """Who was in the race, and how far apart they are."""
     found = answer.found
     tables = []
-    for k, listed in enumerate(found.contenders):
+    races = list({id(listed): listed for listed in found.contenders}.values())  # the pieces of a law share one
+    for k, listed in enumerate(races):
         chances = probabilities(listed)
         rows = tuple(
             (

@@ -1,0 +1,60 @@
+"""Twelve single causes and twelve times nothing, drawn anew whenever the plant or the study changes."""
+
+import hashlib
+import os
+from collections.abc import Iterator
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from hil.hide.case import Case
+from hil.hide.cases import SEPARABLE, draw
+from hil.trials.run import run_case
+
+COUNT, MOST_MISSES, MOST_ALARMS = 12, 2, 1
+SNR = 15.0
+pytestmark = [pytest.mark.slow, pytest.mark.long, pytest.mark.timeout(7200)]
+
+
+def drawn_seed() -> int:
+    """From the sources; ``BRAKEBENCH_DRAWN_SEED`` repeats another one."""
+    if "BRAKEBENCH_DRAWN_SEED" in os.environ:
+        return int(os.environ["BRAKEBENCH_DRAWN_SEED"])
+    digest = hashlib.sha256()
+    for package in ("plant", "plant.effects", "plant.effects.sensing", "hil.study"):
+        for file in sorted(resources.files(package).iterdir(), key=lambda item: item.name):
+            if file.name.endswith((".py", ".toml")):
+                digest.update(file.read_bytes())
+    return int.from_bytes(digest.digest()[:3], "big")
+
+
+@pytest.fixture
+def seed() -> int:
+    number = drawn_seed()
+    print(f"\nto repeat: BRAKEBENCH_DRAWN_SEED={number} pytest tests/hidden/test_drawn.py -m long -s")
+    return number
+
+
+def _singles(seed: int) -> Iterator[Case]:
+    """Cases that reach the size asked for, effects in a drawn order."""
+    for index in np.random.default_rng(seed).permutation(len(SEPARABLE)):
+        case = draw("single", int(index), seed, SNR)
+        if case.reached:
+            yield case
+
+
+def test_drawn_single_causes_are_named(seed: int) -> None:
+    records = [run_case(case, seed, SNR) for case, _ in zip(_singles(seed), range(COUNT), strict=False)]
+    missed = [
+        (r["index"], r["hidden"][0]["effect"], r["verdict"], r["named"])
+        for r in records
+        if r["named"][:1] != [r["hidden"][0]["effect"]]
+    ]
+    assert len(missed) <= MOST_MISSES, missed
+
+
+def test_nothing_drawn_is_nothing_found(seed: int) -> None:
+    records = [run_case(draw("null", index, seed), seed, None) for index in range(COUNT)]
+    alarms = [(r["index"], r["named"]) for r in records if r["causes"]]
+    assert len(alarms) <= MOST_ALARMS, alarms
