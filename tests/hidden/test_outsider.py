@@ -21,11 +21,13 @@ def _bump(speed_mps: float, pressure_pa: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_nothing_is_named_where_the_car_is_only_simpler() -> None:
     assert explain(logs(_plain), vehicle=VEHICLE).json["verdict"] == "none"
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_a_law_in_no_list_is_shown_with_joint_variable_and_curve(tmp_path: Path) -> None:
     found = explain(logs(_bump), vehicle=VEHICLE, out=tmp_path).json
     assert found["verdict"] == "unlisted"
@@ -40,6 +42,7 @@ def test_a_law_in_no_list_is_shown_with_joint_variable_and_curve(tmp_path: Path)
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 @pytest.mark.long
 def test_without_the_dictionary_a_law_in_no_list_is_missed() -> None:
     found = explain(logs(_bump), vehicle=VEHICLE, settings=Settings(dictionary=False)).json

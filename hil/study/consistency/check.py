@@ -165,6 +165,12 @@ def _remarks(models: Mapping[str, Found], causes: Sequence[Cause]) -> list[str]:
     return said
 
 
-def _decide_with(causes: Sequence[Cause]) -> list[str]:
-    wanted = [THETA.effect(n.effect).manoeuvre for c in causes if c.tied for n in c.names]
-    return sorted(dict.fromkeys(wanted), key=lambda m: -wanted.count(m))
+def _decide_with(causes: Sequence[Cause]) -> list[dict[str, Any]]:
+    """Standard manoeuvres that show the tied effects; no scenario drives a car whose forces nobody measures."""
+    shown: dict[str, list[str]] = {}
+    for name in (n.effect for c in causes if c.tied for n in c.names):
+        shown.setdefault(THETA.effect(name).manoeuvre, []).append(name)
+    return [
+        {"scenario": manoeuvre, "why": f"shows {', '.join(dict.fromkeys(names))}", "separation": None}
+        for manoeuvre, names in sorted(shown.items(), key=lambda item: -len(item[1]))
+    ]

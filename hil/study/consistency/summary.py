@@ -278,5 +278,5 @@ def _limits(answer: Consistency) -> Section:
     rows += [("missing channel", text) for text in content["missing"]]
     rows += [("remark", text) for text in content["remarks"]]
     if content["decide_with"]:
-        rows.append(("drive this to decide", ", ".join(content["decide_with"])))
+        rows.append(("drive this to decide", ", ".join(one["scenario"] for one in content["decide_with"])))
     return Section("What these data cannot show", tables=(Table("Limits", ("what", "which"), tuple(rows)),))

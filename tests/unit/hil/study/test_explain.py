@@ -56,6 +56,7 @@ def _logs(theta: np.ndarray, seed: int) -> list[dict[str, np.ndarray]]:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_nothing_is_found_in_nothing() -> None:
     answer = explain(_logs(THETA.neutral(), 5))
     assert answer.json["verdict"] == "none"
@@ -64,6 +65,7 @@ def test_nothing_is_found_in_nothing() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_a_hidden_drag_is_named_extended_and_then_nothing_is_left(tmp_path: Path) -> None:
     theta = THETA.set(THETA.neutral(), "residual_drag", {"torque_nm": {"rl": 30.0}})
     logs = _logs(theta, 6)
@@ -77,6 +79,7 @@ def test_a_hidden_drag_is_named_extended_and_then_nothing_is_left(tmp_path: Path
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_a_drag_that_begins_in_the_middle_is_named_with_its_time() -> None:
     dragging = THETA.set(THETA.neutral(), "residual_drag", {"torque_nm": {"rl": 40.0}})
     beginning = dragging.copy()

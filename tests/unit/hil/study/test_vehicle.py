@@ -55,3 +55,14 @@ def test_what_is_no_number_is_refused(value: object) -> None:
         return
     with pytest.raises(UnusableError, match="expected a number"):
         load_vehicle({**SIX, "mass_kg": value})
+
+
+def test_what_a_set_says_nothing_of_is_not_judged() -> None:
+    car = load_vehicle(SIX)
+    assert {"ehb_dead_time", "motor_tau", "battery_soc"} <= set(car.untold)
+    assert car.parameters.motor.peak_torque_nm > 2000.0
+    assert any("nothing said of ehb, motor, battery" in text for text in car.remarks)
+    told = load_vehicle({**SIX, "ehb_dead_time_s": 0.02, "motor_peak_torque_nm": 400.0})
+    assert set(told.untold) == {"battery_soc"}
+    assert told.parameters.motor.peak_torque_nm == 400.0
+    assert paper_car().untold == ()
