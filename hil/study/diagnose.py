@@ -27,7 +27,7 @@ _OF_SCREEN = 1.5
 TIED = 9.2
 _CLEARER = 5.0
 _KINKED = ("late_demand", "ehb_dead_time_s")
-_TURNS, _ANEW, _SETTLED = 7, (0, 1, 3), 3.0
+_TURNS, _MOST_ANEW, _SETTLED, _STALE = 10, 4, 3.0, 0.2
 _COARSE, _FINE = 0.5, 3.0
 """Finite differences of the vehicle's numbers: in standard deviations of what is known before, and of what data say."""
 
@@ -138,13 +138,11 @@ class _Search:
                 break
             before, (model, noise, list_of) = len(model.terms), accepted
             found.contenders += [list_of] * (len(model.terms) - before)
-            self.say(f"accepted {model.terms[-1].candidate.name} = {model.terms[-1].value:.4g}")
+            self.say(f"accepted {model.terms[-1].candidate.name} = {model.terms[-1].value:.4g}; when it begins")
+            model = with_onsets(self.fitter, model, noise)
         found.final, found.noise = model, noise
         if causes_in(model) > 1:
             self._backward(found)
-        if found.final.terms:
-            self.say("when it begins")
-            found.final = with_onsets(self.fitter, found.final, found.noise)
         return found
 
     def _vehicle(self, nominal: Model, noise: Noise) -> tuple[Model, Noise]:
@@ -152,17 +150,21 @@ class _Search:
 
         What the numbers have not explained yet counts as noise, so the first steps are forgiving.
         """
-        model, cost = nominal, np.inf
+        model, cost, around, anew = nominal, np.inf, nominal.z, 0
         for turn in range(_TURNS):
             noise = self.fitter.estimated(model, noise, 60)
             model = self.fitter.fit(model, noise, 4)
-            if turn >= 2 and cost - model.cost < _SETTLED:
+            settled, cost = cost - model.cost < _SETTLED, model.cost
+            stale = bool(np.abs(model.z - around).max() > _STALE)
+            if settled and not stale:
                 break
-            cost = model.cost
-            if self.settings.relinearise and turn in _ANEW:
+            if self.settings.relinearise and stale and (turn < 2 or settled) and anew < _MOST_ANEW:
                 information = np.diag(self.fitter.products(noise))
                 self.steps = np.clip(_FINE / np.sqrt(np.maximum(information, 1e-9)), 0.03, _COARSE)
                 self._nuisance_columns(model.z)
+                around, anew = model.z, anew + 1
+            elif settled:
+                break
         return model, noise
 
     def _nuisance_columns(self, z: Floats) -> None:
@@ -228,10 +230,14 @@ class _Search:
         best = min(fitted, key=odds)
         # what the noise model had taken for noise: estimated again with the best leader in place
         tighter = self.fitter.estimated(best.model, noise, 80)
-        reference = min(self.fitter.fit(model, tighter, 3).cost, self.fitter.cost(model.residual, model.z, noise))
-        fitted = [self._gained(self._again(c, tighter), item, reference) for c, item in zip(fitted, top, strict=True)]
+        if self.fitter.cost(best.model.residual, best.model.z, tighter) > best.cost:
+            tighter = noise  # its parts are estimated in turn, so it need not be better
+        moved = self.fitter.fit(model, tighter, 3)
+        reference = min(moved.cost, self.fitter.cost(model.residual, model.z, noise))
+        again = [self._again(c, moved, tighter) for c in fitted]
+        fitted = [self._gained(c, item, reference) for c, item in zip(again, top, strict=True)]
         clear = sorted((c for c in fitted if c.gained >= found.least_gain), key=odds)
-        law = self._unlisted(found, model, tighter, reference, min(clear, key=odds, default=None))
+        law = self._unlisted(found, moved, tighter, reference, min(clear, key=odds, default=None))
         if law is not None:
             polished, tighter = self.fitter.settle(law.model, tighter, 1, 60)
             first = replace(law, model=polished)
@@ -263,6 +269,7 @@ class _Search:
             self.say("curves in no list")
             self.race = LawRace(self.fitter, self.fitter.world(model.z, model.terms), model)
         best = self.race.entries(self.fitter, model, noise)[0]
+        self.say(f"best curve: {best.curve.law.joint} by {best.curve.variable}, gain {best.gain:.0f}")
         rival = 0.0 if listed is None else 0.5 * (reference - odds(listed))
         least = least_gain(found.looks + len(LAWS), self.settings.alpha) * inflation(found.screened)
         if best.gain < least or best.evidence < rival + _CLEARER:
@@ -306,8 +313,12 @@ class _Search:
             fitted.terms[-1], fitted, fitted.cost, occam - float(np.log(item.candidate.places)), information
         )
 
-    def _again(self, contender: Contender, noise: Noise) -> Contender:
-        fitted = self.fitter.fit(contender.model, noise, 1, self.settings.relinearise)
+    def _again(self, contender: Contender, without: Model, noise: Noise) -> Contender:
+        """Fitted to other noise, from where it is or from where the vehicle's numbers went without it."""
+        beside = self.fitter.at(without.z, contender.model.terms, noise)
+        here = replace(contender.model, cost=self.fitter.cost(contender.model.residual, contender.model.z, noise))
+        start = beside if beside.cost < here.cost else here
+        fitted = self.fitter.fit(start, noise, 2, self.settings.relinearise)
         return replace(contender, model=fitted, term=fitted.terms[-1], cost=fitted.cost)
 
     def _backward(self, found: Diagnosis) -> None:

@@ -1,6 +1,6 @@
 """Logs into what the plant replays: inputs on a 10 ms grid, cut points, segments, and the tracks to compare."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -96,6 +96,18 @@ class Case:
                 numbers += 1
             parts.append(part)
         return np.concatenate(parts)
+
+
+def without_untold(logs: Sequence[Log], untold: Collection[str]) -> list[Log]:
+    """Logs without demands that no simulation can follow: the vehicle set says nothing of what acts on them."""
+    dropped: set[str] = set()
+    for effect, demands, measured in (
+        ("ehb_dead_time", PRESSURE_DEMAND, PRESSURE),
+        ("motor_tau", MOTOR_DEMAND, MOTOR_TORQUE),
+    ):
+        if effect in untold and all(log.has(*measured) for log in logs):
+            dropped |= set(demands)
+    return [replace(log, channels={n: v for n, v in log.channels.items() if n not in dropped}) for log in logs]
 
 
 def prepare(logs: Sequence[Log], radius_m: float) -> Case:

@@ -132,7 +132,8 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
     changes, gains = _changes(numbers, base, where)
     unlimited = [section for section in UNLIMITED if section not in changes]
     for section in unlimited:
-        changes[section] = dict(UNLIMITED[section])
+        if UNLIMITED[section]:
+            changes[section] = dict(UNLIMITED[section])
         for name in UNLIMITED[section]:
             shipped.pop(f"{section}_{name}", None)
     if unlimited:

@@ -96,6 +96,7 @@ UNLIMITED: Final = {
         "peak_torque_nm": 5e3, "peak_power_w": 5e5, "rate_limit_nm_s": 1e6, "fade_end_mps": 0.0, "fade_start_mps": 0.1,
     },
     "battery": {"charge_power_w": 1e6, "discharge_power_w": 1e6},
+    "tyre": {},
 }  # fmt: skip
 """Limits that do not act, for a section of which a set says nothing: another car's limits would be wrong."""
 
@@ -106,5 +107,6 @@ OF_SECTION: Final = {
     ),
     "motor": ("motor_tau", "regen_fadeout", "iwm_derating", "iwm_field", "cogging", "current_torque"),
     "battery": ("battery_soc",),
+    "tyre": ("slip_stiffness", "tyre_relaxation", "load_sensitivity", "tyre_temperature", "low_speed", "mu_road"),
 }  # fmt: skip
 """Effects that change what a section states: where it states nothing, nothing can be told from it."""

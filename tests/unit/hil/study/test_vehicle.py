@@ -62,7 +62,7 @@ def test_what_a_set_says_nothing_of_is_not_judged() -> None:
     assert {"ehb_dead_time", "motor_tau", "battery_soc"} <= set(car.untold)
     assert car.parameters.motor.peak_torque_nm > 2000.0
     assert any("nothing said of ehb, motor, battery" in text for text in car.remarks)
-    told = load_vehicle({**SIX, "ehb_dead_time_s": 0.02, "motor_peak_torque_nm": 400.0})
+    told = load_vehicle({**SIX, "ehb_dead_time_s": 0.02, "motor_peak_torque_nm": 400.0, "tyre_lkx": 1.0})
     assert set(told.untold) == {"battery_soc"}
     assert told.parameters.motor.peak_torque_nm == 400.0
     assert paper_car().untold == ()
