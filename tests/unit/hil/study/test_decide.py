@@ -11,6 +11,7 @@ from hil.study.decide import FOLDER, MOST, STRAIGHT_STOP, decide_with, separatio
 from hil.study.tied import APART
 from hil.virtual import simulate
 
+pytestmark = pytest.mark.slow
 TIED = [
     ("mass_offset", "pad_mu_gain", "headwind", "rolling_resistance"),
     ("mass_offset@car", "pad_mu_gain@front", "pad_mu_gain@rear", "headwind.drag_gain@car"),
