@@ -25,9 +25,7 @@ def test_nothing_hidden_is_nothing_found(index: int) -> None:
     assert run_case(draw("null", index, SEED), SEED, None)["causes"] == []
 
 
-@pytest.mark.parametrize(
-    "effect", ["pad_temp_fade", pytest.param("mu_nv_dynamics", marks=MISSED), pytest.param("mu_warmup", marks=MISSED)]
-)
+@pytest.mark.parametrize("effect", ["pad_temp_fade", "mu_nv_dynamics", pytest.param("mu_warmup", marks=MISSED)])
 def test_a_single_cause_is_named(effect: str) -> None:
     record = run_case(draw("single", SINGLES.index(effect), SEED, 15.0), SEED, 15.0)
     assert record["hidden"][0]["effect"] == effect
