@@ -91,7 +91,7 @@ def read_effects(tables: Mapping[str, Any], where: str) -> Effects:
 
     In it each parameter is a number, a list (one for each member) or a table by member (``{fl = 0.2}``); ``onset_s``
     and ``until_s`` are of the manoeuvre's clock; ``at`` names the members it is to act on. Without any strength it acts
-    at its typical size.
+    at its typical size. The list ``laws`` has curves of one variable at a joint, see `read_laws`.
 
     Raises
     ------
@@ -131,6 +131,8 @@ def read_laws(laws: Any, where: str) -> Vector:
     """
     rows = []
     for k, law in enumerate(laws if isinstance(laws, list) else [laws]):
+        if not isinstance(law, Mapping):
+            raise EffectError(f"{where}[{k}]: expected a table, got {law!r}")
         try:
             members = [Scope.WHEEL.members.index(wheel) for wheel in law.get("at", [])]
             value = float(law["value"])
@@ -139,17 +141,25 @@ def read_laws(laws: Any, where: str) -> Vector:
             rows.append(term(law["joint"], coefficient, shaped, add=bool(law.get("adds", False))))
         except KeyError as error:
             raise EffectError(f"{where}[{k}]: {error.args[0]!r} is missing or unknown") from error
-        except (ValueError, TypeError, AttributeError) as error:
+        except (ValueError, TypeError) as error:
             raise EffectError(f"{where}[{k}]: {error.args[0] if error.args else error}") from error
     return np.array(rows) if rows else NO_TERMS.copy()
 
 
 def written_laws(terms: Vector) -> list[dict[str, Any]]:
-    """Tables that `read_laws` makes the same rows of."""
+    """Tables that `read_laws` makes the same rows of; for hats at joints of `plant.effects.places`.
+
+    Raises
+    ------
+    EffectError
+        A row that acts on a number of the parameter set.
+    """
     begins = {int(getattr(J, place(joint))): joint for joint in JOINTS}
     laws = []
     for row in terms:
         target, size, adds = int(row[0]), int(row[1]), bool(row[2] > 0.5)
+        if target < 0:
+            raise EffectError("a law at a number of the parameter set; expected one at a joint")
         law: dict[str, Any] = {"joint": begins[target - (size if adds else 0)]}
         law |= {"variable": Variable(int(row[7])).name.lower(), "adds": adds}
         law |= {"centre": float(row[9]), "width": float(row[10]), "value": float(row[3])}

@@ -1,4 +1,4 @@
-"""Fixed steps of the model: semi-implicit for everyday use, Runge-Kutta for reference."""
+"""Fixed steps of the model: semi-implicit for everyday use, Runge-Kutta for reference, exponential for long steps."""
 
 from math import cos, exp, sin
 

@@ -37,7 +37,7 @@ def answer(
     """Put the answer together; manoeuvres to drive next are written into ``out``."""
     causes, tied = _causes(found), _tied(found)
     fitted = _rivals(found)
-    rivals = [_rival(c, p) for _, c, p in fitted]
+    rivals = [_rival(c, p) for c, p in fitted]
     known = {c["effect"] for c in (*causes, *rivals)}
     rivals += [entry for entry in _imitations(found, tied) if entry["effect"] not in known]
     verdict = _verdict(found, causes, tied)
@@ -71,7 +71,7 @@ def _verdict(found: Diagnosis, causes: list[dict[str, Any]], tied: Tied | None) 
         return "unlisted"
     if tied is not None and tied.indices:
         return "cannot_tell_apart"
-    for listed in found.contenders:
+    for listed in found.races:
         best = listed[0]
         for other in listed[1:]:
             another = other.term.candidate.effect.name != best.term.candidate.effect.name
@@ -122,28 +122,24 @@ def _unlisted(found: Diagnosis, piece: Piece, listed: list[Contender]) -> dict[s
     """The entry of a law in no list: where, on what, and the curve with its band."""
     terms, covariance = found.final.terms, found.final.covariance
     own = [k for k, term in enumerate(terms) if isinstance(term.candidate, Piece)]
-    known = covariance[np.ix_(own, own)] if covariance.shape[0] == len(terms) else np.zeros((len(own), len(own)))
     pieces = [term.candidate for term in terms if isinstance(term.candidate, Piece)]
     return {
         "effect": NAME, "title": piece.effect.title, "joint": piece.law.joint, "wheel": piece.place, "parameters": {},
         "probability": probabilities(listed)[0], "onset": None, "onset_s": None, "variables": [piece.variable],
         "adds": piece.law.adds,
-        "curve": shown(pieces, [terms[k].value for k in own], known),
+        "curve": shown(pieces, [terms[k].value for k in own], covariance[np.ix_(own, own)]),
     }  # fmt: skip
 
 
-def _rivals(found: Diagnosis) -> list[tuple[int, Contender, float]]:
+def _rivals(found: Diagnosis) -> list[tuple[Contender, float]]:
+    """Contenders of other effects that fit nearly as well, with their probability."""
     rivals = []
-    laws = [isinstance(term.candidate, Piece) for term in found.final.terms]
-    for k, listed in enumerate(found.contenders):
-        if laws[k] and any(laws[:k]):
-            continue  # the pieces of a law share their rivals
-        chances = probabilities(listed)
-        named = {term.candidate.effect.name for term in found.final.terms}
-        for contender, chance in list(zip(listed, chances, strict=True))[1:]:
+    named = {term.candidate.effect.name for term in found.final.terms}
+    for listed in found.races:
+        for contender, chance in list(zip(listed, probabilities(listed), strict=True))[1:]:
             near = contender.cost - listed[0].cost < TIED
             if near and contender.term.candidate.effect.name not in named:
-                rivals.append((k, contender, chance))
+                rivals.append((contender, chance))
     return rivals
 
 
@@ -188,11 +184,11 @@ def _imitations(found: Diagnosis, tied: Tied | None) -> list[dict[str, Any]]:
 
 
 def _decide_with(
-    found: Diagnosis, tied: Tied | None, fitted: list[tuple[int, Contender, float]], out: Path | None
+    found: Diagnosis, tied: Tied | None, fitted: list[tuple[Contender, float]], out: Path | None
 ) -> list[dict[str, Any]]:
     """Scenarios that tell the tied causes apart, the best first."""
     names = [term.candidate.name for term in found.final.terms[:1]]
-    names += [contender.term.candidate.name for _, contender, _ in fitted]
+    names += [contender.term.candidate.name for contender, _ in fitted]
     names += [found.screened[k].candidate.name for k in (() if tied is None else tied.indices)]
     unique = {name.split("@")[0].split(".")[0]: name for name in reversed(names)}  # the first of each effect
     if len(unique) < 2:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hil.study.candidates import Candidate
+from hil.study.candidates import PLACES, Candidate
 from hil.study.table import Floats
 from hil.study.world import Rig, World
 from plant.effects.bank import Shape, Variable, term
@@ -18,16 +18,12 @@ from plant.effects.places import JOINTS
 
 PIECES = 5
 NAME = "unlisted"
-_PLACES = {
-    "car": (0, 1, 2, 3), "front": (0, 1), "rear": (2, 3), "left": (0, 2), "right": (1, 3),
-    "fl": (0,), "fr": (1,), "rl": (2,), "rr": (3,),
-}  # fmt: skip
-_WHEELS = ("fl", "fr", "rl", "rr")
+_WHEELS = Scope.WHEEL.members
 _CALLED = {
     Variable.SPEED: "speed", Variable.WHEEL_SPEED: "wheel_speed", Variable.PRESSURE: "pressure",
     Variable.DISC_TEMPERATURE: "disc_temperature", Variable.APPLIED_TIME: "time_since_on", Variable.TIME: "time",
     Variable.MOTOR_TORQUE: "motor_torque", Variable.ACCELERATION: "acceleration", Variable.YAW_RATE: "yaw_rate",
-    Variable.DISTANCE: "distance", Variable.SLIP: "slip",
+    Variable.DISTANCE: "distance",
 }  # fmt: skip
 _COLUMNS = {
     Variable.SPEED: ["state.speed_mps"], Variable.WHEEL_SPEED: [f"state.wheel_speed_rad_s_{w}" for w in _WHEELS],
@@ -35,7 +31,7 @@ _COLUMNS = {
     Variable.DISC_TEMPERATURE: [f"state.disc_temperature_k_{w}" for w in _WHEELS], Variable.TIME: ["state.time_s"],
     Variable.MOTOR_TORQUE: [f"motor_torque_nm_{w}" for w in _WHEELS],
     Variable.ACCELERATION: ["state.imu_longitudinal_mps2"], Variable.YAW_RATE: ["state.yaw_rate_rad_s"],
-    Variable.DISTANCE: ["state.distance_m"], Variable.SLIP: [f"state.slip_{w}" for w in _WHEELS],
+    Variable.DISTANCE: ["state.distance_m"],
 }  # fmt: skip
 _APPLIED_S = (0.0, 4.0)
 _EDGE, _LEAST_RANGE = 0.01, 1e-6
@@ -94,7 +90,7 @@ class Piece(Candidate):
 
     def members(self) -> tuple[int, ...]:
         """Members of the joint it acts on."""
-        return _PLACES[self.place] if self.law.scope is Scope.WHEEL else (0,)
+        return PLACES[self.law.scope][self.place]
 
     def row(self, value: float) -> Floats:
         """Its row of the bank."""
@@ -132,16 +128,17 @@ def curves(rig: Rig, world: World) -> list[Curve]:
     for law in LAWS:
         low, high = seen[_acting(law), law.variable]
         if high - low > _LEAST_RANGE:
-            found.append(_curve(law, low, high))
+            found.append(curve_of(law, low, high))
     return found
 
 
 def places(curve: Curve) -> Iterator[Curve]:
     """The law at every place."""
-    return (curve.at(place) for place in (_PLACES if curve.law.scope is Scope.WHEEL else ("car",)))
+    return (curve.at(place) for place in PLACES[curve.law.scope])
 
 
-def _curve(law: Law, low: float, high: float) -> Curve:
+def curve_of(law: Law, low: float, high: float) -> Curve:
+    """A law at all members, its hats evenly over a range of its variable."""
     centres = np.linspace(low, high, PIECES)
     unit = JOINTS[law.joint][1] if law.adds else ""
     bound = 20.0 * law.usual if law.adds else 0.9

@@ -11,7 +11,7 @@ from plant.effects.theta import THETA
 _SHARE = 0.05
 _SHARES = {"sus_compliance": 0.5}
 """Of what is usual, for a finite difference; stiffer hubs would swing too fast for the replay's steps."""
-_GROUPS: Mapping[Scope, Mapping[str, tuple[int, ...]]] = {
+PLACES: Mapping[Scope, Mapping[str, tuple[int, ...]]] = {
     Scope.CAR: {"car": (0,)},
     Scope.AXLE: {"car": (0, 1), "front": (0,), "rear": (1,)},
     Scope.WHEEL: {
@@ -20,6 +20,9 @@ _GROUPS: Mapping[Scope, Mapping[str, tuple[int, ...]]] = {
     },
     Scope.NODE: {node: (k,) for k, node in enumerate(NODES)},
 }  # fmt: skip
+"""Members of a scope that move together, by the name of the place."""
+USUAL = 1.5
+"""Standard deviation before any data, in sizes met on real cars."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +61,15 @@ class Candidate:
         extra = "" if len(self.effect.strengths) == 1 else f".{self.parameter.name}"
         return f"{self.effect.name}{extra}@{self.place}"
 
+    @property
+    def spread(self) -> float:
+        """Standard deviation of its value before any data."""
+        parameter = self.parameter
+        return USUAL * abs(parameter.typical) if parameter.typical else 0.5 * (parameter.high - parameter.low)
+
     def members(self) -> tuple[int, ...]:
         """Members of the effect's scope it moves."""
-        return _GROUPS[self.effect.scope][self.place]
+        return PLACES[self.effect.scope][self.place]
 
     def applied(self, world: World, value: float) -> World:
         """The world with this number set (added to what is there) at this place."""
@@ -89,7 +98,7 @@ def candidates(of: list[Column]) -> list[Candidate]:
     }
     found = []
     for effect in dict.fromkeys(column.effect for column in of):
-        groups = _GROUPS[effect.scope]
+        groups = PLACES[effect.scope]
         for parameter in effect.strengths:
             for place, members in groups.items():
                 at = tuple(index[effect.name, parameter.name, member] for member in members)

@@ -24,7 +24,7 @@ from hil.study.linear import project, sums, track_columns
 from hil.study.noise import Frame, Noise, first_guess, tracks_of
 from hil.study.prepare import prepare
 from hil.study.table import CHANNELS, MOTOR_DEMAND, PRESSURE_DEMAND, Floats, Log, make_log
-from hil.study.tied import APART, remaining, spread, summed
+from hil.study.tied import APART, remaining, summed
 from hil.study.vehicle import Vehicle, paper_car
 from hil.study.world import Rig, Stack, World, nominal
 from plant.effects.effect import Scope
@@ -38,7 +38,7 @@ MOST = 3
 STRAIGHT_STOP = "straight_stop"
 """Of `plant.effects.manoeuvres`: what every drive is compared with."""
 FOLDER = "decide_with"
-_LONGEST_S, _SETTLE_S = 90.0, 0.4
+_LONGEST_S = 90.0
 _VISIBLE = 1.0
 _OF_THE_ROAD = ("road_grade.grade", "headwind.wind_mps")
 """Numbers that change sign when the same stretch is driven back."""
@@ -135,7 +135,7 @@ def _items(effects: Sequence[str]) -> list[Candidate]:
         return [listed[0] for listed in choices]
     flat = [candidate for listed in choices for candidate in listed]
     products = _products(STRAIGHT_STOP, flat, False)
-    precision, sizes = np.array([spread(c) ** -2.0 for c in flat]), [c.parameter.typical for c in flat]
+    precision, sizes = np.array([c.spread**-2.0 for c in flat]), [c.parameter.typical for c in flat]
     found, begin = [], 0
     for listed in choices:
         own = range(begin, begin + len(listed))
@@ -225,18 +225,9 @@ def _ground(name: str, both_ways: bool) -> _Ground:
     world = nominal(car)
     rig = Rig(prepare(logs, radius), car).quieted(world)
     rig.keep(world)
-    frame, base = _settled(Frame.of(rig.case)), rig.run(world)
+    frame, base = Frame.of(rig.case), rig.run(world)
     residual = tracks_of(rig.residual(world), frame, radius)
     return _Ground(rig, frame, first_guess(residual, frame), world, base)
-
-
-def _settled(frame: Frame) -> Frame:
-    """Without the first moments of each segment: a car of another radius begins them with a slip nobody drove."""
-    begun = np.flatnonzero((frame.fresh > 0.5) | (frame.restart > 0.5))
-    late = np.ones(len(frame.fresh))
-    for k in begun:
-        late[k : k + round(_SETTLE_S / frame.sample_s)] = 0.0
-    return replace(frame, present={name: known * late for name, known in frame.present.items()})
 
 
 @cache
@@ -259,7 +250,7 @@ def _log(name: str, driven: Drive, disc_k: float, direction: int) -> Log:
 def _separation(name: str, items: Sequence[Candidate], both_ways: bool) -> float:
     """Worst separation of the items at their usual sizes."""
     products = _products(name, items, both_ways)
-    precision = np.array([spread(c) ** -2.0 for c in items])
+    precision = np.array([c.spread**-2.0 for c in items])
     left = []
     for k, item in enumerate(items):
         others = [j for j, other in enumerate(items) if other.effect.name != item.effect.name]

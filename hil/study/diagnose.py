@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hil.study.basis import LAWS, Piece
+from hil.study.basis import LAWS, PIECES, Piece
 from hil.study.candidates import Candidate, Column, candidates, columns
 from hil.study.fit import Fitter, Model, Term, Tracks
 from hil.study.linear import Sums, project, track_columns
@@ -13,11 +13,11 @@ from hil.study.noise import Frame, Noise
 from hil.study.onset import with_onsets
 from hil.study.own_error import variance_of
 from hil.study.prepare import Case
-from hil.study.race import LawRace, least_gain, occam
+from hil.study.race import LawRace, least_gain, share_left
 from hil.study.screen import Score, inflation, leaders, not_testable, score, scores, threshold
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
-from hil.study.world import Rig, Stack, World, start_nuisances
+from hil.study.world import Rig, World, start_nuisances
 
 Say = Callable[[str], None]
 ALPHA = 0.003
@@ -26,6 +26,7 @@ LEADERS = 6
 _OF_SCREEN = 1.5
 TIED = 9.2
 _CLEARER = 5.0
+"""By how much more than the best listed cause a law in no list must explain, log of the odds."""
 _KINKED = ("late_demand", "ehb_dead_time_s")
 _TURNS, _MOST_ANEW, _SETTLED, _STALE = 10, 4, 3.0, 0.2
 _COARSE, _FINE = 0.5, 3.0
@@ -73,8 +74,8 @@ def causes_in(model: Model) -> int:
 class Diagnosis:
     """Everything the diagnosis found.
 
-    ``base`` explains with nuisances alone, ``final`` with the accepted causes; ``contenders`` has, for each accepted
-    cause, all that were fitted in its place, best first.
+    ``base`` explains with nuisances alone, ``final`` with the accepted causes; ``contenders`` has, for each term of
+    ``final``, all that were fitted in its place, best first.
     """
 
     case: Case
@@ -92,6 +93,11 @@ class Diagnosis:
     looks: int = 0
     least_gain: float = 0.0
     remarks: list[str] = field(default_factory=list)
+
+    @property
+    def races(self) -> list[list[Contender]]:
+        """The contenders for each cause; the terms of a law in no list were accepted in one race."""
+        return list({id(listed): listed for listed in self.contenders}.values())
 
 
 def diagnose(
@@ -169,7 +175,7 @@ class _Search:
 
     def _nuisance_columns(self, z: Floats) -> None:
         base = self.rig.run(self._shifted(z))
-        sides = np.array([self._side(k, z, base) for k in range(len(z))])
+        sides = np.array([self._side(k, z) for k in range(len(z))])
         steps = np.where(sides == 0.0, 1.0, sides) * self.steps
         worlds = [self._shifted(z + step * (np.arange(len(z)) == k)) for k, step in enumerate(steps)]
         tracks = track_columns(self.rig, self.frame, base, worlds, steps.tolist())
@@ -178,7 +184,7 @@ class _Search:
     def _shifted(self, z: Floats) -> World:
         return self.base_world.shifted(self.nuisances, z)
 
-    def _side(self, k: int, z: Floats, base: Stack) -> float:
+    def _side(self, k: int, z: Floats) -> float:
         """Which side of 0 counts for what has a kink there (held demands by steps); 0 for all others."""
         if self.nuisances[k].name not in _KINKED:
             return 0.0
@@ -275,8 +281,9 @@ class _Search:
         if best.gain < least or best.evidence < rival + _CLEARER:
             return None
         fitted = self.fitter.fit(self.fitter.at(model.z, (*model.terms, *best.terms), noise), noise, 3)
-        law = Contender(fitted.terms[-1], fitted, fitted.cost, occam(best, fitted.covariance), 0.0)
-        law = replace(law, gained=reference - law.cost)
+        values = np.array([term.value for term in fitted.terms[-PIECES:]])
+        left = share_left(best, values, fitted.covariance[-PIECES:, -PIECES:])
+        law = Contender(fitted.terms[-1], fitted, fitted.cost, left, 0.0, reference - fitted.cost)
         if law.gained < least or 0.5 * (reference - odds(law)) < rival + _CLEARER:
             return None
         return law
@@ -304,8 +311,7 @@ class _Search:
         return self._judged(fitted, item, noise)
 
     def _judged(self, fitted: Model, item: Score, noise: Noise) -> Contender:
-        parameter = item.candidate.parameter
-        tau = 1.5 * abs(parameter.typical) if parameter.typical else 0.5 * (parameter.high - parameter.low)
+        tau = item.candidate.spread
         information = 1.0 / max(float(fitted.covariance[-1, -1]), 1e-30) if fitted.covariance.size else item.information
         value = fitted.terms[-1].value
         occam = -0.5 * float(np.log1p(information * tau * tau)) - 0.5 * (value / tau) ** 2

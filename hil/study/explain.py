@@ -13,7 +13,7 @@ from hil.study.diagnose import Say, Settings, diagnose
 from hil.study.extension import load_extension, write_extension
 from hil.study.measure import gains
 from hil.study.patterns import wrongs
-from hil.study.prepare import prepare, without_untold
+from hil.study.prepare import prepare, without_unstated
 from hil.study.read import from_frame, read_logs
 from hil.study.table import Log
 from hil.study.vehicle import Vehicle, load_vehicle
@@ -49,7 +49,7 @@ def explain(
     why = unforced(read, float(car.parameters.wheel.rolling_radius_m))
     if why:
         return check(read, car, why, extend, out, say or (lambda _: None))
-    case = prepare(without_untold(read, car.untold), float(car.parameters.wheel.rolling_radius_m))
+    case = prepare(without_unstated(read, car.unstated), float(car.parameters.wheel.rolling_radius_m))
     handed_in = nominal(car)
     base = handed_in if extend is None else load_extension(Path(extend)).applied(handed_in)
     found = diagnose(case, car, base, settings, say)

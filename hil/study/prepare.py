@@ -98,16 +98,26 @@ class Case:
         return np.concatenate(parts)
 
 
-def without_untold(logs: Sequence[Log], untold: Collection[str]) -> list[Log]:
+def without_unstated(logs: Sequence[Log], unstated: Collection[str]) -> Sequence[Log]:
     """Logs without demands that no simulation can follow: the vehicle set says nothing of what acts on them."""
     dropped: set[str] = set()
-    for effect, demands, measured in (
-        ("ehb_dead_time", PRESSURE_DEMAND, PRESSURE),
-        ("motor_tau", MOTOR_DEMAND, MOTOR_TORQUE),
-    ):
-        if effect in untold and all(log.has(*measured) for log in logs):
+    for section, demands, measured in (("ehb", PRESSURE_DEMAND, PRESSURE), ("motor", MOTOR_DEMAND, MOTOR_TORQUE)):
+        if section in unstated and all(log.has(*measured) for log in logs):
             dropped |= set(demands)
-    return [replace(log, channels={n: v for n, v in log.channels.items() if n not in dropped}) for log in logs]
+    return _without(logs, dropped)
+
+
+def _without(logs: Sequence[Log], channels: Collection[str], *remarks: str) -> Sequence[Log]:
+    if not channels:
+        return logs
+    return [
+        replace(
+            log,
+            channels={name: values for name, values in log.channels.items() if name not in channels},
+            remarks=(*log.remarks, *remarks),
+        )
+        for log in logs
+    ]
 
 
 def prepare(logs: Sequence[Log], radius_m: float) -> Case:
@@ -167,17 +177,7 @@ def _without_contradicted(logs: Sequence[Log]) -> Sequence[Log]:
                 acting = given > much
                 if acting.any() and (asked[acting] < none).mean() > _CONTRADICTED:
                     dropped |= set(demands)
-    if not dropped:
-        return logs
-    remark = "demands left out: the brakes or motors act while nothing is asked of them"
-    return [
-        replace(
-            log,
-            channels={name: values for name, values in log.channels.items() if name not in dropped},
-            remarks=(*log.remarks, remark),
-        )
-        for log in logs
-    ]
+    return _without(logs, dropped, "demands left out: the brakes or motors act while nothing is asked of them")
 
 
 def _costs(there: set[str]) -> list[str]:

@@ -21,12 +21,16 @@ _WHEELS = ("fl", "fr", "rl", "rr")
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """A law at a place: coefficients of one linear step, gain in chi2, log of its Bayes factor."""
+    """A law at a place: coefficients of one linear step, gain in chi2, log of its Bayes factor.
+
+    ``choices`` is the number of laws and places that it was chosen from.
+    """
 
     curve: Curve
     values: Floats
     gain: float
     evidence: float
+    choices: int
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -58,48 +62,48 @@ class LawRace:
         accepted = len(model.terms)
         projected = project(sums.total(), sums.nuisances, range(accepted), model.z)
         b, q = projected.b[accepted:], projected.q[accepted:, accepted:]
+        choices = sum(len(self._offered(curve, of)) for curve, of in zip(self._curves, self._single, strict=True))
         found, at = [], 0
         for curve, of in zip(self._curves, self._single, strict=True):
             size = PIECES * len(of)
             own = slice(at, at + size)
-            found += self._of(curve, len(of), b[own], q[own, own])
+            for placed in self._offered(curve, of):
+                members = placed.pieces[0].members() if len(of) > 1 else (0,)
+                moves = np.hstack([np.eye(PIECES) * float(wheel in members) for wheel in range(len(of))])
+                found.append(_entry(placed, moves @ b[own], moves @ q[own, own] @ moves.T, choices))
             at += size
-        prior = float(np.log(max(len(found), 1)))
-        return sorted((_fined(entry, prior) for entry in found), key=lambda entry: -entry.evidence)
+        return sorted(found, key=lambda entry: -entry.evidence)
 
     @staticmethod
-    def _of(curve: Curve, wheels: int, b: Floats, q: Floats) -> list[Entry]:
-        """One law at each place: columns of single wheels summed."""
-        found = []
-        usual = np.full(PIECES, curve.law.usual**-2.0)
-        for placed in places(curve) if wheels > 1 else [curve]:
-            members = placed.pieces[0].members() if wheels > 1 else (0,)
-            moves = np.hstack([np.eye(PIECES) * float(wheel in members) for wheel in range(wheels)])
-            own_b, own_q = moves @ b, moves @ q @ moves.T
-            a = own_q + np.diag(usual)
-            values = np.linalg.solve(a, own_b)
-            gain = float(values @ own_b)
-            occam = float(np.linalg.slogdet(a)[1] + np.log(usual**-1.0).sum())
-            found.append(Entry(placed, values, gain, 0.5 * (gain - occam)))
-        return found
+    def _offered(curve: Curve, of: Sequence[Curve]) -> list[Curve]:
+        """The law at every place where it is in the race: columns of single wheels are summed."""
+        return list(places(curve)) if len(of) > 1 else [curve]
 
 
-def occam(entry: Entry, covariance: Floats) -> float:
-    """Log of the share of its prior that a fitted law uses up."""
+def _entry(curve: Curve, b: Floats, q: Floats, choices: int) -> Entry:
+    usual = curve.law.usual
+    values = np.linalg.solve(q + np.eye(PIECES) / usual**2, b)
+    gain = float(values @ b)
+    return Entry(curve, values, gain, 0.5 * gain + _volume(q, usual) - float(np.log(choices)), choices)
+
+
+def _volume(information: Floats, usual: float) -> float:
+    """Log of the share of its prior that the data leave a law; hats they say nothing of cost nothing."""
+    return -0.5 * float(np.linalg.slogdet(np.eye(PIECES) + usual**2 * information)[1])
+
+
+def share_left(entry: Entry, values: Floats, covariance: Floats) -> float:
+    """Log of the prior's density and of the share of it that is left, at the fitted coefficients.
+
+    Parameters
+    ----------
+    values, covariance : (PIECES,) and (PIECES, PIECES) of the law's coefficients, from the data alone.
+    """
     usual = entry.curve.law.usual
-    if covariance.shape[0] < PIECES:
-        return entry.evidence - 0.5 * entry.gain
-    own = covariance[-PIECES:, -PIECES:]
-    return 0.5 * (float(np.linalg.slogdet(own)[1]) - 2.0 * PIECES * float(np.log(usual)))
+    density = -0.5 * float(values @ values) / usual**2
+    return density + _volume(np.linalg.inv(covariance), usual) - float(np.log(entry.choices))
 
 
 def least_gain(looks: int, alpha: float) -> float:
     """Gain that nothing hidden exceeds with probability ``alpha`` in so many looks, the model's error included."""
     return float(chi2.isf(alpha / max(looks, 1), PIECES)) * USUAL**2
-
-
-def _fined(entry: Entry, prior: float) -> Entry:
-    return Entry(entry.curve, entry.values, entry.gain, entry.evidence - prior)
-
-
-__all__ = ["Entry", "LawRace", "least_gain", "occam"]

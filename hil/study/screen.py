@@ -6,11 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from hil.study.candidates import Candidate
+from hil.study.candidates import USUAL, Candidate
 from hil.study.linear import Projected
 from hil.study.own_error import variance_of
 
-_USUAL = 1.5
 SEEN = 3.0
 _MEDIAN_CHI2 = 0.455
 _MOST_INFLATION = 6.0
@@ -46,7 +45,7 @@ def score(candidate: Candidate, b: float, q: float, now: float = 0.0) -> Score:
     """Score from the products of the column with the residual and with itself."""
     parameter = candidate.parameter
     q = max(q, 0.0)
-    tau = _USUAL * abs(parameter.typical) if parameter.typical else 0.5 * (parameter.high - parameter.low)
+    tau = candidate.spread
     largest = max(abs(parameter.low), abs(parameter.high))
     if q * largest**2 < 1e-6:
         return Score(candidate, 0.0, 0.0, 0.0, 0.0, 0.0, q)
@@ -56,7 +55,7 @@ def score(candidate: Candidate, b: float, q: float, now: float = 0.0) -> Score:
     raw = gain
     gain /= variance_of(candidate)
     evidence = 0.5 * (raw - (step / tau) ** 2) - 0.5 * float(np.log1p(q * tau * tau)) - float(np.log(candidate.places))
-    reach, usual = largest * float(np.sqrt(q)), tau / _USUAL * float(np.sqrt(q))
+    reach, usual = largest * float(np.sqrt(q)), tau / USUAL * float(np.sqrt(q))
     return Score(candidate, now + step, gain, evidence, reach, usual, q, raw)
 
 

@@ -215,8 +215,7 @@ def _race(answer: Answer) -> Section:
     """Who was in the race, and how far apart they are."""
     found = answer.found
     tables = []
-    races = list({id(listed): listed for listed in found.contenders}.values())  # the pieces of a law share one
-    for k, listed in enumerate(races):
+    for k, listed in enumerate(found.races):
         chances = probabilities(listed)
         rows = tuple(
             (

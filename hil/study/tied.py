@@ -15,7 +15,6 @@ from hil.study.table import Floats
 APART = 2.0
 """Standard deviations that must be left of a signature for it to be told from its imitation."""
 MOST_RIVALS = 4
-_USUAL = 1.5
 _LEAST_SHARE = 0.02
 
 
@@ -45,12 +44,6 @@ class Tied:
         return tuple(dict.fromkeys((*self.members, *(index for index, _ in self.pairs))))
 
 
-def spread(candidate: Candidate) -> float:
-    """Standard deviation of a candidate's value before any data: one and a half of what is met on real cars."""
-    parameter = candidate.parameter
-    return _USUAL * abs(parameter.typical) if parameter.typical else 0.5 * (parameter.high - parameter.low)
-
-
 def summed(q: Floats, candidates: Sequence[Candidate], offset: int = 0) -> Floats:
     """Products of the candidates' signatures: columns that move together summed, (candidates, candidates)."""
     moves = np.zeros((len(candidates), q.shape[0]))
@@ -72,7 +65,7 @@ def tied_set(q: Floats, candidates: Sequence[Candidate], named: int, value: floa
     value : of the named one, in its unit.
     """
     bounds = np.array([(c.parameter.low, c.parameter.high) for c in candidates])
-    precision = np.array([spread(c) for c in candidates]) ** -2.0
+    precision = np.array([c.spread for c in candidates]) ** -2.0
     own = candidates[named].effect.name
     allowed = np.array([c.effect.name != own for c in candidates])
     return imitation(summed(q, candidates, offset), precision, bounds, named, value, allowed)

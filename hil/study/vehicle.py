@@ -57,7 +57,7 @@ class Vehicle:
     nuisances : what may be off, by tolerance.
     pad_temperature_matters : False where the brake has one gain and no friction model.
     remarks : unknown keys and defaults taken, for the report.
-    untold : effects on what the set says nothing of, so that no deviation can be told.
+    unstated : sections that the set says nothing of (keys of `hil.study.vehicle_keys.OF_SECTION`).
     """
 
     parameters: PlantParameters
@@ -65,7 +65,12 @@ class Vehicle:
     nuisances: tuple[Nuisance, ...]
     pad_temperature_matters: bool
     remarks: tuple[str, ...] = ()
-    untold: tuple[str, ...] = ()
+    unstated: tuple[str, ...] = ()
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """Effects on sections that are not stated, so that no deviation can be told."""
+        return tuple(effect for section in self.unstated for effect in OF_SECTION[section])
 
 
 def paper_car() -> Vehicle:
@@ -137,7 +142,10 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
         for name in UNLIMITED[section]:
             shipped.pop(f"{section}_{name}", None)
     if unlimited:
-        remarks.append(f"{where}: nothing said of {', '.join(unlimited)}, so no limits of theirs are simulated")
+        remarks.append(
+            f"{where}: nothing said of {', '.join(unlimited)}, so no limits of theirs are simulated "
+            "and no demand is compared"
+        )
     parameters = override(base, changes, where)
     friction = any(name.startswith("pad_") for name in numbers)
     if gains and not friction:
@@ -160,8 +168,8 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
     if missing:
         remarks.append(f"{where}: not given, so a usual value with wide uncertainty: {', '.join(missing)}")
     tolerance |= {n: max(t, shipped.get(n, 0.0)) if n.startswith("suspension") else t for n, t in tolerances.items()}
-    untold = tuple(effect for section in unlimited for effect in OF_SECTION[section])
-    return replace(_vehicle(parameters, tolerance, friction or not gains, tuple(remarks)), untold=untold)
+    vehicle = _vehicle(parameters, tolerance, friction or not gains, tuple(remarks))
+    return replace(vehicle, unstated=tuple(unlimited))
 
 
 def _derive(

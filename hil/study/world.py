@@ -239,7 +239,7 @@ class Rig:
     def run(self, world: World) -> Stack:
         """Simulated channels of all drives."""
         self.runs += 1
-        parts = [self._drive(k, drive, world) for k, drive in enumerate(self.case.drives)]
+        parts = [self._drive(drive, world) for drive in self.case.drives]
         return {group: np.concatenate([part[group] for part in parts]) for group in self._groups}
 
     def keep(self, world: World) -> None:
@@ -284,9 +284,9 @@ class Rig:
         told = wheel_speed_before(segment.start_wheel_rad_s, world.theta_in(drive))
         return max(told, 0.0) * float(np.median(_radius_m(world)))
 
-    def _drive(self, number: int, drive: Drive, world: World) -> Stack:
+    def _drive(self, drive: Drive, world: World) -> Stack:
         kept = self._kept
-        raw = kept[1][number] if kept is not None and _moves_alike(world, kept[0]) else self._raw(drive, world)
+        raw = kept[1][drive.number] if kept is not None and _moves_alike(world, kept[0]) else self._raw(drive, world)
         stack = sensed(raw, world.theta_in(drive), ROW_S)
         for group, values in stack.items():
             late = world.late_s[_NODE[group]] if group in _NODE else 0.0
@@ -296,7 +296,7 @@ class Rig:
                 stack[group] = _later(values, self._tooth_rows(values) * world.tooth_share)
         found = {group: averaged(values, drive.stride) for group, values in stack.items()}
         if "wheel" in found:
-            self._at_measured_speed(found, drive, None if self._slopes is None else self._slopes[number])
+            self._at_measured_speed(found, drive, None if self._slopes is None else self._slopes[drive.number])
         return found
 
     def _tooth_rows(self, omega_rad_s: Floats) -> Floats:

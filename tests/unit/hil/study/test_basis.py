@@ -1,5 +1,7 @@
 """Laws in no list: hats that add up to any curve, written and read again, driven in a scenario."""
 
+import tomllib
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 
 from hil.effects import EffectError, read_laws, written_laws
 from hil.scenario import load_scenario
-from hil.study.basis import LAWS, PIECES, Curve, _curve, places, shown
+from hil.study.basis import LAWS, PIECES, Curve, curve_of, places, shown
 from hil.study.extended import extended_scenario
 from hil.study.vehicle import paper_car
 from hil.study.world import nominal
@@ -26,7 +28,7 @@ at = ["rl"]
 
 
 def _any_curve(k: int = 0) -> Curve:
-    return _curve(LAWS[k], 2.0, 34.0)
+    return curve_of(LAWS[k], 2.0, 34.0)
 
 
 def test_hats_of_equal_size_are_a_constant():
@@ -61,7 +63,5 @@ def test_a_law_is_driven_in_a_scenario(tmp_path):
     [('"friction.mu"', '"friction.nu"', "friction.nu"), ('"speed"', '"spede"', "SPEDE"), ("width = 5.0", "", "width")],
 )
 def test_a_law_that_cannot_be_used_says_why(old, new, says):
-    import tomllib
-
     with pytest.raises(EffectError, match=says):
         read_laws(tomllib.loads(LAW_TOML.replace(old, new))["laws"], "laws")

@@ -65,4 +65,4 @@ def test_what_a_set_says_nothing_of_is_not_judged() -> None:
     told = load_vehicle({**SIX, "ehb_dead_time_s": 0.02, "motor_peak_torque_nm": 400.0, "tyre_lkx": 1.0})
     assert set(told.untold) == {"battery_soc"}
     assert told.parameters.motor.peak_torque_nm == 400.0
-    assert paper_car().untold == ()
+    assert paper_car().unstated == ()
