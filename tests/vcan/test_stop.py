@@ -24,6 +24,7 @@ from dbc.exchange import Receiver
 from dbc.frame import BusName
 from dbc.messages import (
     BrakeMode,
+    BrakePedal,
     BrakeStatus,
     EhbDemandFront,
     EhbDemandRear,
@@ -234,12 +235,13 @@ def test_a_killed_plant_takes_the_motor_demand_to_zero_and_no_pressure(
         carrying = torques.index(0.0)
         assert set(torques[carrying:]) == {0.0}
         assert carrying <= TORQUE_FRAMES
+    pressed_s = [line.time_s for line in before if line.can_id == spec_of(BrakePedal).can_id][-1]
     for kind in (EhbDemandFront, EhbDemandRear):
         demands = messages(after, kind)
         at_death = [min(pair) for pair in zip(messages(before, kind)[-1], demands[0], strict=True)]
         times_s = [line.time_s for line in after if line.can_id == spec_of(kind).can_id]
         held = next((i for i, values in enumerate(demands) if None in values), len(demands))
-        assert held == len(demands) or times_s[held] - seen[last].time_s >= HOLD_S
+        assert held == len(demands) or times_s[held] - pressed_s >= HOLD_S
         least = [(1.0 - PEDAL_NOISE) * v - RIPPLE_PA for v in at_death]
         assert all(d >= low for values in demands[:held] for d, low in zip(values, least, strict=True))
         taken_over = [d >= v for values in demands[carrying:held] for d, v in zip(values, at_death, strict=True)]
