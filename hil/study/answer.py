@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from hil.study.basis import NAME, Piece, shown
+from hil.study.basis import Piece, shown
 from hil.study.decide import decide_with, write
 from hil.study.diagnose import TIED, Contender, Diagnosis, odds
 from hil.study.fit import Term
 from hil.study.linear import project
 from hil.study.measure import Gain, intervals, probabilities
+from hil.study.own_error import UNLISTED
 from hil.study.patterns import WORDS, Wrong
 from hil.study.tied import Tied, tied_set
 
@@ -124,9 +125,9 @@ def _unlisted(found: Diagnosis, piece: Piece, listed: list[Contender]) -> dict[s
     own = [k for k, term in enumerate(terms) if isinstance(term.candidate, Piece)]
     pieces = [term.candidate for term in terms if isinstance(term.candidate, Piece)]
     return {
-        "effect": NAME, "title": piece.effect.title, "joint": piece.law.joint, "wheel": piece.place, "parameters": {},
-        "probability": probabilities(listed)[0], "onset": None, "onset_s": None, "variables": [piece.variable],
-        "adds": piece.law.adds,
+        "effect": UNLISTED, "title": piece.effect.title, "joint": piece.law.joint, "wheel": piece.place,
+        "parameters": {}, "probability": probabilities(listed)[0], "onset": None, "onset_s": None,
+        "variables": [piece.variable], "adds": piece.law.adds,
         "curve": shown(pieces, [terms[k].value for k in own], covariance[np.ix_(own, own)]),
     }  # fmt: skip
 

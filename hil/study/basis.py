@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.study.candidates import PLACES, Candidate
+from hil.study.own_error import UNLISTED
 from hil.study.table import Floats
 from hil.study.world import Rig, World
 from plant.effects.bank import Shape, Variable, term
@@ -17,7 +18,6 @@ from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.places import JOINTS
 
 PIECES = 5
-NAME = "unlisted"
 _WHEELS = Scope.WHEEL.members
 _CALLED = {
     Variable.SPEED: "speed", Variable.WHEEL_SPEED: "wheel_speed", Variable.PRESSURE: "pressure",
@@ -46,6 +46,11 @@ class Law:
     variable: Variable
     adds: bool
     usual: float
+
+    @property
+    def name(self) -> str:
+        """For people and keys."""
+        return f"{self.joint}({_CALLED[self.variable]})"
 
     @property
     def scope(self) -> Scope:
@@ -81,7 +86,7 @@ class Piece(Candidate):
     @property
     def name(self) -> str:
         """For people and keys."""
-        return f"{NAME}.{self.law.joint}({_CALLED[self.law.variable]}).{self.parameter.name}@{self.place}"
+        return f"{UNLISTED}.{self.law.name}.{self.parameter.name}@{self.place}"
 
     @property
     def variable(self) -> str:
@@ -144,7 +149,7 @@ def curve_of(law: Law, low: float, high: float) -> Curve:
     bound = 20.0 * law.usual if law.adds else 0.9
     numbers = tuple(Parameter(f"c{k + 1}", unit, -bound, bound, law.usual) for k in range(PIECES))
     effect = Effect(
-        name=NAME, row=0, title=f"{law.joint} depends on {_CALLED[law.variable]} in a way that no list has",
+        name=UNLISTED, row=0, title=f"{law.joint} depends on {_CALLED[law.variable]} in a way that no list has",
         equation="sum c_k hat((v - v_k) / w)", joints=(law.joint,), scope=law.scope, parameters=numbers,
         source="measured data", signature="", manoeuvre="",
     )  # fmt: skip

@@ -11,7 +11,7 @@ from hil.study.fit import Fitter, Model, Term, Tracks
 from hil.study.linear import Sums, project, track_columns
 from hil.study.noise import Frame, Noise
 from hil.study.onset import with_onsets
-from hil.study.own_error import variance_of
+from hil.study.own_error import variance_of, variance_of_law
 from hil.study.prepare import Case
 from hil.study.race import LawRace, least_gain, share_left
 from hil.study.screen import Score, inflation, leaders, not_testable, score, scores, threshold
@@ -28,7 +28,7 @@ TIED = 9.2
 _CLEARER = 5.0
 """By how much more than the best listed cause a law in no list must explain, log of the odds."""
 _KINKED = ("late_demand", "ehb_dead_time_s")
-_TURNS, _MOST_ANEW, _SETTLED, _STALE = 10, 4, 3.0, 0.2
+_TURNS, _MOST_ANEW, _SETTLED, _STALE = 10, 5, 3.0, 0.2
 _COARSE, _FINE = 0.5, 3.0
 """Finite differences of the vehicle's numbers: in standard deviations of what is known before, and of what data say."""
 
@@ -157,14 +157,14 @@ class _Search:
         What the numbers have not explained yet counts as noise, so the first steps are forgiving.
         """
         model, cost, around, anew = nominal, np.inf, nominal.z, 0
-        for turn in range(_TURNS):
+        for _ in range(_TURNS):
             noise = self.fitter.estimated(model, noise, 60)
             model = self.fitter.fit(model, noise, 4)
             settled, cost = cost - model.cost < _SETTLED, model.cost
             stale = bool(np.abs(model.z - around).max() > _STALE)
             if settled and not stale:
                 break
-            if self.settings.relinearise and stale and (turn < 2 or settled) and anew < _MOST_ANEW:
+            if self.settings.relinearise and stale and anew < _MOST_ANEW:
                 information = np.diag(self.fitter.products(noise))
                 self.steps = np.clip(_FINE / np.sqrt(np.maximum(information, 1e-9)), 0.03, _COARSE)
                 self._nuisance_columns(model.z)
@@ -243,7 +243,7 @@ class _Search:
         again = [self._again(c, moved, tighter) for c in fitted]
         fitted = [self._gained(c, item, reference) for c, item in zip(again, top, strict=True)]
         clear = sorted((c for c in fitted if c.gained >= found.least_gain), key=odds)
-        law = self._unlisted(found, moved, tighter, reference, min(clear, key=odds, default=None))
+        law = self._unlisted(found, moved, tighter, reference, min(fitted, key=odds))
         if law is not None:
             polished, tighter = self.fitter.settle(law.model, tighter, 1, 60)
             first = replace(law, model=polished)
@@ -266,9 +266,9 @@ class _Search:
         return polished, tighter, [first, *rest]
 
     def _unlisted(
-        self, found: Diagnosis, model: Model, noise: Noise, reference: float, listed: Contender | None
+        self, found: Diagnosis, model: Model, noise: Noise, reference: float, listed: Contender
     ) -> Contender | None:
-        """A law in no list that explains clearly more than the best listed cause, if there is one."""
+        """A law in no list that explains more than the best listed cause, beyond noise and the model's own error."""
         if not self.settings.dictionary or any(isinstance(term.candidate, Piece) for term in model.terms):
             return None
         if self.race is None:
@@ -276,15 +276,16 @@ class _Search:
             self.race = LawRace(self.fitter, self.fitter.world(model.z, model.terms), model)
         best = self.race.entries(self.fitter, model, noise)[0]
         self.say(f"best curve: {best.curve.law.joint} by {best.curve.variable}, gain {best.gain:.0f}")
-        rival = 0.0 if listed is None else 0.5 * (reference - odds(listed))
+        rival, left = max(0.5 * (reference - odds(listed)), 0.0), min(listed.cost, reference)
         least = least_gain(found.looks + len(LAWS), self.settings.alpha) * inflation(found.screened)
-        if best.gain < least or best.evidence < rival + _CLEARER:
+        least *= variance_of_law(best.curve.law.name)
+        if best.gain - (reference - left) < least or best.evidence < rival + _CLEARER:
             return None
         fitted = self.fitter.fit(self.fitter.at(model.z, (*model.terms, *best.terms), noise), noise, 3)
         values = np.array([term.value for term in fitted.terms[-PIECES:]])
-        left = share_left(best, values, fitted.covariance[-PIECES:, -PIECES:])
-        law = Contender(fitted.terms[-1], fitted, fitted.cost, left, 0.0, reference - fitted.cost)
-        if law.gained < least or 0.5 * (reference - odds(law)) < rival + _CLEARER:
+        share = share_left(best, values, fitted.covariance[-PIECES:, -PIECES:])
+        law = Contender(fitted.terms[-1], fitted, fitted.cost, share, 0.0, reference - fitted.cost)
+        if left - law.cost < least or 0.5 * (reference - odds(law)) < rival + _CLEARER:
             return None
         return law
 

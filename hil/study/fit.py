@@ -6,14 +6,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hil.study.candidates import Candidate
-from hil.study.linear import Sums, solve, sums, track_columns
+from hil.study.linear import FARTHEST, Sums, solve, sums, track_columns
 from hil.study.noise import Frame, Noise, estimate, first_guess, tracks_of, whiten
 from hil.study.table import Floats
 from hil.study.vehicle import Nuisance
 from hil.study.world import Rig, Stack, World
 
 Tracks = dict[str, Floats]
-_LARGEST_STEP, _FARTHEST = 8.0, 8.0
+_LARGEST_STEP = 8.0
 _DAMPING = (0.0, 0.1, 1.0, 10.0)
 _DIVERGED = 1e15
 
@@ -130,7 +130,7 @@ class Fitter:
         for damping in _DAMPING:
             change, covariance = solve(total, count, free, model.z, damping, held)
             dz = np.clip(change[:count], -_LARGEST_STEP, _LARGEST_STEP)
-            z = np.clip(model.z + dz, -_FARTHEST, _FARTHEST)
+            z = np.clip(model.z + dz, -FARTHEST, FARTHEST)
             z = np.where(self.sides * z < 0.0, 0.0, z)
             terms = tuple(
                 replace(term, value=_bounded(term.candidate, term.value + float(step)))
@@ -142,10 +142,12 @@ class Fitter:
         return replace(model, covariance=covariance) if model.terms and not model.covariance.size else None
 
     def _held(self, total: Floats, model: Model) -> list[int]:
-        """Nuisances at the end of their side that want to leave it."""
+        """Nuisances at the end of their side, or as far off as they may be, that want to go on."""
         change, _ = solve(total, len(self.nuisances), range(len(model.terms)), model.z)
-        wanted = self.sides * (model.z + change[: len(self.nuisances)])
-        return [int(k) for k in np.flatnonzero((wanted < 0.0) & (self.sides * model.z <= 0.0))]
+        wanted = model.z + change[: len(self.nuisances)]
+        other_side = (self.sides * wanted < 0.0) & (self.sides * model.z <= 0.0)
+        too_far = (np.abs(model.z) >= FARTHEST) & (model.z * wanted > FARTHEST**2)
+        return [int(k) for k in np.flatnonzero(other_side | too_far)]
 
     def products(self, noise: Noise) -> Floats:
         """Information of the nuisances, (nuisances, nuisances)."""

@@ -3,7 +3,8 @@
 Two models of one car, written apart, differ in form; some effects imitate such differences. ``own_error.toml`` holds
 the root mean square of each number's estimate over its standard deviation, on drives of a car that shares no code with
 the plant and has nothing hidden (``brakebench trials --own-error``); 1 would be a perfect model. A gain in chi-squared
-is divided by its square before it is called beyond noise.
+is divided by its square before it is called beyond noise. The same is measured for the laws in no list, of all their
+coefficients together.
 """
 
 import tomllib
@@ -15,6 +16,8 @@ from hil.study.candidates import Candidate
 
 USUAL = 1.5
 """Where nothing was measured."""
+UNLISTED = "unlisted"
+"""Name of all laws in no list."""
 
 
 @cache
@@ -26,4 +29,13 @@ def _table() -> Mapping[str, Mapping[str, float]]:
 
 def variance_of(candidate: Candidate) -> float:
     """What the gain of a candidate is divided by, at least 1."""
-    return max(float(_table().get(candidate.effect.name, {}).get(candidate.parameter.name, USUAL)), 1.0) ** 2
+    return _variance(candidate.effect.name, candidate.parameter.name)
+
+
+def variance_of_law(name: str) -> float:
+    """The same for a law in no list, by `hil.study.basis.Law.name`."""
+    return _variance(UNLISTED, name)
+
+
+def _variance(effect: str, number: str) -> float:
+    return max(float(_table().get(effect, {}).get(number, USUAL)), 1.0) ** 2

@@ -10,7 +10,6 @@ from hil.study.basis import PIECES, Curve, curves, places
 from hil.study.fit import Fitter, Model, Term, Tracks
 from hil.study.linear import project, track_columns
 from hil.study.noise import Noise
-from hil.study.own_error import USUAL
 from hil.study.table import Floats
 from hil.study.world import World
 
@@ -105,5 +104,5 @@ def share_left(entry: Entry, values: Floats, covariance: Floats) -> float:
 
 
 def least_gain(looks: int, alpha: float) -> float:
-    """Gain that nothing hidden exceeds with probability ``alpha`` in so many looks, the model's error included."""
-    return float(chi2.isf(alpha / max(looks, 1), PIECES)) * USUAL**2
+    """Gain that nothing hidden exceeds with probability ``alpha`` in so many looks, the model's error shared out."""
+    return float(chi2.isf(alpha / max(looks, 1), PIECES))

@@ -32,13 +32,16 @@ _SUSPENSION = {
     "suspension_brake_support_tangent": 0.6, "suspension_anti_roll_nm_rad": 0.7, "suspension_roll_centre_height_m": 3.0,
     "vehicle_pitch_inertia_kg_m2": 0.6, "vehicle_roll_inertia_kg_m2": 0.2,
 }  # fmt: skip
+_SIGNED = ("suspension_progression_n_m3", "suspension_brake_support_tangent", "suspension_roll_centre_height_m")
+"""Numbers that a car may have of either sign."""
 
 
 @dataclass(frozen=True, eq=False)
 class Nuisance:
     """A number of the vehicle that may be off: ``p[at] += z * step``, z normal with standard deviation 1.
 
-    ``kind`` says of what: a number of the vehicle, the discs' temperature at the start, or the latency of a node.
+    ``kind`` says of what: a number of the vehicle (``signed`` if it may be below zero), the discs' temperature at the
+    start, or the latency of a node.
     """
 
     name: str
@@ -328,4 +331,6 @@ def _nuisances(p: Floats, tolerance: Mapping[str, float], layout: Layout) -> lis
         for k in range(size):
             half = max(tolerance.get(name, 0.0), share * float(p[at + k]))
             add(name if size == 1 else f"{name}_{('front', 'rear')[k]}", [at + k], [half])
+            if name in _SIGNED:
+                found[-1] = replace(found[-1], kind="signed")
     return found

@@ -78,8 +78,10 @@ class World:
                     late[at] += amount * step
                 elif nuisance.kind == "tooth":
                     tooth += amount * step
+                elif nuisance.kind == "signed":
+                    p[at] += amount * step
                 else:
-                    p[at] = _within(p[at], p[at] + amount * step)
+                    p[at] = _positive(p[at], amount, step)
         return replace(self, p=p, disc_offset_k=disc, late_s=tuple(late), tooth_share=tooth)
 
 
@@ -94,9 +96,14 @@ def start_nuisances() -> list[Nuisance]:
     return [Nuisance("disc_temperature_k", (0,), (15.0,), "disc"), Nuisance("tooth_lag", (0,), (0.5,), "tooth"), *found]
 
 
-def _within(now: float, wanted: float) -> float:
-    """Never through zero, nor beyond five times."""
-    return float(np.clip(wanted, 0.1 * now, 5.0 * now)) if now > 0.0 else wanted
+_MOST_FACTOR, _WIDE = 1.7, 0.3
+
+
+def _positive(now: float, z: float, step: float) -> float:
+    """A positive number ``z`` standard deviations off; one known badly goes by a factor (three: at most five times)."""
+    if now <= 0.0 or abs(step) < _WIDE * now:
+        return now + z * step
+    return float(now * min(1.0 + abs(step) / now, _MOST_FACTOR) ** (z * np.sign(step)))
 
 
 def nominal(vehicle: Vehicle) -> World:

@@ -10,9 +10,11 @@ import numpy as np
 from hil.hide.cases import draw
 from hil.hide.files import write
 from hil.study.answer import Answer
-from hil.study.diagnose import Settings
+from hil.study.basis import PIECES
+from hil.study.diagnose import Diagnosis, Settings
 from hil.study.explain import explain
-from hil.study.own_error import USUAL
+from hil.study.own_error import UNLISTED, USUAL
+from hil.study.race import LawRace
 from hil.study.screen import Score
 
 _PRIOR_CASES = 6
@@ -21,7 +23,10 @@ Gains = dict[tuple[str, str], list[float]]
 
 
 def measure(count: int, seed: int, say: Callable[[str], None]) -> Gains:
-    """Gains of every number of an effect over ``count`` null cases: of each case the mean of its better places."""
+    """Gains of every number of an effect, and of every law in no list, over ``count`` null cases.
+
+    Of each case the mean of its better places.
+    """
     found: Gains = defaultdict(list)
     for index in range(count):
         with TemporaryDirectory() as folder:
@@ -29,7 +34,7 @@ def measure(count: int, seed: int, say: Callable[[str], None]) -> Gains:
             write(draw("null", index, seed), logs)
             answer = explain(logs, logs / "vehicle.toml", settings=Settings(most_causes=0))
         assert isinstance(answer, Answer)  # the hidden car's logs tell forces
-        for number, gains in _by_number(answer.found.screened).items():
+        for number, gains in (_by_number(answer.found.screened) | _by_law(answer.found)).items():
             found[number].append(float(np.mean(sorted(gains)[-max(len(gains) // 2, 1) :])))
         say(f"null {index}")
     return found
@@ -40,6 +45,15 @@ def _by_number(screened: Iterable[Score]) -> Gains:
     for item in screened:
         if item.usual > _LEAST_USUAL:
             gains[item.candidate.effect.name, item.candidate.parameter.name].append(item.raw)
+    return gains
+
+
+def _by_law(found: Diagnosis) -> Gains:
+    """Gains of the laws in no list, by coefficient."""
+    fitter, model = found.fitter, found.base
+    gains: Gains = defaultdict(list)
+    for entry in LawRace(fitter, fitter.world(model.z, ()), model).entries(fitter, model, found.noise):
+        gains[UNLISTED, entry.curve.law.name].append(entry.gain / PIECES)
     return gains
 
 
@@ -56,5 +70,9 @@ def as_toml(table: dict[str, dict[str, float]], count: int, seed: int) -> str:
     """The file's text."""
     lines = [f"# made by: brakebench trials --own-error FILE --count {count} --seed {seed}", "[ratio]"]
     for effect, numbers in table.items():
-        lines.append(f"{effect} = {{ {', '.join(f'{name} = {value}' for name, value in numbers.items())} }}")
+        lines.append(f"{effect} = {{ {', '.join(f'{_key(name)} = {value}' for name, value in numbers.items())} }}")
     return "\n".join(lines) + "\n"
+
+
+def _key(name: str) -> str:
+    return name if name.isidentifier() else f'"{name}"'

@@ -6,9 +6,10 @@ from importlib import resources
 import numpy as np
 import pytest
 
+from hil.study.basis import LAWS
 from hil.study.candidates import candidates, columns
 from hil.study.linear import project, solve
-from hil.study.own_error import variance_of
+from hil.study.own_error import UNLISTED, variance_of
 from hil.study.screen import inflation, leaders, score, threshold
 
 CANDIDATES = {c.name: c for c in candidates(columns())}
@@ -52,8 +53,9 @@ def test_a_gain_is_shared_out_over_the_models_own_error() -> None:
     assert found.gain == pytest.approx(found.raw / variance_of(candidate))
 
 
-def test_every_entry_of_the_models_own_error_is_a_candidates_number() -> None:
+def test_every_entry_of_the_models_own_error_is_a_candidates_number_or_a_law() -> None:
     numbers = {(c.effect.name, c.parameter.name) for c in CANDIDATES.values()}
+    numbers |= {(UNLISTED, law.name) for law in LAWS}
     source = resources.files("hil.study") / "own_error.toml"
     table = tomllib.loads(source.read_text(encoding="utf-8"))["ratio"]
     assert {(effect, name) for effect, ratios in table.items() for name in ratios} <= numbers
