@@ -164,7 +164,9 @@ def _tied(found: Diagnosis) -> Tied | None:
     if not found.final.terms or found.sums is None or isinstance(found.final.terms[0].candidate, Piece):
         return None
     term, listed = found.final.terms[0], [score.candidate for score in found.screened]
-    projected = project(found.sums.total(), found.sums.nuisances, (), found.base.z)
+    projected = project(
+        found.sums.total(), found.sums.nuisances, (), found.base.z, found.fitter.at_their_end(found.base.z)
+    )
     return tied_set(projected.q, listed, listed.index(term.candidate), term.value)
 
 

@@ -25,6 +25,8 @@ MOST_CAUSES = 3
 LEADERS = 6
 _OF_SCREEN = 1.5
 TIED = 9.2
+_FORM = 0.2
+"""Share of a cause that its equation may get wrong: what it leaves is no other cause."""
 _CLEARER = 5.0
 """By how much more than the best listed cause a law in no list must explain, log of the odds."""
 _KINKED = ("late_demand", "ehb_dead_time_s")
@@ -74,8 +76,8 @@ def causes_in(model: Model) -> int:
 class Diagnosis:
     """Everything the diagnosis found.
 
-    ``base`` explains with nuisances alone, ``final`` with the accepted causes; ``contenders`` has, for each term of
-    ``final``, all that were fitted in its place, best first.
+    ``base`` explains with nuisances alone, ``final`` with the accepted causes, which take ``explained`` off
+    chi-squared; ``contenders`` has, for each term of ``final``, all that were fitted in its place, best first.
     """
 
     case: Case
@@ -92,6 +94,7 @@ class Diagnosis:
     sums: Sums | None = None
     looks: int = 0
     least_gain: float = 0.0
+    explained: float = 0.0
     remarks: list[str] = field(default_factory=list)
 
     @property
@@ -214,7 +217,8 @@ class _Search:
 
     def _scores(self, sums: Sums, model: Model) -> list[Score]:
         accepted = len(model.terms)
-        projected = project(sums.total(), sums.nuisances, range(accepted), model.z)
+        held = self.fitter.at_their_end(model.z)
+        projected = project(sums.total(), sums.nuisances, range(accepted), model.z, held)
         in_use = {id(term.candidate): term.value for term in model.terms}
         now = [in_use.get(id(candidate), 0.0) for candidate in self.candidates]
         return scores(self.candidates, projected, accepted, now)
@@ -231,6 +235,7 @@ class _Search:
         top = leaders(listed, LEADERS)
         if not top or max(item.gain for item in top) < 0.4 * found.least_gain:
             return None
+        left_over = _FORM**2 * found.explained
         self.say(f"fitting {len(top)} leaders")
         fitted = [self._contender(model, item, noise) for item in top]
         best = min(fitted, key=odds)
@@ -241,12 +246,13 @@ class _Search:
         moved = self.fitter.fit(model, tighter, 3)
         reference = min(moved.cost, self.fitter.cost(model.residual, model.z, noise))
         again = [self._again(c, moved, tighter) for c in fitted]
-        fitted = [self._gained(c, item, reference) for c, item in zip(again, top, strict=True)]
+        fitted = [self._gained(c, item, reference - left_over) for c, item in zip(again, top, strict=True)]
         clear = sorted((c for c in fitted if c.gained >= found.least_gain), key=odds)
         law = self._unlisted(found, moved, tighter, reference, min(fitted, key=odds))
         if law is not None:
             polished, tighter = self.fitter.settle(law.model, tighter, 1, 60)
             first = replace(law, model=polished)
+            found.explained += reference - law.cost
             return polished, tighter, [first, *sorted(clear, key=odds)]
         if not clear:
             most = max(fitted, key=lambda c: c.gained)
@@ -259,6 +265,7 @@ class _Search:
             self.say(f"{better.term.candidate.name} explains more, and the model errs there; nothing stands beside it")
             return None
         best = standing[0]
+        found.explained += reference - best.cost
         polished = self.fitter.fit(best.model, tighter, 4, self.settings.relinearise)
         polished, tighter = self.fitter.settle(polished, tighter, 2, 60)
         rest = sorted((c for c in fitted if c is not best and (c in clear or odds(c) >= odds(best))), key=odds)
@@ -278,7 +285,7 @@ class _Search:
         self.say(f"best curve: {best.curve.law.joint} by {best.curve.variable}, gain {best.gain:.0f}")
         rival, left = max(0.5 * (reference - odds(listed)), 0.0), min(listed.cost, reference)
         least = least_gain(found.looks + len(LAWS), self.settings.alpha) * inflation(found.screened)
-        least *= variance_of_law(best.curve.law.name)
+        least = least * variance_of_law(best.curve.law.name) + _FORM**2 * found.explained
         if best.gain - (reference - left) < least or best.evidence < rival + _CLEARER:
             return None
         fitted = self.fitter.fit(self.fitter.at(model.z, (*model.terms, *best.terms), noise), noise, 3)

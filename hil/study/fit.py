@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hil.study.candidates import Candidate
-from hil.study.linear import FARTHEST, Sums, solve, sums, track_columns
+from hil.study.linear import Sums, solve, sums, track_columns
 from hil.study.noise import Frame, Noise, estimate, first_guess, tracks_of, whiten
 from hil.study.table import Floats
 from hil.study.vehicle import Nuisance
@@ -57,6 +57,7 @@ class Fitter:
         self.rig, self.frame, self.base = rig, frame, base
         self.nuisances, self.nuisance_columns = tuple(nuisances), nuisance_columns
         self.sides = np.zeros(len(self.nuisances)) if sides is None else sides
+        self.farthest = np.array([nuisance.farthest for nuisance in self.nuisances])
         self.radius = float(rig.vehicle.parameters.wheel.rolling_radius_m)
         self._measured = rig.measured()
         self._white_for: Noise | None = None
@@ -130,7 +131,7 @@ class Fitter:
         for damping in _DAMPING:
             change, covariance = solve(total, count, free, model.z, damping, held)
             dz = np.clip(change[:count], -_LARGEST_STEP, _LARGEST_STEP)
-            z = np.clip(model.z + dz, -FARTHEST, FARTHEST)
+            z = np.clip(model.z + dz, -self.farthest, self.farthest)
             z = np.where(self.sides * z < 0.0, 0.0, z)
             terms = tuple(
                 replace(term, value=_bounded(term.candidate, term.value + float(step)))
@@ -146,8 +147,12 @@ class Fitter:
         change, _ = solve(total, len(self.nuisances), range(len(model.terms)), model.z)
         wanted = model.z + change[: len(self.nuisances)]
         other_side = (self.sides * wanted < 0.0) & (self.sides * model.z <= 0.0)
-        too_far = (np.abs(model.z) >= FARTHEST) & (model.z * wanted > FARTHEST**2)
+        too_far = (np.abs(model.z) >= self.farthest) & (model.z * wanted > self.farthest**2)
         return [int(k) for k in np.flatnonzero(other_side | too_far)]
+
+    def at_their_end(self, z: Floats) -> list[int]:
+        """Nuisances as far off as they may be: they explain nothing more."""
+        return np.flatnonzero(np.abs(z) >= self.farthest).tolist()
 
     def products(self, noise: Noise) -> Floats:
         """Information of the nuisances, (nuisances, nuisances)."""

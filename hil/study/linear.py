@@ -12,8 +12,6 @@ from hil.study.world import Rig, Stack, World
 _CHUNK = 48
 _HUBER = 6.0
 _HELD = 1e15
-FARTHEST = 3.0
-"""Standard deviations that a nuisance may be off: one and a half tolerances; farther off it is a cause to be named."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +86,12 @@ class Projected:
     chi2: float
 
 
-def project(total: Floats, nuisances: int, free: Sequence[int] = (), z: Floats | None = None) -> Projected:
+def project(
+    total: Floats, nuisances: int, free: Sequence[int] = (), z: Floats | None = None, held: Sequence[int] = ()
+) -> Projected:
     """Project out nuisances (normal, standard deviation 1, now ``z`` off) and the columns ``free`` (unbounded).
 
-    Nuisances that are as far off as they may be take no part.
+    Nuisances that are ``held`` take no part.
     """
     taken = [1 + k for k in range(nuisances)] + [1 + nuisances + k for k in free]
     a = total[np.ix_(taken, taken)].copy()
@@ -99,9 +99,8 @@ def project(total: Floats, nuisances: int, free: Sequence[int] = (), z: Floats |
     a[range(nuisances), range(nuisances)] += 1.0
     if z is not None:
         right[:nuisances, 0] -= z
-        held = np.flatnonzero(np.abs(z) >= FARTHEST)
-        a[held, held] += _HELD
-        right[held] = 0.0
+    a[list(held), list(held)] += _HELD
+    right[list(held)] = 0.0
     a[range(len(a)), range(len(a))] += 1e-9 * (1.0 + np.diag(a))
     solved = np.linalg.solve(a, right) if taken else np.zeros((0, total.shape[1]))
     left = total - right.T @ solved

@@ -59,7 +59,7 @@ class LawRace:
         """Every law at every place it was simulated for, the best first."""
         sums = fitter.screen(model, self.columns, noise)
         accepted = len(model.terms)
-        projected = project(sums.total(), sums.nuisances, range(accepted), model.z)
+        projected = project(sums.total(), sums.nuisances, range(accepted), model.z, fitter.at_their_end(model.z))
         b, q = projected.b[accepted:], projected.q[accepted:, accepted:]
         choices = sum(len(self._offered(curve, of)) for curve, of in zip(self._curves, self._single, strict=True))
         found, at = [], 0

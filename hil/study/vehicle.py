@@ -22,7 +22,7 @@ HALF_WIDTH_TO_SIGMA = 0.5  # a tolerance is two standard deviations
 _CONSTANT_EPSILON_W = 1e7
 _CONSTANT_B_1_J = 2e-6
 _BRAKE_K = 423.15
-_STATED = 0.01
+_STATED, _GUESSED = 0.01, 8.0
 _FORM = {
     "motor_time_constant_s": 0.3, "ehb_dead_time_s": 0.3, "wheel_inertia_kg_m2": 0.1, "vehicle_cog_height_m": 0.15,
     "vehicle_yaw_inertia_kg_m2": 0.1, "vehicle_steering_ratio": 0.05,
@@ -40,6 +40,7 @@ _SIGNED = ("suspension_progression_n_m3", "suspension_brake_support_tangent", "s
 class Nuisance:
     """A number of the vehicle that may be off: ``p[at] += z * step``, z normal with standard deviation 1.
 
+    ``farthest`` is how many standard deviations it may be off at most; farther off it is a cause to be named.
     ``kind`` says of what: a number of the vehicle (``signed`` if it may be below zero), the discs' temperature at the
     start, or the latency of a node.
     """
@@ -48,6 +49,7 @@ class Nuisance:
     at: tuple[int, ...]
     step: tuple[float, ...]
     kind: str = "vehicle"
+    farthest: float = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +174,12 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
         remarks.append(f"{where}: not given, so a usual value with wide uncertainty: {', '.join(missing)}")
     tolerance |= {n: max(t, shipped.get(n, 0.0)) if n.startswith("suspension") else t for n, t in tolerances.items()}
     vehicle = _vehicle(parameters, tolerance, friction or not gains, tuple(remarks))
-    return replace(vehicle, unstated=tuple(unlimited))
+    guessed = tuple(
+        replace(nuisance, farthest=_GUESSED) if nuisance.name.removesuffix("_front").removesuffix("_rear") in missing
+        else nuisance
+        for nuisance in vehicle.nuisances
+    )  # fmt: skip
+    return replace(vehicle, nuisances=guessed, unstated=tuple(unlimited))
 
 
 def _derive(

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from hil.study.linear import FARTHEST
 from hil.study.vehicle import load_vehicle, paper_car
 from hil.study.world import nominal
 
@@ -11,7 +10,7 @@ SIX = {
     "mass_kg": 1650.0, "wheelbase_m": 2.72, "cog_to_front_axle_m": 1.3, "rolling_radius_m": 0.318,
     "brake_gain_front_nm_pa": 2.9e-4, "brake_gain_rear_nm_pa": 1.7e-4,
 }  # fmt: skip
-STEPS = np.linspace(-FARTHEST, FARTHEST, 25)
+STEPS = np.linspace(-3.0, 3.0, 25)
 
 
 @pytest.mark.parametrize("vehicle", [paper_car(), load_vehicle(SIX)], ids=["own numbers", "six numbers"])
