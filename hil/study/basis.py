@@ -64,7 +64,7 @@ LAWS = (
     )),
     *(Law("motor.torque", v, False, 0.06) for v in (Variable.WHEEL_SPEED, Variable.MOTOR_TORQUE, Variable.TIME)),
     *(Law("body.force", v, True, 200.0) for v in (
-        Variable.SPEED, Variable.TIME, Variable.DISTANCE, Variable.ACCELERATION, Variable.YAW_RATE,
+        Variable.SPEED, Variable.TIME, Variable.DISTANCE, Variable.YAW_RATE,
     )),
     Law("wheel.rolling_torque", Variable.SPEED, False, 0.4),
     Law("tyre.stiffness", Variable.SPEED, False, 0.2),
@@ -72,7 +72,7 @@ LAWS = (
     Law("imu.ax", Variable.SPEED, True, 0.05),
     Law("imu.ax", Variable.ACCELERATION, True, 0.05),
 )  # fmt: skip
-"""The laws in the race; speed is the only variable of what is weakly seen."""
+"""The laws in the race; speed is the only variable of what is weakly seen. A force by acceleration is mass."""
 
 
 @dataclass(frozen=True, eq=False)
