@@ -38,7 +38,7 @@ MOST = 3
 STRAIGHT_STOP = "straight_stop"
 """Of `plant.effects.manoeuvres`: what every drive is compared with."""
 FOLDER = "decide_with"
-_LONGEST_S = 90.0
+_LONGEST_S, _SETTLE_S = 90.0, 0.4
 _VISIBLE = 1.0
 _OF_THE_ROAD = ("road_grade.grade", "headwind.wind_mps")
 """Numbers that change sign when the same stretch is driven back."""
@@ -225,9 +225,18 @@ def _ground(name: str, both_ways: bool) -> _Ground:
     world = nominal(car)
     rig = Rig(prepare(logs, radius), car).quieted(world)
     rig.keep(world)
-    frame, base = Frame.of(rig.case), rig.run(world)
+    frame, base = _settled(Frame.of(rig.case)), rig.run(world)
     residual = tracks_of(rig.residual(world), frame, radius)
     return _Ground(rig, frame, first_guess(residual, frame), world, base)
+
+
+def _settled(frame: Frame) -> Frame:
+    """Without the first moments of each segment: replays begin them without slip, a driven car does not."""
+    begun = np.flatnonzero((frame.fresh > 0.5) | (frame.restart > 0.5))
+    late = np.ones(len(frame.fresh))
+    for k in begun:
+        late[k : k + round(_SETTLE_S / frame.sample_s)] = 0.0
+    return replace(frame, present={name: known * late for name, known in frame.present.items()})
 
 
 @cache
