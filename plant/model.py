@@ -109,8 +109,7 @@ def simulate(
     x : state (``STATE``), advanced in place.  inputs : one ``INPUT`` a row, each ``steps`` steps long. Demands hold
         within a row; steering and measured values go linearly towards the next row.
     cut, switch, p : vectors ``CUT``, ``SWITCH``, ``PARAMETER``.  road : rows of `plant.road.road_table`.
-    step_s : s.  method : `plant.integrate.SEMI_IMPLICIT`, `RUNGE_KUTTA_4` or
-        `EXPONENTIAL_4`.
+    step_s : s.  method : `plant.integrate.SEMI_IMPLICIT`, `RUNGE_KUTTA_4` or `EXPONENTIAL_4`.
     columns : what to note at the start of each row, as indices into the state followed by the outputs.
     table : the notes, shape (rows, columns), written.  y : outputs (``OUTPUT``) at the end, written.
     theta : numbers of all effects (`plant.effects.theta`); onsets act from row to row.

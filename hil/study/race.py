@@ -12,10 +12,10 @@ from hil.study.linear import project, track_columns
 from hil.study.noise import Noise
 from hil.study.table import Floats
 from hil.study.world import World
+from plant.effects.effect import Scope
 
 _SINGLE_WHEELS = ("friction.mu",)
 _SHARE = 0.1
-_WHEELS = ("fl", "fr", "rl", "rr")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class LawRace:
 
     @staticmethod
     def _places(curve: Curve) -> Sequence[str]:
-        return _WHEELS if curve.law.joint in _SINGLE_WHEELS else ("car",)
+        return Scope.WHEEL.members if curve.law.joint in _SINGLE_WHEELS else ("car",)
 
     def _simulated(self, fitter: Fitter, world: World, model: Model) -> Tracks:
         pieces = [piece for of in self._single for curve in of for piece in curve.pieces]

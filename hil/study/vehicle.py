@@ -23,6 +23,7 @@ _CONSTANT_EPSILON_W = 1e7
 _CONSTANT_B_1_J = 2e-6
 _BRAKE_K = 423.15
 _STATED, _GUESSED = 0.01, 8.0
+_WIDE, _MOST_FACTOR, _MOST_TIMES = 0.1, 1.7, 5.0
 _FORM = {
     "motor_time_constant_s": 0.3, "ehb_dead_time_s": 0.3, "wheel_inertia_kg_m2": 0.1, "vehicle_cog_height_m": 0.15,
     "vehicle_yaw_inertia_kg_m2": 0.1, "vehicle_steering_ratio": 0.05,
@@ -174,12 +175,24 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
         remarks.append(f"{where}: not given, so a usual value with wide uncertainty: {', '.join(missing)}")
     tolerance |= {n: max(t, shipped.get(n, 0.0)) if n.startswith("suspension") else t for n, t in tolerances.items()}
     vehicle = _vehicle(parameters, tolerance, friction or not gains, tuple(remarks))
-    guessed = tuple(
-        replace(nuisance, farthest=_GUESSED) if nuisance.name.removesuffix("_front").removesuffix("_rear") in missing
-        else nuisance
-        for nuisance in vehicle.nuisances
-    )  # fmt: skip
-    return replace(vehicle, nuisances=guessed, unstated=tuple(unlimited))
+    nuisances = tuple(
+        _guessed(one, vehicle.p) if one.name.removesuffix("_front").removesuffix("_rear") in missing else one
+        for one in vehicle.nuisances
+    )
+    return replace(vehicle, nuisances=nuisances, unstated=tuple(unlimited))
+
+
+def _guessed(nuisance: Nuisance, p: Floats) -> Nuisance:
+    """A number that no set states may go far, but to no more than five times or a fifth."""
+    factor = max(factor_of(p[at], step) for at, step in zip(nuisance.at, nuisance.step, strict=True))
+    limit = np.log(_MOST_TIMES) / np.log(factor) if factor > 1.0 else _GUESSED
+    return replace(nuisance, farthest=min(_GUESSED, float(limit)))
+
+
+def factor_of(now: float, step: float) -> float:
+    """By what one standard deviation multiplies a positive number known badly; 1 for one that it is added to."""
+    wide = now > 0.0 and abs(step) >= _WIDE * now
+    return min(1.0 + abs(step) / now, _MOST_FACTOR) if wide else 1.0
 
 
 def _derive(

@@ -11,7 +11,7 @@ from scipy.signal import savgol_filter
 from hil.study.prepare import ROW_S, SLOW_MPS, Case, Drive, Segment, averaged
 from hil.study.sensing import WATCHING, inverted, sensed, wheel_speed_before
 from hil.study.table import Floats
-from hil.study.vehicle import Nuisance, Vehicle, rest_friction
+from hil.study.vehicle import Nuisance, Vehicle, factor_of, rest_friction
 from plant.effects.bank import NO_TERMS
 from plant.effects.plugin import NO_PLUGINS
 from plant.effects.theta import THETA
@@ -96,14 +96,10 @@ def start_nuisances() -> list[Nuisance]:
     return [Nuisance("disc_temperature_k", (0,), (15.0,), "disc"), Nuisance("tooth_lag", (0,), (0.5,), "tooth"), *found]
 
 
-_MOST_FACTOR, _WIDE = 1.7, 0.3
-
-
 def _positive(now: float, z: float, step: float) -> float:
-    """A positive number ``z`` standard deviations off; one known badly goes by a factor (three: at most five times)."""
-    if now <= 0.0 or abs(step) < _WIDE * now:
-        return now + z * step
-    return float(now * min(1.0 + abs(step) / now, _MOST_FACTOR) ** (z * np.sign(step)))
+    """A positive number ``z`` standard deviations off: it never goes through zero."""
+    factor = factor_of(now, step)
+    return float(now * factor ** (z * np.sign(step))) if factor > 1.0 else now + z * step
 
 
 def nominal(vehicle: Vehicle) -> World:
