@@ -16,7 +16,7 @@ from plant.effects.apply import after, before
 from plant.effects.joints import J, at_car, at_wheel
 from plant.motors import motors
 from plant.road import segment_at
-from plant.vectors import P, U, X, Y
+from plant.vectors import CUT_PARTS, P, U, X, Y
 from plant.vehicle import GRAVITY_MPS2, dynamic_pressure_area
 
 Vector = NDArray[np.float64]
@@ -144,7 +144,7 @@ def derivative(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, roa
     cut : ``CUT``, above 0.5 where a measured value in ``u`` replaces the simulated one.  switch : ``SWITCH``.
     p : as of `plant.effects.apply.Q`.  road : rows of `plant.road.road_table`.  y : ``OUTPUT``, written.
     """
-    wheels = cut.size // 4  # 4, but unknown to the compiler: it keeps the loops and puts four wheels in one register
+    wheels = cut.size // CUT_PARTS  # 4, but unknown to the compiler: it puts four wheels in one register
     before(x, u, cut, p, y)
     slope = at_car(road[segment_at(road, x[X.x_m]), 3], y, J.road_grade)
     cos_grade = 1.0 / sqrt(1.0 + slope * slope)

@@ -13,6 +13,13 @@ Vector = NDArray[np.float64]
 
 
 @equation
+def _turning(x: Vector, u: Vector, cut: Vector, i: int) -> float:
+    """Wheel speed that a motor's limits see."""
+    measured, own = float(u[U.wheel_speed_rad_s + i]), float(x[X.wheel_speed_rad_s + i])
+    return measured if cut[C.motor_speed + i] > 0.5 else own
+
+
+@equation
 def motors(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, y: Vector, wheels: int) -> None:
     """Rates of torque and winding temperature; ``y.motor_torque_nm``, what is available, the charge limit announced.
 
@@ -24,7 +31,7 @@ def motors(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, y: Vect
     y[Y.charge_power_limit_w] = switch[S.battery_announces] * full
     limit = switch[S.battery_accepts] * full
     for i in range(wheels):
-        omega = x[X.wheel_speed_rad_s + i]
+        omega = _turning(x, u, cut, i)
         hot = derating(x[X.winding_temperature_k + i], p[P.motor_derating_start_k], p[P.motor_derating_end_k])
         able = torque_limit(omega, p[P.motor_peak_torque_nm], p[P.motor_peak_power_w], p[P.motor_max_speed_rad_s])
         able = max(at_wheel(able * (switch[S.motor_alive + i] * hot), y, J.motor_available, i), 0.0)
@@ -37,7 +44,7 @@ def motors(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, y: Vect
 
     charging, driving = 0.0, 0.0
     for i in range(4):
-        power = y[Y.motor_target_nm + i] * x[X.wheel_speed_rad_s + i]
+        power = y[Y.motor_target_nm + i] * _turning(x, u, cut, i)
         charging += max(-power, 0.0)
         driving += max(power, 0.0)
     charge_share = min(limit / max(charging, 1.0), 1.0)
@@ -45,7 +52,7 @@ def motors(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, y: Vect
 
     for i in range(wheels):
         target = y[Y.motor_target_nm + i]
-        target *= charge_share if target * x[X.wheel_speed_rad_s + i] < 0.0 else drive_share
+        target *= charge_share if target * _turning(x, u, cut, i) < 0.0 else drive_share
         own, measured = x[X.motor_torque_nm + i], u[U.motor_torque_nm + i]
         rate = torque_rate(target, own, p[P.motor_time_constant_s], p[P.motor_rate_limit_nm_s])
         y[Y.motor_target_nm + i] = target

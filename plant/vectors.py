@@ -60,8 +60,10 @@ INPUTS = {
     "motor_torque_nm": 4,
     "wheel_torque_nm": 4,
     "longitudinal_force_n": 4,
+    "wheel_speed_rad_s": 4,
 }
-CUTS = {"pressure": 4, "motor_torque": 4, "wheel_torque": 4, "force": 4}
+CUTS = {"pressure": 4, "motor_torque": 4, "wheel_torque": 4, "force": 4, "motor_speed": 4}
+CUT_PARTS = len(CUTS)
 SWITCHES = {"motor_alive": 4, "battery_accepts": 1, "battery_announces": 1}
 BASE_RATES = Layout("BaseRates", CONTINUOUS)
 RATES = Layout("Rates", CONTINUOUS | EXTRA_STATES)

@@ -17,6 +17,10 @@ WHEELS = ("fl", "fr", "rl", "rr")
 START_MPS, RADIUS_M = 0.05, NOMINAL.rolling_radius_m
 SLOW_RAD_S = 10.0
 LAG_ROWS = 6  # in which a motor has reached what it may give
+NEAR_ROWS = 20  # about the moment a motor meets a limit
+SAME_SPEED = 0.005  # share of the speed beyond which a bend is another bend
+_BY_SPEED = {"ay_mps2": 1.7, "yaw_rate_rad_s": 0.7}
+"""Powers of the speed that a bend goes with at usual speeds; 2 and 1 for a car without understeer."""
 MOTION = ("wheel_speed_", "ax_", "ay_", "yaw_", "speed_", "motor_torque_")
 
 
@@ -36,7 +40,7 @@ def whitened(differences: Sequence[Table], base: Sequence[Table], noise: Noise) 
         moving = (omega.mean(axis=1) > 0.3).astype(np.float64)
         coloured = np.array([noise.gust_mps2, noise.slope_mps2, noise.drift_mps2, *[noise.wheel_drift] * 4])
         times = np.array([noise.gust_tau_s, noise.slope_tau_s, noise.drift_tau_s, *[noise.sensor_tau_s] * 4])
-        torque = _answered(apart, table, omega)
+        torque, unclear = _answered(apart, table, omega)
         known = torque.sum(axis=1) / (NOMINAL.rolling_radius_m * NOMINAL.mass_kg)
         parts.append(
             _motion_innovations(
@@ -51,20 +55,25 @@ def whitened(differences: Sequence[Table], base: Sequence[Table], noise: Noise) 
         ]
         own += [(f"pressure_{w}_pa", noise.pressure_pa, noise.pressure_drift_pa) for w in WHEELS]
         for i, w in enumerate(WHEELS):
-            own_torque = apart[f"motor_torque_{w}_nm"] - torque[:, i]
+            own_torque = np.where(unclear[:, i], np.nan, apart[f"motor_torque_{w}_nm"] - torque[:, i])
             parts.append(_innovations(own_torque, _deviation(noise.torque_nm, "motor"), noise.torque_drift_nm, keep))
+        faster = np.nan_to_num(motion[:, :4].mean(axis=1)) / np.maximum(omega.mean(axis=1), 1.0)
         for name, white, drift in own:
-            parts.append(_innovations(apart[name], _deviation(white, name.split("_")[0]), drift, keep))
+            shown = apart[name]
+            if name in _BY_SPEED:  # a bend answers another speed
+                shown = np.where(np.abs(faster) > SAME_SPEED, np.nan, shown - _BY_SPEED[name] * faster * table[name])
+            parts.append(_innovations(shown, _deviation(white, name.split("_")[0]), drift, keep))
     return np.concatenate(parts)
 
 
-def _answered(apart: Table, table: Table, omega: Vector) -> Vector:
+def _answered(apart: Table, table: Table, omega: Vector) -> tuple[Vector, NDArray[np.bool_]]:
     """Motor torque that only answers another speed: no signature, but what the motion has to be cleared of, (n, 4).
 
     The driver who holds a speed shows in the demand. Where a motor gives less than demanded, its torque follows the
-    fading at low speed, T / (v - v0), or constant power, -T / omega.
+    fading at low speed, T / (v - v0), or constant power, -T / omega. True where that is no linear matter: where braking
+    fades, and about the moments a limit is met or left.
     """
-    result = np.zeros_like(omega)
+    result, unclear = np.zeros_like(omega), np.zeros(omega.shape, dtype=bool)
     for i, w in enumerate(WHEELS):
         torque, demand = table[f"motor_torque_{w}_nm"], table[f"motor_torque_demand_{w}_nm"]
         speed, turned = omega[:, i] * NOMINAL.rolling_radius_m, np.nan_to_num(apart[f"wheel_speed_{w}_rad_s"])
@@ -75,7 +84,9 @@ def _answered(apart: Table, table: Table, omega: Vector) -> Vector:
         result[:, i] = np.where(fades, torque / over * NOMINAL.rolling_radius_m * turned, 0.0)
         result[:, i] += np.where(short & ~fades, -torque / np.maximum(omega[:, i], 1.0) * turned, 0.0)
         result[:, i] += np.where(short, 0.0, apart[f"motor_torque_demand_{w}_nm"])
-    return np.nan_to_num(result)
+        met = np.convolve(np.abs(np.diff(short, prepend=short[:1])), np.ones(2 * NEAR_ROWS + 1), mode="same") > 0.5
+        unclear[:, i] = fades | (met & (np.abs(turned) > 0.0))
+    return np.nan_to_num(result), unclear
 
 
 def difference(one: Sequence[Table], other: Sequence[Table]) -> list[dict[str, Vector]]:

@@ -180,7 +180,7 @@ def _imitations(found: Diagnosis, tied: Tied | None) -> list[dict[str, Any]]:
     for index in tied.indices:
         score = found.screened[index]
         value = together.get(index, score.value)
-        contender = Contender(Term(score.candidate, value), found.base, 0.0, 0.0, score.information)
+        contender = Contender(Term(score.candidate, value), found.base, 0.0, 0.0, score.information, found.noise)
         odds_against = float(np.exp(-0.5 * apart[index] ** 2))
         entries.setdefault(score.candidate.effect.name, _rival(contender, odds_against / (1.0 + odds_against)))
     return list(entries.values())

@@ -1,7 +1,9 @@
 """The diagnosis: noise first, then nuisances, then one cause at a time, fitted non-linearly before it is believed."""
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,23 +16,36 @@ from hil.study.onset import with_onsets
 from hil.study.own_error import variance_of, variance_of_law
 from hil.study.prepare import Case
 from hil.study.race import LawRace, least_gain, share_left
-from hil.study.screen import Score, inflation, leaders, not_testable, score, scores, threshold
+from hil.study.screen import (
+    Score,
+    inflation,
+    leaders,
+    not_testable,
+    rescored,
+    score,
+    scores,
+    share_of,
+    threshold,
+)
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
-from hil.study.world import Rig, World, start_nuisances
+from hil.study.world import WORKERS, Rig, World, start_nuisances
 
 Say = Callable[[str], None]
+Of = TypeVar("Of")
 ALPHA = 0.003
 MOST_CAUSES = 3
-LEADERS = 6
+PLAUSIBLE, LEADERS = 12, 5
 _OF_SCREEN = 1.5
 TIED = 9.2
 _FORM = 0.2
 """Share of a cause that its equation may get wrong: what it leaves is no other cause."""
 _CLEARER = 5.0
 """By how much more than the best listed cause a law in no list must explain, log of the odds."""
+_HOPELESS = 0.1
+"""Share of the gain asked below which no candidate is looked at with noise of its own."""
 _KINKED = ("late_demand", "ehb_dead_time_s")
-_TURNS, _MOST_ANEW, _SETTLED, _STALE = 10, 5, 3.0, 0.2
+_TURNS, _MOST_ANEW, _SETTLED, _STALE = 12, 1, 3.0, 0.3
 _COARSE, _FINE = 0.5, 3.0
 """Finite differences of the vehicle's numbers: in standard deviations of what is known before, and of what data say."""
 
@@ -50,7 +65,8 @@ class Settings:
 class Contender:
     """A model that explains the data with one cause in a certain place: its term, cost and log of the odds.
 
-    ``gained`` is what it takes off chi-squared, shared out over the model's own error.
+    ``noise`` is what is left beside it; ``gained`` is what it takes off chi-squared, shared out over the model's own
+    error.
     """
 
     term: Term
@@ -58,6 +74,7 @@ class Contender:
     cost: float
     evidence: float
     information: float
+    noise: Noise
     gained: float = 0.0
 
 
@@ -120,6 +137,7 @@ class _Search:
         self.columns: list[Column] = columns(vehicle.untold)
         self.candidates: list[Candidate] = candidates(self.columns)
         self.fitter: Fitter
+        self.effect_columns: Tracks = {}
         self.race: LawRace | None = None
         self.steps: Floats = np.full(len(self.nuisances), _COARSE)
 
@@ -131,9 +149,9 @@ class _Search:
         self.say("noise, and the vehicle's numbers within their tolerance")
         model, noise = self._vehicle(nominal, noise)
         self.say(f"sensitivities of {len(self.candidates)} candidates")
-        effect_columns = self._effect_columns(model)
+        self.effect_columns = self._effect_columns(model)
         found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, noise, noise, nominal, model, model)
-        sums = self.fitter.screen(model, effect_columns, noise)
+        sums = self.fitter.screen(model, self.effect_columns, noise)
         found.sums = sums
         found.screened = self._scores(sums, model)
         found.untestable = sorted({*not_testable(found.screened), *self.rig.vehicle.untold})
@@ -141,7 +159,7 @@ class _Search:
         found.least_gain = threshold(found.looks, self.settings.alpha) * inflation(found.screened)
         while causes_in(model) < self.settings.most_causes:
             if model.terms:
-                sums = self.fitter.screen(model, effect_columns, noise)
+                sums = self.fitter.screen(model, self.effect_columns, noise)
             accepted = self._next(found, model, noise, sums)
             if accepted is None:
                 break
@@ -165,19 +183,21 @@ class _Search:
             model = self.fitter.fit(model, noise, 4)
             settled, cost = cost - model.cost < _SETTLED, model.cost
             stale = bool(np.abs(model.z - around).max() > _STALE)
-            if settled and not stale:
-                break
+            if not settled:
+                continue
             if self.settings.relinearise and stale and anew < _MOST_ANEW:
                 information = np.diag(self.fitter.products(noise))
                 self.steps = np.clip(_FINE / np.sqrt(np.maximum(information, 1e-9)), 0.03, _COARSE)
                 self._nuisance_columns(model.z)
-                around, anew = model.z, anew + 1
-            elif settled:
+                around, anew, cost = model.z, anew + 1, np.inf
+            else:
                 break
         return model, noise
 
     def _nuisance_columns(self, z: Floats) -> None:
-        base = self.rig.run(self._shifted(z))
+        now = self._shifted(z)
+        self.rig.keep(now)
+        base = self.rig.run(now)
         sides = np.array([self._side(k, z) for k in range(len(z))])
         steps = np.where(sides == 0.0, 1.0, sides) * self.steps
         worlds = [self._shifted(z + step * (np.arange(len(z)) == k)) for k, step in enumerate(steps)]
@@ -232,21 +252,25 @@ class _Search:
         listed = [
             s for s in listed if (s.candidate.effect.name, s.candidate.parameter.name, s.candidate.place) not in used
         ]
-        top = leaders(listed, LEADERS)
+        plausible = leaders(listed, PLAUSIBLE)
+        if not plausible or max(item.gain for item in plausible) < _HOPELESS * found.least_gain:
+            return None
+        self.say(f"noise beside {len(plausible)} candidates")
+        now = self.fitter.term_columns(model) if model.terms else None
+        noise = self._no_worse(model, self.fitter.estimated(model, noise, 80), noise)
+        reference = self.fitter.cost(model.residual, model.z, noise)
+        seen = self._at_once(lambda item: self._profiled(model, item, noise, now, reference), plausible, noise)
+        beside = {id(item): quieter for item, quieter in seen}
+        top = leaders([item for item, _ in seen], LEADERS)
         if not top or max(item.gain for item in top) < 0.4 * found.least_gain:
             return None
         left_over = _FORM**2 * found.explained
         self.say(f"fitting {len(top)} leaders")
-        fitted = [self._contender(model, item, noise) for item in top]
-        best = min(fitted, key=odds)
-        # what the noise model had taken for noise: estimated again with the best leader in place
-        tighter = self.fitter.estimated(best.model, noise, 80)
-        if self.fitter.cost(best.model.residual, best.model.z, tighter) > best.cost:
-            tighter = noise  # its parts are estimated in turn, so it need not be better
+        fitted = self._at_once(lambda item: self._contender(model, item, beside[id(item)], now), top, noise)
+        tighter = min(fitted, key=odds).noise
         moved = self.fitter.fit(model, tighter, 3)
-        reference = min(moved.cost, self.fitter.cost(model.residual, model.z, noise))
-        again = [self._again(c, moved, tighter) for c in fitted]
-        fitted = [self._gained(c, item, reference - left_over) for c, item in zip(again, top, strict=True)]
+        reference = min(moved.cost, reference)
+        fitted = [self._gained(c, item, reference - left_over) for c, item in zip(fitted, top, strict=True)]
         clear = sorted((c for c in fitted if c.gained >= found.least_gain), key=odds)
         law = self._unlisted(found, moved, tighter, reference, min(fitted, key=odds))
         if law is not None:
@@ -260,17 +284,56 @@ class _Search:
             return None
         better = min(fitted, key=odds)
         least = found.least_gain
-        standing = [c for c in clear if c is better or self._stands_beside(better, c, tighter, least)]
+        standing = [c for c in clear if c is better or self._stands_beside(better, c, least)]
         if not standing:
             self.say(f"{better.term.candidate.name} explains more, and the model errs there; nothing stands beside it")
             return None
         best = standing[0]
         found.explained += reference - best.cost
-        polished = self.fitter.fit(best.model, tighter, 4, self.settings.relinearise)
-        polished, tighter = self.fitter.settle(polished, tighter, 2, 60)
+        polished = self.fitter.fit(best.model, best.noise, 4, self.settings.relinearise)
+        polished, tighter = self.fitter.settle(polished, best.noise, 2, 60)
         rest = sorted((c for c in fitted if c is not best and (c in clear or odds(c) >= odds(best))), key=odds)
         first = replace(best, model=polished, term=polished.terms[-1])
         return polished, tighter, [first, *rest]
+
+    def _at_once(self, of: Callable[[Score], Of], items: Sequence[Score], noise: Noise) -> list[Of]:
+        """Many looks that do not depend on each other, over threads."""
+        self.fitter.products(noise)  # which all of them need
+        with ThreadPoolExecutor(WORKERS) as pool:
+            return list(pool.map(of, items))
+
+    def _no_worse(self, model: Model, new: Noise, old: Noise) -> Noise:
+        """The new noise unless the old was likelier: its parts are estimated in turn."""
+        costs = [self.fitter.cost(model.residual, model.z, noise) for noise in (new, old)]
+        return new if costs[0] < costs[1] else old
+
+    def _begun(self, model: Model, item: Score, now: Tracks | None) -> tuple[Model, Tracks]:
+        """A candidate in the model where it does nothing yet, and the sensitivities to all values.
+
+        ``now`` are those to what the model has already.
+        """
+        begun = replace(model, terms=(*model.terms, Term(item.candidate, 0.0)), covariance=np.zeros((0, 0)))
+        at = list(item.candidate.columns)
+        own = {name: values[:, at].sum(axis=1, keepdims=True) for name, values in self.effect_columns.items()}
+        return begun, own if now is None else {name: np.hstack([now[name], values]) for name, values in own.items()}
+
+    def _profiled(
+        self, model: Model, item: Score, noise: Noise, now: Tracks | None, reference: float
+    ) -> tuple[Score, Noise]:
+        """The candidate by one linear step with the noise that is left beside it.
+
+        Noise estimated without a cause takes much of a slow one for its own.
+        """
+        begun, own = self._begun(model, item, now)
+        first = self.fitter.foreseen(begun, own, noise)
+        quieter = self._no_worse(first, self.fitter.estimated(first, noise, 40), noise)
+        again = self.fitter.foreseen(begun, own, quieter)
+        quieter = self._no_worse(again, self.fitter.estimated(again, quieter, 30), quieter)
+        cost = self.fitter.cost(again.residual, again.z, quieter)
+        raw = max(reference - cost, item.raw)
+        value = again.terms[-1].value
+        information = 1.0 / max(float(again.covariance[-1, -1]), 1e-30)
+        return rescored(item, value, raw, information), quieter
 
     def _unlisted(
         self, found: Diagnosis, model: Model, noise: Noise, reference: float, listed: Contender
@@ -281,7 +344,7 @@ class _Search:
         if self.race is None:
             self.say("curves in no list")
             self.race = LawRace(self.fitter, self.fitter.world(model.z, model.terms), model)
-        best = self.race.entries(self.fitter, model, noise)[0]
+        best = self.race.entries(model, noise)[0]
         self.say(f"best curve: {best.curve.law.joint} by {best.curve.variable}, gain {best.gain:.0f}")
         rival, left = max(0.5 * (reference - odds(listed)), 0.0), min(listed.cost, reference)
         least = least_gain(found.looks + len(LAWS), self.settings.alpha) * inflation(found.screened)
@@ -291,17 +354,17 @@ class _Search:
         fitted = self.fitter.fit(self.fitter.at(model.z, (*model.terms, *best.terms), noise), noise, 3)
         values = np.array([term.value for term in fitted.terms[-PIECES:]])
         share = share_left(best, values, fitted.covariance[-PIECES:, -PIECES:])
-        law = Contender(fitted.terms[-1], fitted, fitted.cost, share, 0.0, reference - fitted.cost)
+        law = Contender(fitted.terms[-1], fitted, fitted.cost, share, 0.0, noise, reference - fitted.cost)
         if left - law.cost < least or 0.5 * (reference - odds(law)) < rival + _CLEARER:
             return None
         return law
 
-    def _stands_beside(self, better: Contender, clear: Contender, noise: Noise, least: float) -> bool:
+    def _stands_beside(self, better: Contender, clear: Contender, least: float) -> bool:
         """Whether a cause that is beyond doubt is so even when a better one, which is not, is let in as an error."""
         if odds(clear) - odds(better) < TIED:
             return True
-        joint = self.fitter.at(better.model.z, (*better.model.terms, clear.term), noise)
-        both = self.fitter.fit(joint, noise, 2, self.settings.relinearise)
+        joint = self.fitter.at(better.model.z, (*better.model.terms, clear.term), better.noise)
+        both = self.fitter.fit(joint, better.noise, 2, self.settings.relinearise)
         return (better.cost - both.cost) / variance_of(clear.term.candidate) >= least
 
     @staticmethod
@@ -310,30 +373,16 @@ class _Search:
         gained = min(reference - contender.cost, _OF_SCREEN * item.raw) / variance_of(item.candidate)
         return replace(contender, gained=gained)
 
-    def _contender(self, model: Model, item: Score, noise: Noise) -> Contender:
-        term = Term(item.candidate, item.value)
-        tried = self.fitter.at(model.z, (*model.terms, term), noise)
-        if not tried.cost < model.cost + 50.0:  # too long a step: begin nearer
-            tried = self.fitter.at(model.z, (*model.terms, Term(item.candidate, 0.3 * item.value)), noise)
-        fitted = self.fitter.fit(tried, noise, 2, self.settings.relinearise)
-        return self._judged(fitted, item, noise)
-
-    def _judged(self, fitted: Model, item: Score, noise: Noise) -> Contender:
+    def _contender(self, model: Model, item: Score, noise: Noise, now: Tracks | None) -> Contender:
+        """A leader fitted from where it does nothing, with the noise that is left beside it."""
+        begun, own = self._begun(model, item, now)
+        fitted = self.fitter.fit(begun, noise, 3, self.settings.relinearise, own)
+        noise = self._no_worse(fitted, self.fitter.estimated(fitted, noise, 60), noise)
+        fitted = self.fitter.fit(fitted, noise, 1, self.settings.relinearise)
         tau = item.candidate.spread
         information = 1.0 / max(float(fitted.covariance[-1, -1]), 1e-30) if fitted.covariance.size else item.information
-        value = fitted.terms[-1].value
-        occam = -0.5 * float(np.log1p(information * tau * tau)) - 0.5 * (value / tau) ** 2
-        return Contender(
-            fitted.terms[-1], fitted, fitted.cost, occam - float(np.log(item.candidate.places)), information
-        )
-
-    def _again(self, contender: Contender, without: Model, noise: Noise) -> Contender:
-        """Fitted to other noise, from where it is or from where the vehicle's numbers went without it."""
-        beside = self.fitter.at(without.z, contender.model.terms, noise)
-        here = replace(contender.model, cost=self.fitter.cost(contender.model.residual, contender.model.z, noise))
-        start = beside if beside.cost < here.cost else here
-        fitted = self.fitter.fit(start, noise, 2, self.settings.relinearise)
-        return replace(contender, model=fitted, term=fitted.terms[-1], cost=fitted.cost)
+        evidence = share_of(information, fitted.terms[-1].value, tau) - float(np.log(item.candidate.places))
+        return Contender(fitted.terms[-1], fitted, fitted.cost, evidence, information, noise)
 
     def _backward(self, found: Diagnosis) -> None:
         """Take out each cause in turn; what is not missed stays out."""

@@ -16,6 +16,10 @@ Tracks = dict[str, Floats]
 _LARGEST_STEP = 8.0
 _DAMPING = (0.0, 0.1, 1.0, 10.0)
 _DIVERGED = 1e15
+_WORTH = 1.0
+"""A step that takes less off the cost is the last."""
+_FOLLOWED = 0.05
+"""A step of less, in standard deviations, says too little of how sensitivities change."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,19 +112,25 @@ class Fitter:
         worlds = [term.candidate.applied(world, step) for term, step in zip(model.terms, steps, strict=True)]
         return track_columns(self.rig, self.frame, model.stack or self.rig.run(world), worlds, steps)
 
-    def fit(self, model: Model, noise: Noise, steps: int = 2, relinearise: bool = True) -> Model:
-        """Improve nuisances and values; keeps the model where no step does."""
+    def fit(
+        self, model: Model, noise: Noise, steps: int = 2, relinearise: bool = True, own: Tracks | None = None
+    ) -> Model:
+        """Improve nuisances and values; keeps the model where no step does.
+
+        ``own`` are the sensitivities to the values at this model, if they are known.
+        """
         best = replace(model, cost=self.cost(model.residual, model.z, noise))
-        own: Tracks = {}
         for step in range(steps):
-            if best.terms and (relinearise or not step):
+            if best.terms and (own is None or (relinearise and step)):
                 own = self.term_columns(best)
-            moved = self._step(best, own, noise)
+            moved = self._step(best, own or {}, noise)
             if moved is None:
                 break
             gained = best.cost - moved.cost
+            if not best.terms:
+                self._follow(best, moved)
             best = moved
-            if gained < 1.0:
+            if gained < _WORTH:
                 break
         return best
 
@@ -130,6 +140,8 @@ class Fitter:
         free, held = range(len(model.terms)), self._held(total, model)
         for damping in _DAMPING:
             change, covariance = solve(total, count, free, model.z, damping, held)
+            if self._foretold(total, change, model.z, held) < _WORTH:
+                break
             dz = np.clip(change[:count], -_LARGEST_STEP, _LARGEST_STEP)
             z = np.clip(model.z + dz, -self.farthest, self.farthest)
             z = np.where(self.sides * z < 0.0, 0.0, z)
@@ -141,6 +153,26 @@ class Fitter:
             if moved.cost < model.cost:
                 return replace(moved, covariance=covariance)
         return replace(model, covariance=covariance) if model.terms and not model.covariance.size else None
+
+    def _follow(self, before: Model, after: Model) -> None:
+        """Sensitivities that foretell the step just made (Broyden 1965, Math. Comp. 19, eq. 4.5)."""
+        change = after.z - before.z
+        squared = float(change @ change)
+        if squared < _FOLLOWED**2:
+            return
+        share = (change / squared).astype(np.float32)
+        for name, columns in self.nuisance_columns.items():
+            moved = (before.residual[name][:, 0] - after.residual[name][:, 0]).astype(np.float32)
+            columns += np.outer(moved - columns @ change.astype(np.float32), share)
+        self._white_for = None
+
+    @staticmethod
+    def _foretold(total: Floats, change: Floats, z: Floats, held: Sequence[int]) -> float:
+        """What a step takes off the cost if the model is linear."""
+        right = total[1:, 0].copy()
+        right[: len(z)] -= z
+        right[list(held)] = 0.0
+        return float(right @ change)
 
     def _held(self, total: Floats, model: Model) -> list[int]:
         """Nuisances at the end of their side, or as far off as they may be, that want to go on."""
@@ -155,33 +187,56 @@ class Fitter:
         return np.flatnonzero(np.abs(z) >= self.farthest).tolist()
 
     def products(self, noise: Noise) -> Floats:
-        """Information of the nuisances, (nuisances, nuisances)."""
+        """Information of the nuisances, (nuisances, nuisances); remembered for this noise."""
         if self._white_for is not noise:
-            white, _ = whiten({k: v.astype(np.float64) for k, v in self.nuisance_columns.items()}, self.frame, noise)
-            self._white = np.concatenate([white[name] for name in self.frame.names]).astype(np.float32)
-            self._products = np.asarray(self._white.T @ self._white, np.float64)
+            self._white, self._products = self._of_nuisances(noise)
             self._white_for = noise
         return self._products
 
+    def _of_nuisances(self, noise: Noise) -> tuple[Floats, Floats]:
+        """Whitened sensitivities of the nuisances, and their products."""
+        if self._white_for is noise:
+            return self._white, self._products
+        white, _ = whiten({k: v.astype(np.float64) for k, v in self.nuisance_columns.items()}, self.frame, noise)
+        joined = np.concatenate([white[name] for name in self.frame.names]).astype(np.float32)
+        return joined, np.asarray(joined.T @ joined, np.float64)
+
     def _total(self, model: Model, own: Tracks, noise: Noise) -> Floats:
-        """Products of [residual, nuisances, own columns], the nuisances' from memory."""
-        products = self.products(noise)
+        """Products of [residual, nuisances, own columns]."""
+        white, products = self._of_nuisances(noise)
         joined = {
             name: np.hstack([values, own[name].astype(np.float64)]) if own else values
             for name, values in model.residual.items()
         }
-        white, _ = whiten(joined, self.frame, noise)
-        outer = np.concatenate([white[name] for name in self.frame.names])
+        innovations, _ = whiten(joined, self.frame, noise)
+        outer = np.concatenate([innovations[name] for name in self.frame.names])
         outer[:, 0] = np.clip(outer[:, 0], -6.0, 6.0)
         count, width = len(self.nuisances), outer.shape[1]
         total = np.empty((count + width, count + width))
         at = [0, *range(1 + count, count + width)]
         total[1 : 1 + count, 1 : 1 + count] = products
-        cross = np.asarray(self._white.T @ outer.astype(np.float32), np.float64)
+        cross = np.asarray(white.T @ outer.astype(np.float32), np.float64)
         total[np.ix_(range(1, 1 + count), at)] = cross
         total[np.ix_(at, range(1, 1 + count))] = cross.T
         total[np.ix_(at, at)] = outer.T @ outer
         return total
+
+    def foreseen(self, model: Model, own: Tracks, noise: Noise) -> Model:
+        """The model after one linear step, with the residual that sensitivities foretell; ``own`` to its values."""
+        count, total = len(self.nuisances), self._total(model, own, noise)
+        change, covariance = solve(total, count, range(len(model.terms)), model.z, 0.0, self._held(total, model))
+        z = np.clip(model.z + np.clip(change[:count], -_LARGEST_STEP, _LARGEST_STEP), -self.farthest, self.farthest)
+        z = np.where(self.sides * z < 0.0, 0.0, z)
+        terms = tuple(
+            replace(term, value=_bounded(term.candidate, term.value + float(step)))
+            for term, step in zip(model.terms, change[count:], strict=True)
+        )
+        moved = np.array([new.value - old.value for new, old in zip(terms, model.terms, strict=True)])
+        residual = {
+            name: values - (self.nuisance_columns[name] @ (z - model.z) + own[name] @ moved)[:, None]
+            for name, values in model.residual.items()
+        }
+        return Model(z, terms, residual, self.cost(residual, z, noise), covariance)
 
     def settle(self, model: Model, noise: Noise, rounds: int, budget: int = 160) -> tuple[Model, Noise]:
         """Noise and fit in turn."""

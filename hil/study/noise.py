@@ -16,6 +16,7 @@ MODES = np.array([[0.25, 0.25, 0.25, 0.25], [0.25, 0.25, -0.25, -0.25], [0.5, -0
 MODE_NAMES = ("mean", "front-rear", "left-right front", "left-right rear")
 _FLOOR = {"wheel": 5e-4, "ax": 2e-3, "gps": 2e-3, "ay": 2e-3, "yaw": 2e-4, "pressure": 500.0, "motor": 0.05}
 _LONGEST_S = 2.0  # what is slower is no noise but wants a cause
+_SWING_S = 0.3
 _USUAL = np.array([0.05, 0.03, 0.03, 0.005, 1.0, 3.0, 2.0, 1.0])
 _SPREAD = np.array([1.5, 1.5, 1.5, 1.5, 0.7, 0.7, 0.7, 0.7])
 """Disturbances that roads, drivers and sensors usually make (sizes, then times), and the spread of their logarithms."""
@@ -82,6 +83,12 @@ class Frame:
                 for name, known in shown.items():
                     tracks.setdefault(name, []).append(known)
         present = {name: np.concatenate(parts) for name, parts in tracks.items()}
+        begun = np.concatenate(restart)  # a lag mixes the first sample with those before, a body in a bend swings in
+        swings = np.convolve(begun, np.ones(int(np.ceil(_SWING_S / case.sample_s))))[: len(begun)]
+        present = {
+            name: np.where((swings if name in ("ay", "yaw") else begun) > 0.5, 0.0, known)
+            for name, known in present.items()
+        }
         present = {name: known for name, known in present.items() if known.sum() > 50}
         return cls(
             np.concatenate(fresh), np.concatenate(restart), np.concatenate([d.moving for d in case.drives]) * 1.0,

@@ -16,12 +16,13 @@ from hil.study.table import (
     Log,
     UnusableError,
 )
-from plant.vectors import CUT, INPUT
+from plant.vectors import CUT, INPUT, U
 
 ROW_S = 0.01
 SLOW_MPS = 2.0  # below, wheel sensors and the contact's low-speed terms say little
 SETTLE_S = 1.0
-SHORTEST_S, LONGEST_S = 8.0, 25.0
+SHORTEST_S, LONGEST_S, TURNING_S = 8.0, 25.0, 3.0
+_STRAIGHT_RAD = 0.02
 _RELEASED_PA, _RELEASED_NM = 1e5, 20.0
 _CONTRADICTED = 0.8
 _TRACK = {
@@ -29,6 +30,8 @@ _TRACK = {
     "ax": ("ax_mps2",), "ay": ("ay_mps2",), "yaw": ("yaw_rate_rad_s",), "gps": ("speed_mps",),
 }  # fmt: skip
 SINGLES = ("ax", "ay", "yaw", "gps")
+FILTERED, FILTER_S = ("ax", "ay", "yaw"), 0.2
+"""Channels whose simulated sensor has not seen what was before the log, and for how long that shows."""
 GROUPS = ("wheel", "pressure", "motor")
 
 
@@ -145,6 +148,7 @@ def prepare(logs: Sequence[Log], radius_m: float) -> Case:
     cut = CUT.zeros()
     cut[CUT.slice("pressure")] = 1.0 if driven[0] else 0.0
     cut[CUT.slice("motor_torque")] = 1.0 if driven[2] else 0.0
+    cut[CUT.slice("motor_speed")] = 1.0 if set(WHEEL_SPEED) <= there else 0.0
     groups = [name for name, names in _TRACK.items() if set(names) <= there]
     if "wheel" not in groups and set(WHEEL_SPEED) & there:
         groups.insert(0, "wheel")  # some wheels only: the others are empty
@@ -237,6 +241,7 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float) -> Dri
     inputs[:, INPUT.slice("steering_wheel_rad")] = _filled(on_grid("steer_rad"))[:, None]
 
     wheels = np.column_stack([on_grid(name) for name in WHEEL_SPEED])
+    inputs[:, INPUT.slice("wheel_speed_rad_s")] = np.column_stack([_filled(wheel) for wheel in wheels.T])
     turning = np.any(np.isfinite(wheels))
     spins = _median(wheels)
     ground = on_grid("speed_mps")
@@ -248,7 +253,8 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float) -> Dri
         np.abs(inputs[:, INPUT.slice("motor_demand_nm")]).max(axis=1),
     )
     quiet = (brakes < _RELEASED_PA) & (motors < _RELEASED_NM)
-    bounds = _bounds(speed, quiet, stride)
+    bent = np.abs(inputs[:, U.steering_wheel_rad]) > _STRAIGHT_RAD
+    bounds = _bounds(speed, quiet, bent, stride)
     smooth = _smoothed(_filled(spins))
     smooth_ground = _smoothed(_filled(ground)) if not turning else None
     segments = tuple(
@@ -261,6 +267,8 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float) -> Dri
         measured[name] = averaged(columns, stride)
         for k, channel in enumerate(_TRACK[name]):
             measured[name][~_sampled(log, channel, begin, len(measured[name]), stride), k] = np.nan
+        if name in FILTERED:
+            measured[name][: int(np.ceil(FILTER_S / (stride * ROW_S)))] = np.nan
     slow = averaged(speed[:, None], stride)[:, 0]
     after = max(int(SETTLE_S / (stride * ROW_S)), 1)
     near_stop = np.convolve(slow < SLOW_MPS, np.ones(2 * after + 1), mode="same") > 0.5
@@ -326,14 +334,16 @@ def _smoothed(values: Floats) -> Floats:
     return np.asarray(windows.mean(axis=1) + slope * x[0])
 
 
-def _bounds(speed: Floats, quiet: Floats, stride: int) -> list[int]:
-    """Where to restart: at rest, else released after 8 s, else after 25 s."""
+def _bounds(speed: Floats, quiet: Floats, bent: Floats, stride: int) -> list[int]:
+    """Where to restart: at rest, else released after 8 s, else after 25 s; in bends, which answer speed, after 3 s."""
     rows, bounds, begin = len(speed), [0], 0
     rest = speed < 0.3
     for row in range(1, rows - int(2.0 / ROW_S)):
         since = (row - begin) * ROW_S
         stopped = rest[row] and not rest[row - 1] and since > 2.0
-        if stopped or (since > SHORTEST_S and quiet[row] and speed[row] > SLOW_MPS + 1.0) or since > LONGEST_S:
+        turned = bent[row] and since > TURNING_S and speed[row] > SLOW_MPS + 1.0
+        rolls = since > SHORTEST_S and quiet[row] and speed[row] > SLOW_MPS + 1.0
+        if stopped or turned or rolls or since > LONGEST_S:
             begin = (row + (int(SETTLE_S / ROW_S) if stopped else 0)) // stride * stride
             if begin > bounds[-1] and begin < rows - int(1.0 / ROW_S):
                 bounds.append(begin)

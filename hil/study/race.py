@@ -14,7 +14,7 @@ from hil.study.table import Floats
 from hil.study.world import World
 from plant.effects.effect import Scope
 
-_SINGLE_WHEELS = ("friction.mu",)
+_BY_WHEEL, _AXLES = ("friction.mu",), ("front", "rear")
 _SHARE = 0.1
 
 
@@ -38,45 +38,75 @@ class Entry:
 
 
 class LawRace:
-    """Sensitivities to all laws at one model, simulated once."""
+    """Sensitivities to all laws at one model, simulated once; wheel by wheel for the law that leads."""
 
     def __init__(self, fitter: Fitter, world: World, model: Model) -> None:
-        self._curves = curves(fitter.rig, world)
-        self._single = [[curve.at(place) for place in self._places(curve)] for curve in self._curves]
-        self.columns = self._simulated(fitter, world, model)
+        self._fitter, self._world = fitter, world
+        fitter.rig.keep(world)
+        self._base = model.stack or fitter.rig.run(world)
+        self._parts = {curve: [curve.at(place) for place in _parts(curve)] for curve in curves(fitter.rig, world)}
+        self._columns = self._simulated([part for parts in self._parts.values() for part in parts])
 
-    @staticmethod
-    def _places(curve: Curve) -> Sequence[str]:
-        return Scope.WHEEL.members if curve.law.joint in _SINGLE_WHEELS else ("car",)
-
-    def _simulated(self, fitter: Fitter, world: World, model: Model) -> Tracks:
-        pieces = [piece for of in self._single for curve in of for piece in curve.pieces]
+    def _simulated(self, parts: Sequence[Curve]) -> dict[tuple[str, str], Tracks]:
+        """Columns of each law and place."""
+        pieces = [piece for part in parts for piece in part.pieces]
         steps = [_SHARE * piece.law.usual for piece in pieces]
-        worlds = [piece.applied(world, step) for piece, step in zip(pieces, steps, strict=True)]
-        return track_columns(fitter.rig, fitter.frame, model.stack or fitter.rig.run(world), worlds, steps)
+        worlds = [piece.applied(self._world, step) for piece, step in zip(pieces, steps, strict=True)]
+        all_of = track_columns(self._fitter.rig, self._fitter.frame, self._base, worlds, steps)
+        return {
+            (part.law.name, part.place): {
+                name: values[:, PIECES * k : PIECES * (k + 1)] for name, values in all_of.items()
+            }
+            for k, part in enumerate(parts)
+        }
 
-    def entries(self, fitter: Fitter, model: Model, noise: Noise) -> list[Entry]:
+    def entries(self, model: Model, noise: Noise) -> list[Entry]:
         """Every law at every place it was simulated for, the best first."""
-        sums = fitter.screen(model, self.columns, noise)
+        found = self._ranked(model, noise)
+        leading = next(curve for curve in self._parts if curve.law is found[0].curve.law)
+        if len(self._parts[leading]) == len(_AXLES):
+            self._parts[leading] = [leading.at(wheel) for wheel in Scope.WHEEL.members]
+            self._fitter.rig.keep(self._world)
+            self._columns |= self._simulated(self._parts[leading])
+            found = self._ranked(model, noise)
+        return found
+
+    def _ranked(self, model: Model, noise: Noise) -> list[Entry]:
+        fitter = self._fitter
+        parts = [part for parts in self._parts.values() for part in parts]
+        listed = [self._columns[part.law.name, part.place] for part in parts]
+        joined = {name: np.hstack([columns[name] for columns in listed]) for name in fitter.frame.names}
+        sums = fitter.screen(model, joined, noise)
         accepted = len(model.terms)
         projected = project(sums.total(), sums.nuisances, range(accepted), model.z, fitter.at_their_end(model.z))
         b, q = projected.b[accepted:], projected.q[accepted:, accepted:]
-        choices = sum(len(self._offered(curve, of)) for curve, of in zip(self._curves, self._single, strict=True))
+        offered = {curve: _offered(curve, parts) for curve, parts in self._parts.items()}
+        choices = sum(map(len, offered.values()))
         found, at = [], 0
-        for curve, of in zip(self._curves, self._single, strict=True):
-            size = PIECES * len(of)
+        for curve, parts in self._parts.items():
+            size = PIECES * len(parts)
             own = slice(at, at + size)
-            for placed in self._offered(curve, of):
-                members = placed.pieces[0].members() if len(of) > 1 else (0,)
-                moves = np.hstack([np.eye(PIECES) * float(wheel in members) for wheel in range(len(of))])
+            for placed, taken in offered[curve]:
+                moves = np.hstack([np.eye(PIECES) * float(k in taken) for k in range(len(parts))])
                 found.append(_entry(placed, moves @ b[own], moves @ q[own, own] @ moves.T, choices))
             at += size
         return sorted(found, key=lambda entry: -entry.evidence)
 
-    @staticmethod
-    def _offered(curve: Curve, of: Sequence[Curve]) -> list[Curve]:
-        """The law at every place where it is in the race: columns of single wheels are summed."""
-        return list(places(curve)) if len(of) > 1 else [curve]
+
+def _parts(curve: Curve) -> Sequence[str]:
+    """Places that are simulated at first; all others are sums of them."""
+    return _AXLES if curve.law.joint in _BY_WHEEL else ("car",)
+
+
+def _offered(curve: Curve, parts: Sequence[Curve]) -> list[tuple[Curve, list[int]]]:
+    """The law at every place that parts add up to, with those parts."""
+    found = []
+    for placed in places(curve):
+        members = set(placed.pieces[0].members())
+        taken = [k for k, part in enumerate(parts) if set(part.pieces[0].members()) <= members]
+        if sum(len(parts[k].pieces[0].members()) for k in taken) == len(members):
+            found.append((placed, taken))
+    return found
 
 
 def _entry(curve: Curve, b: Floats, q: Floats, choices: int) -> Entry:

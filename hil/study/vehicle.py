@@ -33,6 +33,8 @@ _SUSPENSION = {
     "suspension_brake_support_tangent": 0.6, "suspension_anti_roll_nm_rad": 0.7, "suspension_roll_centre_height_m": 3.0,
     "vehicle_pitch_inertia_kg_m2": 0.6, "vehicle_roll_inertia_kg_m2": 0.2,
 }  # fmt: skip
+_THERMAL = {"friction_brake_heat_capacity_j_k": 0.2, "friction_brake_cooling_w_k": 0.3}
+"""Heat store of the discs; where the friction does not depend on temperature it does not matter."""
 _SIGNED = ("suspension_progression_n_m3", "suspension_brake_support_tangent", "suspension_roll_centre_height_m")
 """Numbers that a car may have of either sign."""
 
@@ -288,10 +290,13 @@ def _vehicle(
     parameters: PlantParameters, tolerance: Mapping[str, float], thermal: bool, remarks: tuple[str, ...]
 ) -> Vehicle:
     p = pack(parameters)
-    return Vehicle(parameters, p, tuple(_nuisances(p, tolerance, PARAMETER)), thermal, remarks)
+    forms = _SUSPENSION | _THERMAL if thermal else _SUSPENSION
+    return Vehicle(parameters, p, tuple(_nuisances(p, tolerance, forms, PARAMETER)), thermal, remarks)
 
 
-def _nuisances(p: Floats, tolerance: Mapping[str, float], layout: Layout) -> list[Nuisance]:
+def _nuisances(
+    p: Floats, tolerance: Mapping[str, float], forms: Mapping[str, float], layout: Layout
+) -> list[Nuisance]:
     """One a parameter; what acts alike is one (radius and area, pad numbers), axles are moved together or apart."""
     found: list[Nuisance] = []
 
@@ -345,8 +350,8 @@ def _nuisances(p: Floats, tolerance: Mapping[str, float], layout: Layout) -> lis
     add("wheel_brake_windup_time_s", [layout.slice("wheel_brake_windup_time_s").start], [0.006])
     add("tyre_lsgal", [layout.slice("tyre_lsgal").start], [0.5])
     add("tyre_lmuy", [layout.slice("tyre_lmuy").start], [0.15])
-    # the same for the suspension: a vehicle set states dive and roll at best, never the curves behind them
-    for name, share in _SUSPENSION.items():
+    # the same for suspension and discs: a vehicle set states dive and roll at best, never the curves behind them
+    for name, share in forms.items():
         at, size = layout.slice(name).start, layout.sizes[name]
         for k in range(size):
             half = max(tolerance.get(name, 0.0), share * float(p[at + k]))

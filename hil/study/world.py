@@ -6,14 +6,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 from scipy.signal import savgol_filter
 
+from hil.study import acting
+from hil.study.acting import Acting
 from hil.study.prepare import ROW_S, SLOW_MPS, Case, Drive, Segment, averaged
-from hil.study.sensing import WATCHING, inverted, sensed, wheel_speed_before
+from hil.study.sensing import inverted, sensed, wheel_speed_before
 from hil.study.table import Floats
 from hil.study.vehicle import Nuisance, Vehicle, factor_of, rest_friction
 from plant.effects.bank import NO_TERMS
 from plant.effects.plugin import NO_PLUGINS
+from plant.effects.states import EXTRA_STATES
 from plant.effects.theta import THETA
 from plant.integrate import EXPONENTIAL_4
 from plant.model import column_indices, healthy, initial_state, simulate
@@ -33,6 +37,16 @@ _SOURCE = {
     "yaw": ["state.imu_yaw_rate_rad_s"],
     "gps": ["state.speed_mps"],
 }
+_SLOW = np.concatenate(
+    [
+        np.arange(STATE.size)[STATE.slice(name)]
+        for name in (
+            "winding_temperature_k", "pad_friction", "pad_temperature_k", "disc_temperature_k", "state_of_charge",
+            *EXTRA_STATES,
+        )
+    ]
+)  # fmt: skip
+"""States that a segment hands on to a later one, beside the motion."""
 Stack = dict[str, Floats]
 """Channels by group, (samples of all drives, channels)."""
 
@@ -164,55 +178,69 @@ def _in_time(inputs: Floats, late_s: tuple[float, ...]) -> Floats:
     return moved
 
 
-_SHORT, _SETTLED_ROWS = 0.97, 6
-_LEAST_MPS, _STEEPEST_NMS_RAD = 0.2, 40.0
 _USUAL_RADIUS_M = 0.3
+_FADING_MPS, _LEAST_NM = 0.3, 1.0
+_GRADE, _TURNS_MPS2, _CHARACTERISTIC_MPS = 0.01, 0.3, (8.0, 200.0)
 _TOOTH_ROWS = 2.0
 
 
-def speed_slope(torque_nm: Floats, demand_nm: Floats, omega_rad_s: Floats, world: World) -> Floats:
-    """How the torque of motors that give less than demanded answers their speed, N m s/rad, (rows, 4).
+def _apart(one: World, other: World) -> Acting:
+    """What must be going on for two worlds to move differently."""
+    if one.onsets != other.onsets:
+        return Acting.DRIVING
+    found = acting.of_effects(one.theta, other.theta) | acting.of_terms(one.terms, other.terms)
+    if one.p is not other.p:
+        found |= acting.of_parameters(one.p, other.p)
+    if one.disc_offset_k != other.disc_offset_k:
+        found |= Acting.BRAKES
+    for late, also, of in zip(one.late_s, other.late_s, acting.LATE, strict=True):
+        if late != also:
+            found |= of
+    return found
 
-    Regeneration that fades at low speed has T / (v - v0) per m/s, constant power (of motor or battery) -T / omega.
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """A world's replay of a drive: what was noted, and the states at the start and after each segment."""
+
+    table: Floats
+    states: tuple[Floats, ...]
+
+
+def _powers(speed_mps: Floats, characteristic_mps: float) -> tuple[Floats, Floats]:
+    """Powers of the speed that lateral acceleration and yaw rate go with at a given steering angle.
+
+    Of the linear single-track model, a_y = v^2 delta / (l (1 + v^2 / v_ch^2)) (Mitschke and Wallentowitz 2014,
+    Dynamik der Kraftfahrzeuge, sec. 27).
     """
-    before = np.vstack((np.repeat(demand_nm[:1], _SETTLED_ROWS, axis=0), demand_nm[:-_SETTLED_ROWS]))
-    short = np.abs(torque_nm) < _SHORT * np.minimum(np.abs(demand_nm), np.abs(before))
-    radius = float(world.p[P.wheel_rolling_radius_m])
-    speed = omega_rad_s * radius
-    fades = short & (speed < world.p[P.motor_fade_start_mps]) & (torque_nm < 0.0)
-    over = np.maximum(speed - float(world.p[P.motor_fade_end_mps]), _LEAST_MPS)
-    power = np.where(short, -torque_nm / np.maximum(omega_rad_s, 1.0), 0.0)
-    return np.asarray(np.where(fades, torque_nm / over * radius, power))
+    squared = (speed_mps / characteristic_mps) ** 2
+    return 2.0 / (1.0 + squared), (1.0 - squared) / (1.0 + squared)
 
 
-def _moves_alike(one: World, other: World) -> bool:
-    """Whether two worlds differ in sensors that only watch, if at all."""
-    apart = np.flatnonzero(one.theta != other.theta)
-    return (
-        (one.p is other.p or np.array_equal(one.p, other.p))
-        and np.array_equal(one.terms, other.terms)
-        and one.disc_offset_k == other.disc_offset_k
-        and one.onsets == other.onsets
-        and one.late_s[1:] == other.late_s[1:]
-        and bool(np.isin(apart, WATCHING).all())
-    )
+def _between(drive: Drive, segment: Segment, group: str) -> Floats | None:
+    """Measured channels of a segment."""
+    values = drive.measured.get(group)
+    return None if values is None else values[segment.first // drive.stride : segment.last // drive.stride]
 
 
 class Rig:
     """Replays worlds over the drives of a case.
 
-    Simulated motor torque and turning are those at the measured wheel speed: a motor at its limits and a car in a bend
-    answer every error of the speed, whatever made it. ``slopes``, (samples, 4) a drive, say how motors do
-    (`speed_slope`).
+    Limits of motors and turning are those at the measured wheel speed: a motor at its limits and a car in a bend answer
+    every error of the speed, whatever made it.
     """
 
-    def __init__(self, case: Case, vehicle: Vehicle, slopes: Sequence[Floats] | None = None) -> None:
-        self.case, self.vehicle, self._slopes = case, vehicle, slopes
+    def __init__(self, case: Case, vehicle: Vehicle, characteristic_mps: float = np.inf) -> None:
+        self.case, self.vehicle, self._characteristic_mps = case, vehicle, characteristic_mps
         self._groups = case.groups
         names = [name for group in case.groups for name in _SOURCE[group]]
         self._columns = column_indices(names)
         self._road = road_table(DRY)
-        self._kept: tuple[World, list[Stack]] | None = None
+        self._going_on = [
+            [acting.in_segment(drive.inputs[s.first : s.last], _between(drive, s, "ay")) for s in drive.segments]
+            for drive in case.drives
+        ]
+        self._kept: tuple[World, list[_Kept]] | None = None
         self.runs = 0
 
     def quieted(self, world: World) -> "Rig":
@@ -221,7 +249,7 @@ class Rig:
         What drives the car is the simulated value plus the smoothed difference of the measured one: steps stay sharp.
         """
         wanted = [(group, part) for group, part in _INPUTS if group in self._groups]
-        drives, slopes = [], []
+        drives = []
         for drive in self.case.drives:
             raw = self._raw(drive, world)
             inputs = drive.inputs.copy()
@@ -230,14 +258,42 @@ class Rig:
                 apart = drive.inputs[:, where] - raw[group]
                 window = min(_SMOOTH, (len(apart) - 1) // 2 * 2 + 1)
                 inputs[:, where] = raw[group] + savgol_filter(apart, window, 2, axis=0)
-            measured = drive.measured
-            if "motor" in measured and "wheel" in measured:
-                demand = drive.inputs[:, INPUT.slice("motor_demand_nm")]
-                slope = averaged(speed_slope(raw["motor"], demand, raw["wheel"], world), drive.stride)
-                measured = {**measured, "motor": np.where(np.abs(slope) > _STEEPEST_NMS_RAD, np.nan, measured["motor"])}
-                slopes.append(np.clip(slope, -_STEEPEST_NMS_RAD, _STEEPEST_NMS_RAD))
-            drives.append(replace(drive, inputs=inputs, measured=measured))
-        return Rig(replace(self.case, drives=tuple(drives)), self.vehicle, slopes or None)
+            drives.append(replace(drive, inputs=inputs, measured=self._without_fading(drive, world)))
+        case = replace(self.case, drives=tuple(drives))
+        return Rig(case, self.vehicle, self._characteristic(world))
+
+    @staticmethod
+    def _without_fading(drive: Drive, world: World) -> Stack:
+        """Measured channels without motors whose braking fades: there it answers errors of speed no sensor resolves."""
+        if not {"motor", "wheel"} <= set(drive.measured):
+            return drive.measured
+        speed = np.nan_to_num(drive.measured["wheel"]) * float(world.p[P.wheel_rolling_radius_m])
+        asked = averaged(drive.inputs[:, INPUT.slice("motor_demand_nm")], drive.stride)
+        fades = (speed < float(world.p[P.motor_fade_start_mps]) + _FADING_MPS) & (asked < -_LEAST_NM)
+        return {**drive.measured, "motor": np.where(fades, np.nan, drive.measured["motor"])}
+
+    def _characteristic(self, world: World) -> float:
+        """Characteristic speed of the simulated car, m/s: how its turning answers a small difference of the speed."""
+        if not {"wheel", "ay"} <= set(self._groups):
+            return np.inf
+        tail = world.theta.copy()
+        tail[THETA.slice("road_grade", "grade")] += _GRADE
+        a, b = (self._stacked(one) for one in (world, replace(world, theta=tail)))
+        v = a["wheel"].mean(axis=1) * float(world.p[P.wheel_rolling_radius_m])
+        turning = (np.abs(a["ay"][:, 0]) > _TURNS_MPS2) & (v > SLOW_MPS)
+        ay, v, faster = a["ay"][turning, 0], v[turning], (b["wheel"] - a["wheel"]).mean(axis=1)[turning]
+        if not len(ay):
+            return np.inf
+        share = faster / a["wheel"].mean(axis=1)[turning]
+
+        def off(log_speed: float) -> float:
+            return float(np.sum(((b["ay"] - a["ay"])[turning, 0] - ay * share * _powers(v, np.exp(log_speed))[0]) ** 2))
+
+        return float(np.exp(minimize_scalar(off, bounds=np.log(_CHARACTERISTIC_MPS), method="bounded").x))
+
+    def _stacked(self, world: World) -> Stack:
+        parts = [self._raw(drive, world) for drive in self.case.drives]
+        return {group: np.concatenate([part[group] for part in parts]) for group in self._groups}
 
     def run(self, world: World) -> Stack:
         """Simulated channels of all drives."""
@@ -246,8 +302,9 @@ class Rig:
         return {group: np.concatenate([part[group] for part in parts]) for group in self._groups}
 
     def keep(self, world: World) -> None:
-        """Keep the motion of this world: one that differs in its sensors alone is not simulated again."""
-        self._kept = world, [self._raw(drive, world) for drive in self.case.drives]
+        """Keep the motion of this world: others are simulated only where they can differ from it."""
+        self._kept = None
+        self._kept = world, [_Kept(*self._replayed(drive, world, self._columns)) for drive in self.case.drives]
 
     def run_all(self, worlds: Sequence[World]) -> Iterator[Stack]:
         """Of many worlds, in order, over threads."""
@@ -288,9 +345,7 @@ class Rig:
         return max(told, 0.0) * float(np.median(_radius_m(world)))
 
     def _drive(self, drive: Drive, world: World) -> Stack:
-        kept = self._kept
-        raw = kept[1][drive.number] if kept is not None and _moves_alike(world, kept[0]) else self._raw(drive, world)
-        stack = sensed(raw, world.theta_in(drive), ROW_S)
+        stack = sensed(self._raw(drive, world), world.theta_in(drive), ROW_S)
         for group, values in stack.items():
             late = world.late_s[_NODE[group]] if group in _NODE else 0.0
             if late:
@@ -299,7 +354,7 @@ class Rig:
                 stack[group] = _later(values, self._tooth_rows(values) * world.tooth_share)
         found = {group: averaged(values, drive.stride) for group, values in stack.items()}
         if "wheel" in found:
-            self._at_measured_speed(found, drive, None if self._slopes is None else self._slopes[drive.number])
+            self._at_measured_speed(found, drive)
         return found
 
     def _tooth_rows(self, omega_rad_s: Floats) -> Floats:
@@ -307,24 +362,23 @@ class Rig:
         pitch = 2.0 * np.pi / self.vehicle.parameters.sensor.teeth
         return np.minimum(0.5 * pitch / np.fmax(np.abs(omega_rad_s), 0.1) / ROW_S, _TOOTH_ROWS)
 
-    def _at_measured_speed(self, found: Stack, drive: Drive, slope: Floats | None) -> None:
-        """What answers the speed, as it is at the measured speed: limited motors, a_y as v^2, yaw rate as v."""
-        faster = np.nan_to_num(drive.measured["wheel"] - found["wheel"])
-        if slope is not None:
-            found["motor"] += slope * faster
-        share = faster.mean(axis=1) / np.maximum(found["wheel"].mean(axis=1), SLOW_MPS / _USUAL_RADIUS_M)
-        share = np.clip(share, -0.2, 0.2)[:, None]
-        for group, power in (("ay", 2.0), ("yaw", 1.0)):
+    def _at_measured_speed(self, found: Stack, drive: Drive) -> None:
+        """The turning of the car as it is at the measured speed."""
+        faster = np.nan_to_num(drive.measured["wheel"] - found["wheel"]).mean(axis=1)
+        turning = np.maximum(found["wheel"].mean(axis=1), SLOW_MPS / _USUAL_RADIUS_M)
+        share = np.clip(faster / turning, -0.2, 0.2)
+        powers = _powers(turning * self.vehicle.parameters.wheel.rolling_radius_m, self._characteristic_mps)
+        for group, power in zip(("ay", "yaw"), powers, strict=True):
             if group in found:
-                found[group] *= 1.0 + power * share
+                found[group] *= (1.0 + power * share)[:, None]
 
     def states(self, world: World, names: Sequence[str]) -> Floats:
         """States and outputs by name (`plant.model.column_indices`) over all drives, (rows, names)."""
         columns = column_indices(list(names))
-        return np.concatenate([self._replayed(drive, world, columns) for drive in self.case.drives])
+        return np.concatenate([self._replayed(drive, world, columns)[0] for drive in self.case.drives])
 
     def _raw(self, drive: Drive, world: World) -> Stack:
-        table = self._replayed(drive, world, self._columns)
+        table = self._noted(drive, world)
         stack: Stack = {}
         at = 0
         for group in self._groups:
@@ -333,22 +387,45 @@ class Rig:
             at += width
         return stack
 
-    def _replayed(self, drive: Drive, world: World, columns: NDArray[np.int64]) -> Floats:
-        """One drive, what ``columns`` ask for at every row."""
+    def _noted(self, drive: Drive, world: World) -> Floats:
+        """Raw channels of one drive; from what was kept where the worlds cannot differ."""
+        if self._kept is None:
+            return self._replayed(drive, world, self._columns)[0]
+        apart, kept = _apart(world, self._kept[0]), self._kept[1][drive.number]
+        differs = [bool(apart & going_on) for going_on in self._going_on[drive.number]]
+        return self._replayed(drive, world, self._columns, kept, differs)[0] if any(differs) else kept.table
+
+    def _replayed(
+        self, drive: Drive, world: World, columns: NDArray[np.int64], kept: _Kept | None = None,
+        differs: Sequence[bool] = (),
+    ) -> tuple[Floats, tuple[Floats, ...]]:  # fmt: skip
+        """One drive: what ``columns`` ask for at every row, and the states at the start and after each segment.
+
+        Segments that do not differ are taken from ``kept``; what moves slowly goes on from where it was.
+        """
         x = self._start(drive, world)
         theta = world.theta_in(drive)
         inputs = inverted(drive.inputs, theta, ROW_S)
         inputs = _in_time(inputs, world.late_s)
         table = np.empty((len(inputs), len(columns)))
         cut, switch, y = self.case.cut, healthy(), OUTPUT.zeros()
+        states = [x.copy()]
         for number, segment in enumerate(drive.segments):
+            rows = slice(segment.first, segment.last)
+            if kept is not None and not differs[number]:
+                table[rows] = kept.table[rows]
+                ahead = x[_SLOW] - kept.states[number][_SLOW]
+                x = kept.states[number + 1].copy()
+                x[_SLOW] += ahead
+                continue
             if number:
                 self._restart(x, self._speed(drive, segment, world))
             simulate(
-                x, inputs[segment.first : segment.last], cut, switch, world.p, self._road, ROW_S / STEPS, STEPS,
-                EXPONENTIAL_4, columns, table[segment.first : segment.last], y, theta, world.terms, NO_PLUGINS,
+                x, inputs[rows], cut, switch, world.p, self._road, ROW_S / STEPS, STEPS, EXPONENTIAL_4, columns,
+                table[rows], y, theta, world.terms, NO_PLUGINS,
             )  # fmt: skip
-        return table
+            states.append(x.copy())
+        return table, tuple(states)
 
     @staticmethod
     def _restart(x: Floats, speed_mps: float) -> None:

@@ -52,6 +52,7 @@ def test_own_pressure_at_the_pressure_cut_gives_the_same_stop(stop):
     ("motor_torque", "motor_torque_nm", "motor_torque_nm"),
     ("wheel_torque", "wheel_torque_nm", "wheel_torque_nm"),
     ("force", "longitudinal_force_n", "longitudinal_force_n"),
+    ("motor_speed", "wheel_speed_rad_s", "state.wheel_speed_rad_s"),
 ])  # fmt: skip
 def test_own_values_at_the_other_cuts(stop, cut_name, part, source):
     start, inputs, p = stop
@@ -73,6 +74,18 @@ def test_demand_still_makes_its_pressure_while_a_measured_one_brakes(stop):
     table = replay(start, inputs, p, ["pressure_pa_fl", "state.pressure_pa_fl"], cut=cut)[0]
     assert table[-1, 0] == 10e5
     assert table[-1, 1] == pytest.approx(25e5, rel=1e-3)
+
+
+def test_motors_keep_to_their_limits_at_the_measured_speed(stop):
+    start, inputs, p = stop
+    inputs[:, INPUT.slice("motor_demand_nm")] = -500.0
+    inputs[:, INPUT.slice("wheel_speed_rad_s")] = 0.0  # a measured standstill: braking has faded out
+    cut = CUT.zeros()
+    cut[CUT.slice("motor_speed")] = 1.0
+    faded = replay(start, inputs, p, ["motor_torque_nm_fl"], cut=cut)[0]
+    driven = replay(start, inputs, p, ["motor_torque_nm_fl"])[0]
+    assert np.abs(faded).max() == 0.0
+    assert driven.min() < -100.0
 
 
 def test_one_wheel_can_be_cut_alone(stop):
