@@ -14,11 +14,12 @@ from hil.study.acting import Acting
 from hil.study.prepare import ROW_S, SLOW_MPS, Case, Drive, Segment, averaged
 from hil.study.sensing import inverted, sensed, wheel_speed_before
 from hil.study.table import Floats
-from hil.study.vehicle import Nuisance, Vehicle, factor_of, rest_friction
+from hil.study.vehicle import Nuisance, Vehicle, factor_of
 from plant.effects.bank import NO_TERMS
 from plant.effects.plugin import NO_PLUGINS
 from plant.effects.states import EXTRA_STATES
 from plant.effects.theta import THETA
+from plant.friction import mu_equilibrium
 from plant.integrate import EXPONENTIAL_4
 from plant.model import column_indices, healthy, initial_state, simulate
 from plant.road import DRY, road_table
@@ -325,11 +326,10 @@ class Rig:
         soc = log.channels.get("soc")
         charge = 0.7 if soc is None else float(np.nanmean(soc[:20]))
         disc = (log.disc_temperature_k or DISC_K) + world.disc_offset_k
-        x = initial_state(self.vehicle.parameters, 0.0, disc, charge)
-        if not self.vehicle.pad_temperature_matters:
-            ambient = float(world.p[P.friction_brake_ambient_k])
-            x[STATE.slice("pad_temperature_k")] = ambient
-            x[STATE.slice("pad_friction")] = rest_friction(self.vehicle.parameters, ambient)
+        pad_k = disc if self.vehicle.pad_temperature_matters else float(world.p[P.friction_brake_ambient_k])
+        pad = (float(world.p[at]) for at in (P.pad_a_1_ks, P.pad_b_1_j, P.pad_epsilon_w))
+        x = initial_state(self.vehicle.parameters, 0.0, disc, charge, mu_equilibrium(0.0, pad_k, *pad))
+        x[STATE.slice("pad_temperature_k")] = pad_k
         speed = self._speed(drive, first, world)
         x[X.speed_mps] = speed
         x[STATE.slice("wheel_speed_rad_s")] = speed / _radius_m(world)

@@ -10,6 +10,7 @@ from hil.study.table import Log, make_log
 from hil.study.vehicle import paper_car
 from hil.study.world import Rig, World, nominal
 from plant.effects.theta import THETA
+from plant.vectors import P
 
 WHEELS = ("fl", "fr", "rl", "rr")
 COASTS, RECUPERATES, BRAKES = (0.0, 9.0), (10.0, 15.0), (19.0, 23.0)
@@ -72,3 +73,15 @@ def test_brakes_change_nothing_before_they_are_applied(rig):
     assert len(rig.case.drives[0].segments) == SEGMENTS
     assert np.array_equal(same["wheel"][:first], changed["wheel"][:first])
     assert np.abs(same["wheel"][first:] - changed["wheel"][first:]).max() > 0.1
+
+
+def test_pads_begin_at_the_rest_value_of_the_car_at_hand(rig):
+    """With the friction of the car as handed in, what is stated of its pads would say nothing of the first stops."""
+    level = nominal(rig.vehicle)
+    p = level.p.copy()
+    p[P.pad_epsilon_w] *= 1.05
+    rig.keep(level)
+    slower = rig.run(replace(level, p=p))["wheel"][-100:] - rig.run(level)["wheel"][-100:]
+    weaker = rig.run(_with(level, "pad_mu_gain", "gain", 1.0 / 1.05 - 1.0))["wheel"][-100:]
+    weaker = weaker - rig.run(level)["wheel"][-100:]
+    assert slower.mean() == pytest.approx(weaker.mean(), rel=0.1)
