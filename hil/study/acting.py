@@ -1,6 +1,6 @@
 """Where a number of the car can matter: nothing a brake does shows while the brakes are released.
 
-Sensitivities are replayed over those segments only (`hil.study.world.Rig.keep`). The lists follow from sensitivities
+Sensitivities are replayed over those segments only (`hil.study.rig.Rig.keep`). The lists follow from sensitivities
 over a whole set of drives: what they leave out holds less than a hundredth of a number's information.
 """
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from hil.study.candidates import PLACES, Candidate
 from hil.study.own_error import UNLISTED
+from hil.study.rig import Rig
 from hil.study.table import Floats
-from hil.study.world import Rig, World
+from hil.study.world import World
 from plant.effects.bank import Shape, Variable, term
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.places import JOINTS

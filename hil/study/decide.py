@@ -23,10 +23,11 @@ from hil.study.candidates import Candidate, Column, candidates, columns
 from hil.study.linear import project, sums, track_columns
 from hil.study.noise import Frame, Noise, first_guess, tracks_of
 from hil.study.prepare import prepare
+from hil.study.rig import Rig, Stack
 from hil.study.table import CHANNELS, MOTOR_DEMAND, PRESSURE_DEMAND, Floats, Log, make_log
 from hil.study.tied import APART, remaining, summed
 from hil.study.vehicle import Vehicle, paper_car
-from hil.study.world import Rig, Stack, World, nominal
+from hil.study.world import World, nominal
 from plant.effects.effect import Scope
 from plant.effects.manoeuvres import MANOEUVRES, ROW_S, Drive, Show, drive
 from plant.effects.signals import NAMES, noise, simulate

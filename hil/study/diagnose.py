@@ -1,38 +1,35 @@
 """The diagnosis: noise first, then nuisances, then one cause at a time, fitted non-linearly before it is believed."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
 
 import numpy as np
 
 from hil.study.basis import LAWS, PIECES, Piece
 from hil.study.candidates import Candidate, Column, candidates, columns
-from hil.study.fit import Fitter, Model, Term, Tracks
+from hil.study.contest import Contender, Contest, odds
+from hil.study.fit import Fitter, Model, Tracks
 from hil.study.linear import Sums, project, track_columns
 from hil.study.noise import Frame, Noise
 from hil.study.onset import with_onsets
 from hil.study.own_error import variance_of, variance_of_law
 from hil.study.prepare import Case
 from hil.study.race import LawRace, least_gain, share_left
+from hil.study.rig import Rig
 from hil.study.screen import (
     Score,
     inflation,
     leaders,
     not_testable,
-    rescored,
     score,
     scores,
-    share_of,
     threshold,
 )
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
-from hil.study.world import WORKERS, Rig, World, start_nuisances
+from hil.study.world import World, start_nuisances
 
 Say = Callable[[str], None]
-Of = TypeVar("Of")
 ALPHA = 0.003
 MOST_CAUSES = 3
 PLAUSIBLE, LEADERS = 12, 5
@@ -59,28 +56,6 @@ class Settings:
     dictionary: bool = True
     alpha: float = ALPHA
     most_causes: int = MOST_CAUSES
-
-
-@dataclass(frozen=True, eq=False)
-class Contender:
-    """A model that explains the data with one cause in a certain place: its term, cost and log of the odds.
-
-    ``noise`` is what is left beside it; ``gained`` is what it takes off chi-squared, shared out over the model's own
-    error.
-    """
-
-    term: Term
-    model: Model
-    cost: float
-    evidence: float
-    information: float
-    noise: Noise
-    gained: float = 0.0
-
-
-def odds(contender: Contender) -> float:
-    """Twice the negative log of the odds, the smaller the better."""
-    return contender.cost - 2.0 * contender.evidence
 
 
 def causes_in(model: Model) -> int:
@@ -256,20 +231,18 @@ class _Search:
         if not plausible or max(item.gain for item in plausible) < _HOPELESS * found.least_gain:
             return None
         self.say(f"noise beside {len(plausible)} candidates")
-        now = self.fitter.term_columns(model) if model.terms else None
-        noise = self._no_worse(model, self.fitter.estimated(model, noise, 80), noise)
-        reference = self.fitter.cost(model.residual, model.z, noise)
-        seen = self._at_once(lambda item: self._profiled(model, item, noise, now, reference), plausible, noise)
+        contest = Contest(self.fitter, self.effect_columns, model, noise, self.settings.relinearise)
+        seen = contest.at_once(contest.profiled, plausible)
         beside = {id(item): quieter for item, quieter in seen}
         top = leaders([item for item, _ in seen], LEADERS)
         if not top or max(item.gain for item in top) < 0.4 * found.least_gain:
             return None
         left_over = _FORM**2 * found.explained
         self.say(f"fitting {len(top)} leaders")
-        fitted = self._at_once(lambda item: self._contender(model, item, beside[id(item)], now), top, noise)
+        fitted = contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
         tighter = min(fitted, key=odds).noise
         moved = self.fitter.fit(model, tighter, 3)
-        reference = min(moved.cost, reference)
+        reference = min(moved.cost, contest.reference)
         fitted = [self._gained(c, item, reference - left_over) for c, item in zip(fitted, top, strict=True)]
         clear = sorted((c for c in fitted if c.gained >= found.least_gain), key=odds)
         law = self._unlisted(found, moved, tighter, reference, min(fitted, key=odds))
@@ -295,45 +268,6 @@ class _Search:
         rest = sorted((c for c in fitted if c is not best and (c in clear or odds(c) >= odds(best))), key=odds)
         first = replace(best, model=polished, term=polished.terms[-1])
         return polished, tighter, [first, *rest]
-
-    def _at_once(self, of: Callable[[Score], Of], items: Sequence[Score], noise: Noise) -> list[Of]:
-        """Many looks that do not depend on each other, over threads."""
-        self.fitter.products(noise)  # which all of them need
-        with ThreadPoolExecutor(WORKERS) as pool:
-            return list(pool.map(of, items))
-
-    def _no_worse(self, model: Model, new: Noise, old: Noise) -> Noise:
-        """The new noise unless the old was likelier: its parts are estimated in turn."""
-        costs = [self.fitter.cost(model.residual, model.z, noise) for noise in (new, old)]
-        return new if costs[0] < costs[1] else old
-
-    def _begun(self, model: Model, item: Score, now: Tracks | None) -> tuple[Model, Tracks]:
-        """A candidate in the model where it does nothing yet, and the sensitivities to all values.
-
-        ``now`` are those to what the model has already.
-        """
-        begun = replace(model, terms=(*model.terms, Term(item.candidate, 0.0)), covariance=np.zeros((0, 0)))
-        at = list(item.candidate.columns)
-        own = {name: values[:, at].sum(axis=1, keepdims=True) for name, values in self.effect_columns.items()}
-        return begun, own if now is None else {name: np.hstack([now[name], values]) for name, values in own.items()}
-
-    def _profiled(
-        self, model: Model, item: Score, noise: Noise, now: Tracks | None, reference: float
-    ) -> tuple[Score, Noise]:
-        """The candidate by one linear step with the noise that is left beside it.
-
-        Noise estimated without a cause takes much of a slow one for its own.
-        """
-        begun, own = self._begun(model, item, now)
-        first = self.fitter.foreseen(begun, own, noise)
-        quieter = self._no_worse(first, self.fitter.estimated(first, noise, 40), noise)
-        again = self.fitter.foreseen(begun, own, quieter)
-        quieter = self._no_worse(again, self.fitter.estimated(again, quieter, 30), quieter)
-        cost = self.fitter.cost(again.residual, again.z, quieter)
-        raw = max(reference - cost, item.raw)
-        value = again.terms[-1].value
-        information = 1.0 / max(float(again.covariance[-1, -1]), 1e-30)
-        return rescored(item, value, raw, information), quieter
 
     def _unlisted(
         self, found: Diagnosis, model: Model, noise: Noise, reference: float, listed: Contender
@@ -372,17 +306,6 @@ class _Search:
         """With its gain, shared out over the model's own error; more than the screen saw is the noise's doing."""
         gained = min(reference - contender.cost, _OF_SCREEN * item.raw) / variance_of(item.candidate)
         return replace(contender, gained=gained)
-
-    def _contender(self, model: Model, item: Score, noise: Noise, now: Tracks | None) -> Contender:
-        """A leader fitted from where it does nothing, with the noise that is left beside it."""
-        begun, own = self._begun(model, item, now)
-        fitted = self.fitter.fit(begun, noise, 3, self.settings.relinearise, own)
-        noise = self._no_worse(fitted, self.fitter.estimated(fitted, noise, 60), noise)
-        fitted = self.fitter.fit(fitted, noise, 1, self.settings.relinearise)
-        tau = item.candidate.spread
-        information = 1.0 / max(float(fitted.covariance[-1, -1]), 1e-30) if fitted.covariance.size else item.information
-        evidence = share_of(information, fitted.terms[-1].value, tau) - float(np.log(item.candidate.places))
-        return Contender(fitted.terms[-1], fitted, fitted.cost, evidence, information, noise)
 
     def _backward(self, found: Diagnosis) -> None:
         """Take out each cause in turn; what is not missed stays out."""

@@ -8,9 +8,10 @@ import numpy as np
 from hil.study.candidates import Candidate
 from hil.study.linear import Sums, solve, sums, track_columns
 from hil.study.noise import Frame, Noise, estimate, first_guess, tracks_of, whiten
+from hil.study.rig import Rig, Stack
 from hil.study.table import Floats
 from hil.study.vehicle import Nuisance
-from hil.study.world import Rig, Stack, World
+from hil.study.world import World
 
 Tracks = dict[str, Floats]
 _LARGEST_STEP = 8.0

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.study.noise import Frame, Noise, tracks_of, whiten
+from hil.study.rig import Rig, Stack
 from hil.study.table import Floats
-from hil.study.world import Rig, Stack, World
+from hil.study.world import World
 
 _CHUNK = 48
 _HUBER = 6.0

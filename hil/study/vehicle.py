@@ -294,9 +294,7 @@ def _vehicle(
     return Vehicle(parameters, p, tuple(_nuisances(p, tolerance, forms, PARAMETER)), thermal, remarks)
 
 
-def _nuisances(
-    p: Floats, tolerance: Mapping[str, float], forms: Mapping[str, float], layout: Layout
-) -> list[Nuisance]:
+def _nuisances(p: Floats, tolerance: Mapping[str, float], forms: Mapping[str, float], layout: Layout) -> list[Nuisance]:
     """One a parameter; what acts alike is one (radius and area, pad numbers), axles are moved together or apart."""
     found: list[Nuisance] = []
 

@@ -1,55 +1,21 @@
-"""The car in the study: parameters, effects and sensing, replayed freely over all drives, many cars at once."""
+"""One car of the study: its numbers, effects and latencies; how numbers of the vehicle move it."""
 
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
-from scipy.signal import savgol_filter
 
 from hil.study import acting
 from hil.study.acting import Acting
-from hil.study.prepare import ROW_S, SLOW_MPS, Case, Drive, Segment, averaged
-from hil.study.sensing import inverted, sensed, wheel_speed_before
+from hil.study.prepare import Drive
 from hil.study.table import Floats
 from hil.study.vehicle import Nuisance, Vehicle, factor_of
 from plant.effects.bank import NO_TERMS
-from plant.effects.plugin import NO_PLUGINS
-from plant.effects.states import EXTRA_STATES
 from plant.effects.theta import THETA
-from plant.friction import mu_equilibrium
-from plant.integrate import EXPONENTIAL_4
-from plant.model import column_indices, healthy, initial_state, simulate
-from plant.road import DRY, road_table
-from plant.vectors import INPUT, OUTPUT, STATE, P, X
 
-STEPS = 2
-WORKERS = 2
-DISC_K = 350.0
-_SUFFIX = ("fl", "fr", "rl", "rr")
-_SOURCE = {
-    "wheel": [f"state.wheel_speed_rad_s_{wheel}" for wheel in _SUFFIX],
-    "pressure": [f"state.pressure_pa_{wheel}" for wheel in _SUFFIX],
-    "motor": [f"state.motor_torque_nm_{wheel}" for wheel in _SUFFIX],
-    "ax": ["state.imu_longitudinal_mps2"],
-    "ay": ["state.imu_lateral_mps2"],
-    "yaw": ["state.imu_yaw_rate_rad_s"],
-    "gps": ["state.speed_mps"],
-}
-_SLOW = np.concatenate(
-    [
-        np.arange(STATE.size)[STATE.slice(name)]
-        for name in (
-            "winding_temperature_k", "pad_friction", "pad_temperature_k", "disc_temperature_k", "state_of_charge",
-            *EXTRA_STATES,
-        )
-    ]
-)  # fmt: skip
-"""States that a segment hands on to a later one, beside the motion."""
-Stack = dict[str, Floats]
-"""Channels by group, (samples of all drives, channels)."""
+_OF_THE_ROAD = (("road_grade", "grade"), ("headwind", "wind_mps"))
+LATE = ("imu", "pressure", "motor", "demand")
+"""Nodes whose frames may come later than the wheel speeds'; demands may be acted on later than they are logged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,11 +66,6 @@ class World:
         return replace(self, p=p, disc_offset_k=disc, late_s=tuple(late), tooth_share=tooth)
 
 
-LATE = ("imu", "pressure", "motor", "demand")
-"""Nodes whose frames may come later than the wheel speeds'; demands may be acted on later than they are logged."""
-_NODE = {"ax": 0, "ay": 0, "yaw": 0, "pressure": 1, "motor": 2}
-
-
 def start_nuisances() -> list[Nuisance]:
     """What the logs, not the vehicle, leave open: temperature of the discs, latency of the nodes."""
     found = [Nuisance(f"late_{node}", (k,), (2e-3,), "late") for k, node in enumerate(LATE)]
@@ -122,18 +83,6 @@ def nominal(vehicle: Vehicle) -> World:
     return World(vehicle.p, THETA.neutral())
 
 
-def _radius_m(world: World) -> Floats:
-    """Rolling radius of each wheel, (4,), effects that change it included: no slip at the start that nobody drove."""
-    worn = 1.0 + world.theta[THETA.slice("tyre_radius", "gain")]
-    flat = 1.0 - 0.01 * world.theta[THETA.slice("tyre_pressure_loss", "share")]
-    return np.asarray(float(world.p[P.wheel_rolling_radius_m]) * worn * flat)
-
-
-_INPUTS = (("pressure", "pressure_pa"), ("motor", "motor_torque_nm"))
-_SMOOTH = 21  # rows of 10 ms
-_OF_THE_ROAD = (("road_grade", "grade"), ("headwind", "wind_mps"))
-
-
 def _along(theta: Floats, direction: int) -> Floats:
     """Theta as met when driving along the road (+1) or back (-1)."""
     if direction > 0:
@@ -144,48 +93,7 @@ def _along(theta: Floats, direction: int) -> Floats:
     return turned
 
 
-def _later(values: Floats, rows: float | Floats) -> Floats:
-    """Channels as seen some rows later, straight lines between rows."""
-    last = len(values) - 1
-    at = np.clip(np.arange(len(values))[:, None] - rows, 0.0, last) + np.zeros(values.shape)
-    before = at.astype(np.intp)
-    share = at - before
-    column = np.arange(values.shape[1])
-    return np.asarray((1.0 - share) * values[before, column] + share * values[np.minimum(before + 1, last), column])
-
-
-def _held_later(values: Floats, rows: float) -> Floats:
-    """Held values that change a fraction of a row later (earlier where negative), as the mean over each row."""
-    change = np.diff(values, axis=0)
-    moved = values.copy()
-    if rows >= 0.0:
-        moved[1:] -= min(rows, 1.0) * change
-    else:
-        moved[:-1] += min(-rows, 1.0) * change
-    return moved
-
-
-def _in_time(inputs: Floats, late_s: tuple[float, ...]) -> Floats:
-    """Measured inputs with their nodes' latency taken back, demands when they are acted on."""
-    if not any(late_s[1:]):
-        return inputs
-    moved = inputs.copy()
-    for part in ("pressure_demand_pa", "motor_demand_nm"):
-        where = INPUT.slice(part)
-        moved[:, where] = _held_later(inputs[:, where], late_s[3] / ROW_S)
-    for part, late in (("pressure_pa", late_s[1]), ("motor_torque_nm", late_s[2])):
-        where = INPUT.slice(part)
-        moved[:, where] = _later(inputs[:, where], -late / ROW_S)
-    return moved
-
-
-_USUAL_RADIUS_M = 0.3
-_FADING_MPS, _LEAST_NM = 0.3, 1.0
-_GRADE, _TURNS_MPS2, _CHARACTERISTIC_MPS = 0.01, 0.3, (8.0, 200.0)
-_TOOTH_ROWS = 2.0
-
-
-def _apart(one: World, other: World) -> Acting:
+def apart(one: World, other: World) -> Acting:
     """What must be going on for two worlds to move differently."""
     if one.onsets != other.onsets:
         return Acting.DRIVING
@@ -198,248 +106,3 @@ def _apart(one: World, other: World) -> Acting:
         if late != also:
             found |= of
     return found
-
-
-@dataclass(frozen=True, eq=False)
-class _Kept:
-    """A world's replay of a drive: what was noted, and the states at the start and after each segment."""
-
-    table: Floats
-    states: tuple[Floats, ...]
-
-
-def _powers(speed_mps: Floats, characteristic_mps: float) -> tuple[Floats, Floats]:
-    """Powers of the speed that lateral acceleration and yaw rate go with at a given steering angle.
-
-    Of the linear single-track model, a_y = v^2 delta / (l (1 + v^2 / v_ch^2)) (Mitschke and Wallentowitz 2014,
-    Dynamik der Kraftfahrzeuge, sec. 27).
-    """
-    squared = (speed_mps / characteristic_mps) ** 2
-    return 2.0 / (1.0 + squared), (1.0 - squared) / (1.0 + squared)
-
-
-def _between(drive: Drive, segment: Segment, group: str) -> Floats | None:
-    """Measured channels of a segment."""
-    values = drive.measured.get(group)
-    return None if values is None else values[segment.first // drive.stride : segment.last // drive.stride]
-
-
-class Rig:
-    """Replays worlds over the drives of a case.
-
-    Limits of motors and turning are those at the measured wheel speed: a motor at its limits and a car in a bend answer
-    every error of the speed, whatever made it.
-    """
-
-    def __init__(self, case: Case, vehicle: Vehicle, characteristic_mps: float = np.inf) -> None:
-        self.case, self.vehicle, self._characteristic_mps = case, vehicle, characteristic_mps
-        self._groups = case.groups
-        names = [name for group in case.groups for name in _SOURCE[group]]
-        self._columns = column_indices(names)
-        self._road = road_table(DRY)
-        self._going_on = [
-            [acting.in_segment(drive.inputs[s.first : s.last], _between(drive, s, "ay")) for s in drive.segments]
-            for drive in case.drives
-        ]
-        self._kept: tuple[World, list[_Kept]] | None = None
-        self.runs = 0
-
-    def quieted(self, world: World) -> "Rig":
-        """A rig whose measured pressures and motor torques are rid of noise.
-
-        What drives the car is the simulated value plus the smoothed difference of the measured one: steps stay sharp.
-        """
-        wanted = [(group, part) for group, part in _INPUTS if group in self._groups]
-        drives = []
-        for drive in self.case.drives:
-            raw = self._raw(drive, world)
-            inputs = drive.inputs.copy()
-            for group, part in wanted:
-                where = INPUT.slice(part)
-                apart = drive.inputs[:, where] - raw[group]
-                window = min(_SMOOTH, (len(apart) - 1) // 2 * 2 + 1)
-                inputs[:, where] = raw[group] + savgol_filter(apart, window, 2, axis=0)
-            drives.append(replace(drive, inputs=inputs, measured=self._without_fading(drive, world)))
-        case = replace(self.case, drives=tuple(drives))
-        return Rig(case, self.vehicle, self._characteristic(world))
-
-    @staticmethod
-    def _without_fading(drive: Drive, world: World) -> Stack:
-        """Measured channels without motors whose braking fades: there it answers errors of speed no sensor resolves."""
-        if not {"motor", "wheel"} <= set(drive.measured):
-            return drive.measured
-        speed = np.nan_to_num(drive.measured["wheel"]) * float(world.p[P.wheel_rolling_radius_m])
-        asked = averaged(drive.inputs[:, INPUT.slice("motor_demand_nm")], drive.stride)
-        fades = (speed < float(world.p[P.motor_fade_start_mps]) + _FADING_MPS) & (asked < -_LEAST_NM)
-        return {**drive.measured, "motor": np.where(fades, np.nan, drive.measured["motor"])}
-
-    def _characteristic(self, world: World) -> float:
-        """Characteristic speed of the simulated car, m/s: how its turning answers a small difference of the speed."""
-        if not {"wheel", "ay"} <= set(self._groups):
-            return np.inf
-        tail = world.theta.copy()
-        tail[THETA.slice("road_grade", "grade")] += _GRADE
-        a, b = (self._stacked(one) for one in (world, replace(world, theta=tail)))
-        v = a["wheel"].mean(axis=1) * float(world.p[P.wheel_rolling_radius_m])
-        turning = (np.abs(a["ay"][:, 0]) > _TURNS_MPS2) & (v > SLOW_MPS)
-        ay, v, faster = a["ay"][turning, 0], v[turning], (b["wheel"] - a["wheel"]).mean(axis=1)[turning]
-        if not len(ay):
-            return np.inf
-        share = faster / a["wheel"].mean(axis=1)[turning]
-
-        def off(log_speed: float) -> float:
-            return float(np.sum(((b["ay"] - a["ay"])[turning, 0] - ay * share * _powers(v, np.exp(log_speed))[0]) ** 2))
-
-        return float(np.exp(minimize_scalar(off, bounds=np.log(_CHARACTERISTIC_MPS), method="bounded").x))
-
-    def _stacked(self, world: World) -> Stack:
-        parts = [self._raw(drive, world) for drive in self.case.drives]
-        return {group: np.concatenate([part[group] for part in parts]) for group in self._groups}
-
-    def run(self, world: World) -> Stack:
-        """Simulated channels of all drives."""
-        self.runs += 1
-        parts = [self._drive(drive, world) for drive in self.case.drives]
-        return {group: np.concatenate([part[group] for part in parts]) for group in self._groups}
-
-    def keep(self, world: World) -> None:
-        """Keep the motion of this world: others are simulated only where they can differ from it."""
-        self._kept = None
-        self._kept = world, [_Kept(*self._replayed(drive, world, self._columns)) for drive in self.case.drives]
-
-    def run_all(self, worlds: Sequence[World]) -> Iterator[Stack]:
-        """Of many worlds, in order, over threads."""
-        with ThreadPoolExecutor(WORKERS) as pool:
-            yield from pool.map(self.run, worlds)
-
-    def residual(self, world: World) -> Stack:
-        """Measured less simulated, (samples, channels, 1); NaN where nothing is measured."""
-        simulated = self.run(world)
-        return {group: (measured - simulated[group])[:, :, None] for group, measured in self.measured().items()}
-
-    def measured(self) -> Stack:
-        """Measured channels of all drives."""
-        return {g: np.concatenate([drive.measured[g] for drive in self.case.drives]) for g in self._groups}
-
-    def _start(self, drive: Drive, world: World) -> Floats:
-        log, first = drive.log, drive.segments[0]
-        soc = log.channels.get("soc")
-        charge = 0.7 if soc is None else float(np.nanmean(soc[:20]))
-        disc = (log.disc_temperature_k or DISC_K) + world.disc_offset_k
-        pad_k = disc if self.vehicle.pad_temperature_matters else float(world.p[P.friction_brake_ambient_k])
-        pad = (float(world.p[at]) for at in (P.pad_a_1_ks, P.pad_b_1_j, P.pad_epsilon_w))
-        x = initial_state(self.vehicle.parameters, 0.0, disc, charge, mu_equilibrium(0.0, pad_k, *pad))
-        x[STATE.slice("pad_temperature_k")] = pad_k
-        speed = self._speed(drive, first, world)
-        x[X.speed_mps] = speed
-        x[STATE.slice("wheel_speed_rad_s")] = speed / _radius_m(world)
-        x[STATE.slice("pressure_pa")] = np.clip(drive.inputs[0, INPUT.slice("pressure_pa")], 0.0, None)
-        x[STATE.slice("motor_torque_nm")] = drive.inputs[0, INPUT.slice("motor_torque_nm")]
-        return x
-
-    def _speed(self, drive: Drive, segment: Segment, world: World) -> float:
-        """Speed a segment starts with: what the sensors told, less what the world's sensors add."""
-        if segment.start_speed_mps is not None:
-            return max(segment.start_speed_mps, 0.0)
-        told = wheel_speed_before(segment.start_wheel_rad_s, world.theta_in(drive))
-        return max(told, 0.0) * float(np.median(_radius_m(world)))
-
-    def _drive(self, drive: Drive, world: World) -> Stack:
-        stack = sensed(self._raw(drive, world), world.theta_in(drive), ROW_S)
-        for group, values in stack.items():
-            late = world.late_s[_NODE[group]] if group in _NODE else 0.0
-            if late:
-                stack[group] = _later(values, late / ROW_S)
-            elif group == "wheel" and world.tooth_share:
-                stack[group] = _later(values, self._tooth_rows(values) * world.tooth_share)
-        found = {group: averaged(values, drive.stride) for group, values in stack.items()}
-        if "wheel" in found:
-            self._at_measured_speed(found, drive)
-        return found
-
-    def _tooth_rows(self, omega_rad_s: Floats) -> Floats:
-        """Half the time between two teeth, rows; two rows at most."""
-        pitch = 2.0 * np.pi / self.vehicle.parameters.sensor.teeth
-        return np.minimum(0.5 * pitch / np.fmax(np.abs(omega_rad_s), 0.1) / ROW_S, _TOOTH_ROWS)
-
-    def _at_measured_speed(self, found: Stack, drive: Drive) -> None:
-        """The turning of the car as it is at the measured speed."""
-        faster = np.nan_to_num(drive.measured["wheel"] - found["wheel"]).mean(axis=1)
-        turning = np.maximum(found["wheel"].mean(axis=1), SLOW_MPS / _USUAL_RADIUS_M)
-        share = np.clip(faster / turning, -0.2, 0.2)
-        powers = _powers(turning * self.vehicle.parameters.wheel.rolling_radius_m, self._characteristic_mps)
-        for group, power in zip(("ay", "yaw"), powers, strict=True):
-            if group in found:
-                found[group] *= (1.0 + power * share)[:, None]
-
-    def states(self, world: World, names: Sequence[str]) -> Floats:
-        """States and outputs by name (`plant.model.column_indices`) over all drives, (rows, names)."""
-        columns = column_indices(list(names))
-        return np.concatenate([self._replayed(drive, world, columns)[0] for drive in self.case.drives])
-
-    def _raw(self, drive: Drive, world: World) -> Stack:
-        table = self._noted(drive, world)
-        stack: Stack = {}
-        at = 0
-        for group in self._groups:
-            width = len(_SOURCE[group])
-            stack[group] = table[:, at : at + width]
-            at += width
-        return stack
-
-    def _noted(self, drive: Drive, world: World) -> Floats:
-        """Raw channels of one drive; from what was kept where the worlds cannot differ."""
-        if self._kept is None:
-            return self._replayed(drive, world, self._columns)[0]
-        apart, kept = _apart(world, self._kept[0]), self._kept[1][drive.number]
-        differs = [bool(apart & going_on) for going_on in self._going_on[drive.number]]
-        return self._replayed(drive, world, self._columns, kept, differs)[0] if any(differs) else kept.table
-
-    def _replayed(
-        self, drive: Drive, world: World, columns: NDArray[np.int64], kept: _Kept | None = None,
-        differs: Sequence[bool] = (),
-    ) -> tuple[Floats, tuple[Floats, ...]]:  # fmt: skip
-        """One drive: what ``columns`` ask for at every row, and the states at the start and after each segment.
-
-        Segments that do not differ are taken from ``kept``; what moves slowly goes on from where it was.
-        """
-        x = self._start(drive, world)
-        theta = world.theta_in(drive)
-        inputs = inverted(drive.inputs, theta, ROW_S)
-        inputs = _in_time(inputs, world.late_s)
-        table = np.empty((len(inputs), len(columns)))
-        cut, switch, y = self.case.cut, healthy(), OUTPUT.zeros()
-        states = [x.copy()]
-        for number, segment in enumerate(drive.segments):
-            rows = slice(segment.first, segment.last)
-            if kept is not None and not differs[number]:
-                table[rows] = kept.table[rows]
-                ahead = x[_SLOW] - kept.states[number][_SLOW]
-                x = kept.states[number + 1].copy()
-                x[_SLOW] += ahead
-                continue
-            if number:
-                self._restart(x, self._speed(drive, segment, world))
-            simulate(
-                x, inputs[rows], cut, switch, world.p, self._road, ROW_S / STEPS, STEPS, EXPONENTIAL_4, columns,
-                table[rows], y, theta, world.terms, NO_PLUGINS,
-            )  # fmt: skip
-            states.append(x.copy())
-        return table, tuple(states)
-
-    @staticmethod
-    def _restart(x: Floats, speed_mps: float) -> None:
-        """The measured speed with the slips as they are; temperatures, friction, energy and pitch go on."""
-        now = x[X.speed_mps]
-        wheels = STATE.slice("wheel_speed_rad_s")
-        if not np.isfinite(x).all():
-            x[~np.isfinite(x)] = 0.0
-        ratio = speed_mps / now if now > 0.5 else 1.0
-        x[wheels] *= ratio
-        if now <= 0.5:
-            x[wheels] += (speed_mps - now) / 0.3
-        if speed_mps < 0.1:
-            x[wheels] = 0.0
-        x[X.speed_mps] = speed_mps
-        for name in ("lateral_speed_mps", "yaw_rate_rad_s"):
-            x[STATE.slice(name)] *= ratio if now > 0.5 else 0.0

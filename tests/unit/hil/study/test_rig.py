@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from hil.study.prepare import prepare
+from hil.study.rig import Rig
 from hil.study.table import Log, make_log
 from hil.study.vehicle import paper_car
-from hil.study.world import Rig, World, nominal
+from hil.study.world import World, nominal
 from plant.effects.theta import THETA
 from plant.vectors import P
 

@@ -1,0 +1,97 @@
+"""Candidates for one more cause of a model, each fitted with the noise that is left beside it."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from hil.study.fit import Fitter, Model, Term, Tracks
+from hil.study.noise import Noise
+from hil.study.rig import WORKERS
+from hil.study.screen import Score, rescored, share_of
+
+Of = TypeVar("Of")
+
+
+@dataclass(frozen=True, eq=False)
+class Contender:
+    """A model that explains the data with one cause in a certain place: its term, cost and log of the odds.
+
+    ``noise`` is what is left beside it; ``gained`` is what it takes off chi-squared, shared out over the model's own
+    error.
+    """
+
+    term: Term
+    model: Model
+    cost: float
+    evidence: float
+    information: float
+    noise: Noise
+    gained: float = 0.0
+
+
+def odds(contender: Contender) -> float:
+    """Twice the negative log of the odds, the smaller the better."""
+    return contender.cost - 2.0 * contender.evidence
+
+
+class Contest:
+    """One place for a cause in a model.
+
+    ``columns`` are sensitivities to all candidates; ``noise`` and ``reference`` are those of the model without any.
+    """
+
+    def __init__(self, fitter: Fitter, columns: Tracks, model: Model, noise: Noise, relinearise: bool) -> None:
+        self._fitter, self._columns, self._model, self._relinearise = fitter, columns, model, relinearise
+        self._now = fitter.term_columns(model) if model.terms else None
+        self.noise = self._no_worse(model, fitter.estimated(model, noise, 80), noise)
+        self.reference = fitter.cost(model.residual, model.z, self.noise)
+        fitter.products(self.noise)  # which all looks need
+
+    @staticmethod
+    def at_once(of: Callable[[Score], Of], items: Sequence[Score]) -> list[Of]:
+        """Looks that do not depend on each other, over threads."""
+        with ThreadPoolExecutor(WORKERS) as pool:
+            return list(pool.map(of, items))
+
+    def _no_worse(self, model: Model, new: Noise, old: Noise) -> Noise:
+        """The new noise unless the old was likelier: its parts are estimated in turn."""
+        costs = [self._fitter.cost(model.residual, model.z, noise) for noise in (new, old)]
+        return new if costs[0] < costs[1] else old
+
+    def _begun(self, item: Score) -> tuple[Model, Tracks]:
+        """A candidate in the model where it does nothing yet, and the sensitivities to all values."""
+        terms, now = (*self._model.terms, Term(item.candidate, 0.0)), self._now
+        begun = replace(self._model, terms=terms, covariance=np.zeros((0, 0)))
+        at = list(item.candidate.columns)
+        own = {name: values[:, at].sum(axis=1, keepdims=True) for name, values in self._columns.items()}
+        return begun, own if now is None else {name: np.hstack([now[name], values]) for name, values in own.items()}
+
+    def profiled(self, item: Score) -> tuple[Score, Noise]:
+        """The candidate by one linear step with the noise that is left beside it.
+
+        Noise estimated without a cause takes much of a slow one for its own.
+        """
+        begun, own = self._begun(item)
+        first = self._fitter.foreseen(begun, own, self.noise)
+        quieter = self._no_worse(first, self._fitter.estimated(first, self.noise, 40), self.noise)
+        again = self._fitter.foreseen(begun, own, quieter)
+        quieter = self._no_worse(again, self._fitter.estimated(again, quieter, 30), quieter)
+        cost = self._fitter.cost(again.residual, again.z, quieter)
+        raw = max(self.reference - cost, item.raw)
+        value = again.terms[-1].value
+        information = 1.0 / max(float(again.covariance[-1, -1]), 1e-30)
+        return rescored(item, value, raw, information), quieter
+
+    def contender(self, item: Score, noise: Noise) -> Contender:
+        """A leader fitted from where it does nothing, with the noise that is left beside it."""
+        begun, own = self._begun(item)
+        fitted = self._fitter.fit(begun, noise, 3, self._relinearise, own)
+        noise = self._no_worse(fitted, self._fitter.estimated(fitted, noise, 60), noise)
+        fitted = self._fitter.fit(fitted, noise, 1, self._relinearise)
+        tau = item.candidate.spread
+        information = 1.0 / max(float(fitted.covariance[-1, -1]), 1e-30) if fitted.covariance.size else item.information
+        evidence = share_of(information, fitted.terms[-1].value, tau) - float(np.log(item.candidate.places))
+        return Contender(fitted.terms[-1], fitted, fitted.cost, evidence, information, noise)
