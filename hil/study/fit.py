@@ -19,7 +19,7 @@ _DAMPING = (0.0, 0.1, 1.0, 10.0)
 _DIVERGED = 1e15
 _WORTH = 1.0
 """A step that takes less off the cost is the last."""
-_FOLLOWED = 0.05
+_FOLLOWED = 0.5
 """A step of less, in standard deviations, says too little of how sensitivities change."""
 
 

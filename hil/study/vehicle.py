@@ -33,6 +33,7 @@ _SUSPENSION = {
     "suspension_brake_support_tangent": 0.6, "suspension_anti_roll_nm_rad": 0.7, "suspension_roll_centre_height_m": 3.0,
     "vehicle_pitch_inertia_kg_m2": 0.6, "vehicle_roll_inertia_kg_m2": 0.2,
 }  # fmt: skip
+_LIFT = 0.1
 _THERMAL = {"friction_brake_heat_capacity_j_k": 0.2, "friction_brake_cooling_w_k": 0.3}
 """Heat store of the discs; where the friction does not depend on temperature it does not matter."""
 _SIGNED = ("suspension_progression_n_m3", "suspension_brake_support_tangent", "suspension_roll_centre_height_m")
@@ -348,6 +349,14 @@ def _nuisances(p: Floats, tolerance: Mapping[str, float], forms: Mapping[str, fl
     add("wheel_brake_windup_time_s", [layout.slice("wheel_brake_windup_time_s").start], [0.006])
     add("tyre_lsgal", [layout.slice("tyre_lsgal").start], [0.5])
     add("tyre_lmuy", [layout.slice("tyre_lmuy").start], [0.15])
+    lift = layout.slice("vehicle_lift_coefficient")
+    for k, axle in enumerate(("front", "rear")):
+        add(
+            f"vehicle_lift_coefficient_{axle}",
+            [lift.start + k],
+            [max(tolerance.get("vehicle_lift_coefficient", 0.0), _LIFT)],
+        )
+        found[-1] = replace(found[-1], kind="signed")
     # the same for suspension and discs: a vehicle set states dive and roll at best, never the curves behind them
     for name, share in forms.items():
         at, size = layout.slice(name).start, layout.sizes[name]
