@@ -42,7 +42,7 @@ _CLEARER = 5.0
 _HOPELESS = 0.1
 """Share of the gain asked below which no candidate is looked at with noise of its own."""
 _KINKED = ("late_demand", "ehb_dead_time_s")
-_TURNS, _MOST_ANEW, _SETTLED, _STALE = 12, 1, 3.0, 0.3
+_TURNS, _MOST_ANEW, _SETTLED, _STALE = 12, 3, 3.0, 0.3
 _COARSE, _FINE = 0.5, 3.0
 """Finite differences of the vehicle's numbers: in standard deviations of what is known before, and of what data say."""
 
@@ -157,7 +157,7 @@ class _Search:
             noise = self.fitter.estimated(model, noise, 60)
             model = self.fitter.fit(model, noise, 4)
             settled, cost = cost - model.cost < _SETTLED, model.cost
-            stale = bool(np.abs(model.z - around).max() > _STALE)
+            stale = bool(np.abs(model.z - around).max() > _STALE * (1 + 2 * anew))
             if not settled:
                 continue
             if self.settings.relinearise and stale and anew < _MOST_ANEW:

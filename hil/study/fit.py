@@ -129,7 +129,7 @@ class Fitter:
                 break
             gained = best.cost - moved.cost
             if not best.terms:
-                self._follow(best, moved)
+                self._follow(best, moved, noise)
             best = moved
             if gained < _WORTH:
                 break
@@ -155,13 +155,17 @@ class Fitter:
                 return replace(moved, covariance=covariance)
         return replace(model, covariance=covariance) if model.terms and not model.covariance.size else None
 
-    def _follow(self, before: Model, after: Model) -> None:
-        """Sensitivities that foretell the step just made (Broyden 1965, Math. Comp. 19, eq. 4.5)."""
+    def _follow(self, before: Model, after: Model, noise: Noise) -> None:
+        """Sensitivities that foretell the step just made (Broyden 1965, Math. Comp. 19, eq. 4.5).
+
+        Numbers are scaled by what the data say of them: one that does not act is given no signature.
+        """
         change = after.z - before.z
-        squared = float(change @ change)
-        if squared < _FOLLOWED**2:
+        scaled = np.diag(self.products(noise)) * change
+        squared = float(scaled @ change)
+        if float(change @ change) < _FOLLOWED**2 or squared <= 0.0:
             return
-        share = (change / squared).astype(np.float32)
+        share = (scaled / squared).astype(np.float32)
         for name, columns in self.nuisance_columns.items():
             moved = (before.residual[name][:, 0] - after.residual[name][:, 0]).astype(np.float32)
             columns += np.outer(moved - columns @ change.astype(np.float32), share)
