@@ -42,7 +42,7 @@ _CLEARER = 5.0
 _HOPELESS = 0.1
 """Share of the gain asked below which no candidate is looked at with noise of its own."""
 _KINKED = ("late_demand", "ehb_dead_time_s")
-_TURNS, _MOST_ANEW, _SETTLED, _STALE = 12, 3, 3.0, 0.3
+_TURNS, _MOST_ANEW, _SETTLED, _STALE, _FAR = 12, 3, 3.0, 0.3, 1.0
 _COARSE, _FINE = 0.5, 3.0
 """Finite differences of the vehicle's numbers: in standard deviations of what is known before, and of what data say."""
 
@@ -112,6 +112,7 @@ class _Search:
         self.columns: list[Column] = columns(vehicle.untold)
         self.candidates: list[Candidate] = candidates(self.columns)
         self.fitter: Fitter
+        self.accepted: tuple[Term, ...] = ()
         self.effect_columns: Tracks = {}
         self.race: LawRace | None = None
         self.steps: Floats = np.full(len(self.nuisances), _COARSE)
@@ -132,6 +133,7 @@ class _Search:
         found.untestable = sorted({*not_testable(found.screened), *self.rig.vehicle.untold})
         found.looks = _independent(found.screened)
         found.least_gain = threshold(found.looks, self.settings.alpha) * inflation(found.screened)
+        around = model.z
         while causes_in(model) < self.settings.most_causes:
             if model.terms:
                 sums = self.fitter.screen(model, self.effect_columns, noise)
@@ -142,7 +144,8 @@ class _Search:
             found.contenders += [list_of] * (len(model.terms) - before)
             self.say(f"accepted {model.terms[-1].candidate.name} = {model.terms[-1].value:.4g}; when it begins")
             model = with_onsets(self.fitter, model, noise)
-        found.final, found.noise = model, noise
+            model, noise, around = self._bent_back(model, noise, around)
+        found.final, found.noise, found.fitter = model, noise, self.fitter
         if causes_in(model) > 1:
             self._backward(found)
         return found
@@ -169,6 +172,22 @@ class _Search:
                 break
         return model, noise
 
+    def _bent_back(self, model: Model, noise: Noise, around: Floats) -> tuple[Model, Noise, Floats]:
+        """The model with sensitivities taken anew where a cause let the vehicle's numbers go back far.
+
+        Numbers that had stood in for the cause bend what all others seem to explain.
+        """
+        if not self.settings.relinearise or float(np.abs(model.z - around).max()) < _FAR:
+            return model, noise, around
+        self.say("sensitivities anew beside it")
+        self.accepted = model.terms
+        self._nuisance_columns(model.z)
+        model, noise = self.fitter.settle(model, noise, 2, 60)
+        self.accepted = model.terms
+        self.effect_columns = self._effect_columns(model)
+        self.race = None
+        return model, noise, model.z
+
     def _nuisance_columns(self, z: Floats) -> None:
         now = self._shifted(z)
         self.rig.keep(now)
@@ -180,7 +199,11 @@ class _Search:
         self.fitter = Fitter(self.rig, self.frame, self.base_world, self.nuisances, tracks, sides)
 
     def _shifted(self, z: Floats) -> World:
-        return self.base_world.shifted(self.nuisances, z)
+        """The car with what is accepted, and its numbers ``z`` off."""
+        world = self.base_world.shifted(self.nuisances, z)
+        for term in self.accepted:
+            world = with_term(world, term)
+        return world
 
     def _side(self, k: int, z: Floats) -> float:
         """Which side of 0 counts for what has a kink there (held demands by steps); 0 for all others."""

@@ -49,6 +49,14 @@ class Model:
         return [term.value for term in self.terms]
 
 
+def with_term(world: World, term: Term) -> World:
+    """The world with an effect at its value, from where it begins."""
+    world = term.candidate.applied(world, term.value)
+    if term.onset is None:
+        return world
+    return replace(world, onsets=(*world.onsets, (term.candidate.effect.name, *term.onset)))
+
+
 class Fitter:
     """Fits models of one case.
 
@@ -73,9 +81,7 @@ class Fitter:
         """The world of a model."""
         world = self.base.shifted(self.nuisances, z)
         for term in terms:
-            world = term.candidate.applied(world, term.value)
-            if term.onset is not None:
-                world = replace(world, onsets=(*world.onsets, (term.candidate.effect.name, *term.onset)))
+            world = with_term(world, term)
         return world
 
     def at(self, z: Floats, terms: Sequence[Term], noise: Noise) -> Model:

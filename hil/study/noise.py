@@ -251,8 +251,12 @@ def _estimate_side(name: str, values: Floats, frame: Frame, noise: Noise, budget
             np.sum(np.clip(np.abs(z) - 16.0, 0.0, None) ** 2)
         )
 
-    z0 = np.log([at.a, max(at.b, 0.3 * at.a), at.c, at.tau_s])
-    best = minimize(cost, z0, method="Nelder-Mead", options={"maxfev": budget, "xatol": 0.02, "fatol": 0.05})
+    a = max(_differences(values[:, 0], frame.present[name]), floor)
+    quiet = Track(a, 0.0, 3.0 * a, 0.5)
+    starts = [np.log([one.a, max(one.b, 0.3 * one.a), one.c, one.tau_s]) for one in (at, quiet)]
+    best = minimize(
+        cost, min(starts, key=cost), method="Nelder-Mead", options={"maxfev": budget, "xatol": 0.02, "fatol": 0.05}
+    )
     return built(best.x)
 
 
@@ -277,6 +281,9 @@ def _estimate_long(tracks: Mapping[str, Floats], frame: Frame, noise: Noise, bud
         return -_long(tracks, frame, built(z), 1)[0] + 0.5 * float(np.sum(((z[:8] - np.log(_USUAL)) / _SPREAD) ** 2))
 
     sizes, taus = zip(*noise.disturbances, strict=True)
-    z0 = np.log([*sizes, *taus, *(noise.tracks[name].a for name in there)])
-    best = minimize(cost, z0, method="L-BFGS-B", options={"maxfun": budget, "eps": 1e-3, "ftol": 1e-8})
+    white = np.log([noise.tracks[name].a for name in there])
+    starts = [np.concatenate((np.log([*sizes, *taus]), white)), np.concatenate((np.log(_USUAL), white))]
+    best = minimize(
+        cost, min(starts, key=cost), method="L-BFGS-B", options={"maxfun": budget, "eps": 1e-3, "ftol": 1e-8}
+    )
     return built(best.x)
