@@ -8,7 +8,7 @@ import numpy as np
 from hil.study.basis import LAWS, PIECES, Piece
 from hil.study.candidates import Candidate, Column, candidates, columns
 from hil.study.contest import Contender, Contest, odds
-from hil.study.fit import Fitter, Model, Tracks
+from hil.study.fit import Fitter, Model, Term, Tracks, with_term
 from hil.study.linear import Sums, project, track_columns
 from hil.study.noise import Frame, Noise
 from hil.study.onset import with_onsets
