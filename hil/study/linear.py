@@ -79,13 +79,11 @@ def _limited(innovations: Floats) -> Floats:
 class Projected:
     """Residual and columns after the nuisances (and what is accepted) have taken their part.
 
-    ``b`` (columns,) products with the residual, ``q`` (columns, columns) among themselves, ``alone`` the same before
-    anything took its part, ``chi2`` of the residual.
+    ``b`` (columns,) products with the residual, ``q`` (columns, columns) among themselves, ``chi2`` of the residual.
     """
 
     b: Floats
     q: Floats
-    alone: Floats
     chi2: float
 
 
@@ -109,8 +107,7 @@ def project(
     left = total - right.T @ solved
     keep = 1 + nuisances
     prior = float(z @ z) if z is not None else 0.0
-    b, q, alone = (np.asarray(part) for part in (left[0, keep:], left[keep:, keep:], total[keep:, keep:]))
-    return Projected(b, q, alone, float(left[0, 0]) + prior)
+    return Projected(np.asarray(left[0, keep:]), np.asarray(left[keep:, keep:]), float(left[0, 0]) + prior)
 
 
 def solve(

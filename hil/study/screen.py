@@ -11,8 +11,6 @@ from hil.study.linear import Projected
 from hil.study.own_error import variance_of
 
 SEEN = 3.0
-LEAST_OWN = 0.02
-"""Share of its signature that must be left beside the vehicle's numbers; finite differences make as much."""
 _MEDIAN_CHI2 = 0.455
 _MOST_INFLATION = 6.0
 
@@ -39,9 +37,7 @@ def scores(candidates: Sequence[Candidate], projected: Projected, offset: int, n
     for candidate, value in zip(candidates, now, strict=True):
         at = [offset + k for k in candidate.columns]
         b, q = float(projected.b[at].sum()), float(projected.q[np.ix_(at, at)].sum())
-        alone = float(projected.alone[np.ix_(at, at)].sum())
-        item = score(candidate, b, q, value)
-        found.append(item if q > LEAST_OWN * alone else replace(item, value=value, gain=0.0, evidence=0.0, raw=0.0))
+        found.append(score(candidate, b, q, value))
     return found
 
 
