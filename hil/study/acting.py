@@ -9,6 +9,7 @@ from enum import IntFlag
 import numpy as np
 from numpy.typing import NDArray
 
+from hil.study.prepare import STRAIGHT_RAD
 from hil.study.sensing import WATCHING
 from hil.study.table import Floats
 from plant.effects.effect import NODES
@@ -28,7 +29,8 @@ class Acting(IntFlag):
     DRIVING = 8
 
 
-_RELEASED_PA, _RELEASED_NM, _STRAIGHT_RAD, _STRAIGHT_MPS2 = 5e4, 8.0, 0.02, 0.3
+_LEAST_PA, _LEAST_NM, _LEAST_MPS2 = 5e4, 8.0, 0.3
+"""Below in all of a segment, brakes and motors change nothing that noise would not hide, and the car runs straight."""
 _SECTIONS = {
     "ehb_": Acting.BRAKES, "friction_brake_": Acting.BRAKES, "pad_": Acting.BRAKES, "motor_": Acting.MOTORS,
     "battery_": Acting.MOTORS,
@@ -119,11 +121,11 @@ def in_segment(inputs: Floats, ay_mps2: Floats | None) -> Acting:
         return max(float(np.abs(inputs[:, INPUT.slice(part)]).max(initial=0.0)) for part in parts)
 
     found = Acting.DRIVING
-    if most("pressure_pa", "pressure_demand_pa") > _RELEASED_PA:
+    if most("pressure_pa", "pressure_demand_pa") > _LEAST_PA:
         found |= Acting.BRAKES
-    if most("motor_torque_nm", "motor_demand_nm") > _RELEASED_NM:
+    if most("motor_torque_nm", "motor_demand_nm") > _LEAST_NM:
         found |= Acting.MOTORS
-    turned = ay_mps2 is not None and float(np.nanquantile(np.abs(ay_mps2), 0.9)) > _STRAIGHT_MPS2
-    if turned or most("steering_wheel_rad") > _STRAIGHT_RAD:
+    turned = ay_mps2 is not None and float(np.nanquantile(np.abs(ay_mps2), 0.9)) > _LEAST_MPS2
+    if turned or most("steering_wheel_rad") > STRAIGHT_RAD:
         found |= Acting.TURNING
     return found

@@ -91,7 +91,6 @@ class Contest:
         fitted = self._fitter.fit(begun, noise, 3, self._relinearise, own)
         noise = self._no_worse(fitted, self._fitter.estimated(fitted, noise, 60), noise)
         fitted = self._fitter.fit(fitted, noise, 1, self._relinearise)
-        tau = item.candidate.spread
         information = 1.0 / max(float(fitted.covariance[-1, -1]), 1e-30) if fitted.covariance.size else item.information
-        evidence = share_of(information, fitted.terms[-1].value, tau) - float(np.log(item.candidate.places))
+        evidence = share_of(item.candidate, information, fitted.terms[-1].value)
         return Contender(fitted.terms[-1], fitted, fitted.cost, evidence, information, noise)

@@ -16,15 +16,7 @@ from hil.study.own_error import variance_of, variance_of_law
 from hil.study.prepare import Case
 from hil.study.race import LawRace, least_gain, share_left
 from hil.study.rig import Rig
-from hil.study.screen import (
-    Score,
-    inflation,
-    leaders,
-    not_testable,
-    score,
-    scores,
-    threshold,
-)
+from hil.study.screen import Score, inflation, leaders, not_testable, scores, threshold
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
 from hil.study.world import World, start_nuisances
@@ -349,6 +341,3 @@ def _independent(found: Sequence[Score]) -> int:
     """How many looks: candidates that can show at all, places of one effect counted as one and a half."""
     names = {(s.candidate.effect.name, s.candidate.parameter.name) for s in found if s.reach > 1.0}
     return max(1, round(1.5 * len(names)))
-
-
-__all__ = ["ALPHA", "TIED", "Contender", "Diagnosis", "Settings", "diagnose", "odds", "score"]

@@ -149,17 +149,20 @@ class Fitter:
             change, covariance = solve(total, count, free, model.z, damping, held)
             if self._foretold(total, change, model.z, held) < _WORTH:
                 break
-            dz = np.clip(change[:count], -_LARGEST_STEP, _LARGEST_STEP)
-            z = np.clip(model.z + dz, -self.farthest, self.farthest)
-            z = np.where(self.sides * z < 0.0, 0.0, z)
-            terms = tuple(
-                replace(term, value=_bounded(term.candidate, term.value + float(step)))
-                for term, step in zip(model.terms, change[count:], strict=True)
-            )
-            moved = self.at(z, terms, noise)
+            moved = self.at(*self._bounded_step(model, change), noise)
             if moved.cost < model.cost:
                 return replace(moved, covariance=covariance)
         return replace(model, covariance=covariance) if model.terms and not model.covariance.size else None
+
+    def _bounded_step(self, model: Model, change: Floats) -> tuple[Floats, tuple[Term, ...]]:
+        """Nuisances and effects after a step, no farther than each may go."""
+        count = len(self.nuisances)
+        z = np.clip(model.z + np.clip(change[:count], -_LARGEST_STEP, _LARGEST_STEP), -self.farthest, self.farthest)
+        terms = tuple(
+            replace(term, value=_bounded(term.candidate, term.value + float(step)))
+            for term, step in zip(model.terms, change[count:], strict=True)
+        )
+        return np.where(self.sides * z < 0.0, 0.0, z), terms
 
     def _follow(self, before: Model, after: Model, noise: Noise) -> None:
         """Sensitivities that foretell the step just made (Broyden 1965, Math. Comp. 19, eq. 4.5).
@@ -236,12 +239,7 @@ class Fitter:
         """The model after one linear step, with the residual that sensitivities foretell; ``own`` to its values."""
         count, total = len(self.nuisances), self._total(model, own, noise)
         change, covariance = solve(total, count, range(len(model.terms)), model.z, 0.0, self._held(total, model))
-        z = np.clip(model.z + np.clip(change[:count], -_LARGEST_STEP, _LARGEST_STEP), -self.farthest, self.farthest)
-        z = np.where(self.sides * z < 0.0, 0.0, z)
-        terms = tuple(
-            replace(term, value=_bounded(term.candidate, term.value + float(step)))
-            for term, step in zip(model.terms, change[count:], strict=True)
-        )
+        z, terms = self._bounded_step(model, change)
         moved = np.array([new.value - old.value for new, old in zip(terms, model.terms, strict=True)])
         residual = {
             name: values - (self.nuisance_columns[name] @ (z - model.z) + own[name] @ moved)[:, None]

@@ -22,7 +22,7 @@ ROW_S = 0.01
 SLOW_MPS = 2.0  # below, wheel sensors and the contact's low-speed terms say little
 SETTLE_S = 1.0
 SHORTEST_S, LONGEST_S, TURNING_S = 8.0, 25.0, 3.0
-_STRAIGHT_RAD = 0.02
+STRAIGHT_RAD = 0.02  # of the steering wheel
 _RELEASED_PA, _RELEASED_NM = 1e5, 20.0
 _CONTRADICTED = 0.8
 _TRACK = {
@@ -253,7 +253,7 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float) -> Dri
         np.abs(inputs[:, INPUT.slice("motor_demand_nm")]).max(axis=1),
     )
     quiet = (brakes < _RELEASED_PA) & (motors < _RELEASED_NM)
-    bent = np.abs(inputs[:, U.steering_wheel_rad]) > _STRAIGHT_RAD
+    bent = np.abs(inputs[:, U.steering_wheel_rad]) > STRAIGHT_RAD
     bounds = _bounds(speed, quiet, bent, stride)
     smooth = _smoothed(_filled(spins))
     smooth_ground = _smoothed(_filled(ground)) if not turning else None

@@ -73,8 +73,7 @@ class LawRace:
 
     def _ranked(self, model: Model, noise: Noise) -> list[Entry]:
         fitter = self._fitter
-        parts = [part for parts in self._parts.values() for part in parts]
-        listed = [self._columns[part.law.name, part.place] for part in parts]
+        listed = [self._columns[part.law.name, part.place] for parts in self._parts.values() for part in parts]
         joined = {name: np.hstack([columns[name] for columns in listed]) for name in fitter.frame.names}
         sums = fitter.screen(model, joined, noise)
         accepted = len(model.terms)

@@ -54,21 +54,21 @@ def score(candidate: Candidate, b: float, q: float, now: float = 0.0) -> Score:
     gain = 2.0 * b * step - q * step * step
     raw = gain
     gain /= variance_of(candidate)
-    evidence = 0.5 * raw + share_of(q, step, tau) - float(np.log(candidate.places))
+    evidence = 0.5 * raw + share_of(candidate, q, step)
     reach, usual = largest * float(np.sqrt(q)), tau / USUAL * float(np.sqrt(q))
     return Score(candidate, now + step, gain, evidence, reach, usual, q, raw)
 
 
-def share_of(information: float, value: float, tau: float) -> float:
-    """Log of the share of its prior that data leave a number, at its value."""
-    return -0.5 * float(np.log1p(information * tau * tau)) - 0.5 * (value / tau) ** 2
+def share_of(candidate: Candidate, information: float, value: float) -> float:
+    """Log of the share of its prior that data leave a candidate at its value, one of its places."""
+    tau = candidate.spread
+    return -0.5 * float(np.log1p(information * tau * tau)) - 0.5 * (value / tau) ** 2 - float(np.log(candidate.places))
 
 
 def rescored(item: Score, value: float, raw: float, information: float) -> Score:
     """A candidate looked at again: with another value, gain and information."""
-    candidate = item.candidate
-    evidence = 0.5 * raw + share_of(information, value, candidate.spread) - float(np.log(candidate.places))
-    gain = raw / variance_of(candidate)
+    evidence = 0.5 * raw + share_of(item.candidate, information, value)
+    gain = raw / variance_of(item.candidate)
     return replace(item, value=value, gain=gain, evidence=evidence, information=information, raw=raw)
 
 

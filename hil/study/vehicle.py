@@ -33,7 +33,7 @@ _SUSPENSION = {
     "suspension_brake_support_tangent": 0.6, "suspension_anti_roll_nm_rad": 0.7, "suspension_roll_centre_height_m": 3.0,
     "vehicle_pitch_inertia_kg_m2": 0.6, "vehicle_roll_inertia_kg_m2": 0.2,
 }  # fmt: skip
-_LIFT = 0.1
+_LIFT = 0.1  # half-width of an axle's lift coefficient: twice the shipped tolerance, for sets seldom state it
 _THERMAL = {"friction_brake_heat_capacity_j_k": 0.2, "friction_brake_cooling_w_k": 0.3}
 """Heat store of the discs; where the friction does not depend on temperature it does not matter."""
 _SIGNED = ("suspension_progression_n_m3", "suspension_brake_support_tangent", "suspension_roll_centre_height_m")

@@ -14,7 +14,7 @@ from plant.effects.theta import THETA
 from plant.vectors import P
 
 WHEELS = ("fl", "fr", "rl", "rr")
-COASTS, RECUPERATES, BRAKES = (0.0, 9.0), (10.0, 15.0), (19.0, 23.0)
+RECUPERATES, BRAKES = (10.0, 15.0), (19.0, 23.0)
 SEGMENTS = 3
 
 
