@@ -13,14 +13,11 @@ from hil.trials.run import run_case
 
 SEED = 7
 pytestmark = [pytest.mark.slow, pytest.mark.long, pytest.mark.timeout(1200)]
-ALARM = pytest.mark.xfail(
-    reason="explain names iwm_gain (car) where nothing is hidden: what is asked is not calibrated"
-)
 MISSED = pytest.mark.xfail(reason="explain answers none at SNR 15: the model's own error takes most of the signal")
 SINGLES = [kind.name for kind in SEPARABLE]
 
 
-@pytest.mark.parametrize("index", [0, pytest.param(1, marks=ALARM)])
+@pytest.mark.parametrize("index", [0, 1])
 def test_nothing_hidden_is_nothing_found(index: int) -> None:
     assert run_case(draw("null", index, SEED), SEED, None)["causes"] == []
 
@@ -30,6 +27,14 @@ def test_a_single_cause_is_named(effect: str) -> None:
     record = run_case(draw("single", SINGLES.index(effect), SEED, 15.0), SEED, 15.0)
     assert record["hidden"][0]["effect"] == effect
     assert record["named"][:1] == [effect]
+
+
+def test_a_road_grade_is_named_and_within_its_interval() -> None:
+    """It was answered ``none``: motors at their limits told a wrong grade, and noise took the rest for its own."""
+    record = run_case(draw("single", 0, 9001, 15.0), 9001, 15.0)
+    assert record["named"] == ["road_grade"]
+    low, high = record["causes"][0]["parameters"]["grade"]["ci95"]
+    assert low < record["hidden"][0]["parameters"]["grade"]["value"] < high
 
 
 def test_without_the_noise_model_nothing_hidden_raises_an_alarm() -> None:
