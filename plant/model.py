@@ -128,7 +128,8 @@ def simulate(
         for i in range(now.size):
             now[i] = inputs[row, i]
         if columns.size > 0:
-            derivative(x, now, cut, switch, q, road, y)
+            if columns.max() >= x.size:  # an output, not a state
+                derivative(x, now, cut, switch, q, road, y)
             for k in range(columns.size):
                 table[row, k] = x[columns[k]] if columns[k] < x.size else y[columns[k] - x.size]
         for step in range(steps):

@@ -2,19 +2,28 @@
 
 import numpy as np
 
+from hil.study.compiled import compiled
 from hil.study.prepare import ROW_S
 from hil.study.table import Floats
 from plant.vectors import INPUT
 
 
 def later(values: Floats, rows: float | Floats) -> Floats:
-    """Channels as seen some rows later, straight lines between rows."""
-    last = len(values) - 1
-    at = np.clip(np.arange(len(values))[:, None] - rows, 0.0, last) + np.zeros(values.shape)
-    before = at.astype(np.intp)
-    share = at - before
-    column = np.arange(values.shape[1])
-    return np.asarray((1.0 - share) * values[before, column] + share * values[np.minimum(before + 1, last), column])
+    """Channels as seen some rows later, straight lines between rows; ``rows`` for all, or for each value."""
+    out = np.empty_like(values)
+    _later(values, np.broadcast_to(np.asarray(rows, np.float64), values.shape), out)
+    return out
+
+
+@compiled
+def _later(values: Floats, rows: Floats, out: Floats) -> None:
+    last = values.shape[0] - 1
+    for t in range(values.shape[0]):
+        for k in range(values.shape[1]):
+            at = min(max(t - rows[t, k], 0.0), float(last))
+            before = int(at)
+            first = values[before, k]
+            out[t, k] = first + (at - before) * (values[min(before + 1, last), k] - first)
 
 
 def _held_later(values: Floats, rows: float) -> Floats:

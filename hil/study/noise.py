@@ -191,21 +191,22 @@ def _long(tracks: Mapping[str, Floats], frame: Frame, noise: Noise, columns: int
 
 
 def _side(name: str, values: Floats, frame: Frame, noise: Noise) -> tuple[float, Floats]:
-    track = noise.tracks[name]
-    out = np.empty_like(values)
-    white = _white(track, frame.present[name], frame.speed_mps)
-    colour = track.c**2 if noise.enabled else 0.0
+    scaled, value = _evened(name, values, frame, noise)
+    out = np.empty_like(scaled)
+    return value + _filtered(noise.tracks[name], scaled, frame, frame.present[name], noise.enabled, out), out
+
+
+def _evened(name: str, values: Floats, frame: Frame, noise: Noise) -> tuple[Floats, float]:
+    """Values of a track over the scale of their manoeuvre, and what that adds to the log-likelihood."""
     scale = _scale(name, frame, noise)
-    value = -float(np.log(scale) @ frame.present[name])
-    value += coloured(
-        np.ascontiguousarray(values / scale[:, None]),
-        frame.fresh,
-        white,
-        _factor(track.tau_s, frame.sample_s),
-        colour + 1e-16,
-        out,
-    )
-    return float(value), out
+    return np.ascontiguousarray(values / scale[:, None]), -float(np.log(scale) @ frame.present[name])
+
+
+def _filtered(track: Track, scaled: Floats, frame: Frame, known: Floats, enabled: bool, out: Floats) -> float:
+    """Innovations of an evened track into ``out``, and their log-likelihood."""
+    white = _white(track, known, frame.speed_mps) if track.b else track.a**2 * known
+    colour = track.c**2 if enabled else 0.0
+    return float(coloured(scaled, frame.fresh, white, _factor(track.tau_s, frame.sample_s), colour + 1e-16, out))
 
 
 def first_guess(tracks: Mapping[str, Floats], frame: Frame, enabled: bool = True) -> Noise:
@@ -239,17 +240,16 @@ def _estimate_side(name: str, values: Floats, frame: Frame, noise: Noise, budget
     at = noise.tracks[name]
     by_speed = name.startswith("wheel")
 
-    def built(z: Floats) -> Noise:
-        a, b, c, tau = np.exp(z)
-        track = Track(
-            max(float(a), floor), float(b) if by_speed else 0.0, float(c), float(np.clip(tau, 0.02, _LONGEST_S))
-        )
-        return replace(noise, tracks={**noise.tracks, name: track})
+    scaled, _ = _evened(name, values, frame, noise)
+    known, out = frame.present[name], np.empty_like(scaled)
+
+    def built(z: Floats) -> Track:
+        a, b, c, tau = (float(size) for size in np.exp(z))
+        return Track(max(a, floor), b if by_speed else 0.0, c, min(max(tau, 0.02), _LONGEST_S))
 
     def cost(z: Floats) -> float:
-        return -_side(name, values, frame, built(z))[0] + 1e-3 * float(
-            np.sum(np.clip(np.abs(z) - 16.0, 0.0, None) ** 2)
-        )
+        beyond = np.clip(np.abs(z) - 16.0, 0.0, None)
+        return -_filtered(built(z), scaled, frame, known, noise.enabled, out) + 1e-3 * float(beyond @ beyond)
 
     a = max(_differences(values[:, 0], frame.present[name]), floor)
     quiet = Track(a, 0.0, 3.0 * a, 0.5)
@@ -257,7 +257,7 @@ def _estimate_side(name: str, values: Floats, frame: Frame, noise: Noise, budget
     best = minimize(
         cost, min(starts, key=cost), method="Nelder-Mead", options={"maxfev": budget, "xatol": 0.02, "fatol": 0.05}
     )
-    return built(best.x)
+    return replace(noise, tracks={**noise.tracks, name: built(best.x)})
 
 
 def _estimate_long(tracks: Mapping[str, Floats], frame: Frame, noise: Noise, budget: int) -> Noise:

@@ -3,16 +3,12 @@
 The same linear filter goes over residuals and sensitivities, so a fit on its output is the fit of maximum likelihood.
 """
 
-from collections.abc import Callable
-from typing import Any, cast
-
 import numpy as np
-from numba import njit
 
+from hil.study.compiled import compiled
 from hil.study.table import Floats
 
 _UNKNOWN = 1e4  # variance of a start that nothing is known of
-_compile = cast(Callable[[Callable[..., Any]], Callable[..., Any]], njit(cache=True, nogil=True, error_model="numpy"))
 
 
 def _coloured(y: Floats, fresh: Floats, white: Floats, phi: float, colour: float, out: Floats) -> float:
@@ -108,10 +104,10 @@ def _moving(
     return likelihood
 
 
-coloured = _compile(_coloured)
+coloured = compiled(_coloured)
 """White noise and AR(1) on one track: (samples, columns) in, innovations of variance 1 into ``out``; log-likelihood of
 the first column. ``white`` is the variance of each sample, 0 where nothing is compared; ``fresh`` begins a log."""
-moving = _compile(_moving)
+moving = compiled(_moving)
 """The moving car: (samples, 3 tracks, columns) of speed, acceleration, ground speed.
 
 ``colours`` holds rows (factor from sample to sample, variance) of force, slope, accelerometer and wheel disturbance,

@@ -1,16 +1,13 @@
 """One Kalman filter for every linear model here: innovations and log-likelihood, robust against single bad samples."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, cast
 
 import numpy as np
-from numba import njit
 
+from hil.study.compiled import compiled
 from hil.study.table import Floats
 
 _CLIP = 4.0
-_compile = cast(Callable[[Callable[..., Any]], Callable[..., Any]], njit(cache=True, nogil=True, error_model="numpy"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +89,7 @@ def _filter(
                     cov[i, j] -= gain * h[j]
 
 
-_run = _compile(_filter)
+_run = compiled(_filter)
 
 
 def innovations(y: Floats, known: Floats, fresh: Floats, model: Linear) -> tuple[Floats, Floats]:

@@ -1,12 +1,25 @@
 """All sensing effects of a theta, in the order in which a signal meets them."""
 
+from functools import cache
+
 import numpy as np
+from numpy.typing import NDArray
 
 from plant.effects.effect import Effect
 from plant.effects.sensing.catalogue import SENSING
 from plant.effects.sensing.kind import Memory, Numbers
 from plant.effects.theta import THETA, Theta
 from plant.layout import Vector
+
+
+@cache
+def _strengths(layout: Theta) -> list[tuple[Effect, NDArray[np.intp]]]:
+    """Where the numbers lie that switch each effect on."""
+    places = np.arange(layout.size)
+    return [
+        (effect, np.concatenate([places[layout.slice(effect.name, p.name)] for p in effect.strengths]))
+        for effect in SENSING
+    ]
 
 
 class Chain:
@@ -22,11 +35,8 @@ class Chain:
         self._theta = theta
         self._layout = layout
         self._memory: dict[tuple[str, str], Memory] = {}
-        self._active = [effect for effect in SENSING if self._is_on(effect)]
+        self._active = [effect for effect, strengths in _strengths(layout) if theta[strengths].any()]
         self._nodes = {node for effect in self._active for node in effect.nodes}
-
-    def _is_on(self, effect: Effect) -> bool:
-        return any(self._theta[self._layout.slice(effect.name, p.name)].any() for p in effect.strengths)
 
     def _numbers(self, effect: Effect, time_s: Vector) -> Numbers:
         onset, until = (self._theta[self._layout.slice(effect.name, name)][0] for name in ("onset_s", "until_s"))
