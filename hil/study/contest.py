@@ -12,6 +12,7 @@ from hil.study.noise import Noise
 from hil.study.rig import WORKERS
 from hil.study.screen import Score, rescored, share_of
 
+Item = TypeVar("Item")
 Of = TypeVar("Of")
 
 
@@ -51,7 +52,7 @@ class Contest:
         fitter.products(self.noise)  # which all looks need
 
     @staticmethod
-    def at_once(of: Callable[[Score], Of], items: Sequence[Score]) -> list[Of]:
+    def at_once(of: Callable[[Item], Of], items: Sequence[Item]) -> list[Of]:
         """Looks that do not depend on each other, over threads."""
         with ThreadPoolExecutor(WORKERS) as pool:
             return list(pool.map(of, items))
@@ -61,33 +62,45 @@ class Contest:
         costs = [self._fitter.cost(model.residual, model.z, noise) for noise in (new, old)]
         return new if costs[0] < costs[1] else old
 
-    def _begun(self, item: Score) -> tuple[Model, Tracks]:
-        """A candidate in the model where it does nothing yet, and the sensitivities to all values."""
-        terms, now = (*self._model.terms, Term(item.candidate, 0.0)), self._now
-        begun = replace(self._model, terms=terms, covariance=np.zeros((0, 0)))
+    def _begun(self, terms: Sequence[Term], columns: Tracks) -> tuple[Model, Tracks]:
+        """More terms in the model where they do nothing yet, and the sensitivities to all values."""
+        begun = replace(self._model, terms=(*self._model.terms, *terms), covariance=np.zeros((0, 0)))
+        if self._now is None:
+            return begun, columns
+        return begun, {name: np.hstack([self._now[name], values]) for name, values in columns.items()}
+
+    def _of(self, item: Score) -> tuple[list[Term], Tracks]:
+        """A candidate as a term, and its sensitivities."""
         at = list(item.candidate.columns)
         own = {name: values[:, at].sum(axis=1, keepdims=True) for name, values in self._columns.items()}
-        return begun, own if now is None else {name: np.hstack([now[name], values]) for name, values in own.items()}
+        return [Term(item.candidate, 0.0)], own
+
+    def foreseen(self, terms: Sequence[Term], columns: Tracks) -> tuple[Model, Noise]:
+        """The model with more terms by one linear step, and the noise that is left beside them.
+
+        Noise estimated without a cause takes much of a slow one for its own. ``columns`` (samples, terms) are
+        sensitivities to the terms. Of several terms at once data may leave some open: they stay at usual sizes.
+        """
+        begun, own = self._begun(terms, columns)
+        known = np.zeros(len(begun.terms))
+        if len(terms) > 1:
+            known[-len(terms) :] = [term.candidate.parameter.typical**-2 for term in terms]
+        first = self._fitter.foreseen(begun, own, self.noise, known)
+        quieter = self._no_worse(first, self._fitter.estimated(first, self.noise, 40), self.noise)
+        again = self._fitter.foreseen(begun, own, quieter, known)
+        quieter = self._no_worse(again, self._fitter.estimated(again, quieter, 30), quieter)
+        return replace(again, cost=self._fitter.cost(again.residual, again.z, quieter)), quieter
 
     def profiled(self, item: Score) -> tuple[Score, Noise]:
-        """The candidate by one linear step with the noise that is left beside it.
-
-        Noise estimated without a cause takes much of a slow one for its own.
-        """
-        begun, own = self._begun(item)
-        first = self._fitter.foreseen(begun, own, self.noise)
-        quieter = self._no_worse(first, self._fitter.estimated(first, self.noise, 40), self.noise)
-        again = self._fitter.foreseen(begun, own, quieter)
-        quieter = self._no_worse(again, self._fitter.estimated(again, quieter, 30), quieter)
-        cost = self._fitter.cost(again.residual, again.z, quieter)
-        raw = max(self.reference - cost, item.raw)
-        value = again.terms[-1].value
-        information = 1.0 / max(float(again.covariance[-1, -1]), 1e-30)
-        return rescored(item, value, raw, information), quieter
+        """The candidate by one linear step with the noise that is left beside it."""
+        model, quieter = self.foreseen(*self._of(item))
+        raw = max(self.reference - model.cost, item.raw)
+        information = 1.0 / max(float(model.covariance[-1, -1]), 1e-30)
+        return rescored(item, model.terms[-1].value, raw, information), quieter
 
     def contender(self, item: Score, noise: Noise) -> Contender:
         """A leader fitted from where it does nothing, with the noise that is left beside it."""
-        begun, own = self._begun(item)
+        begun, own = self._begun(*self._of(item))
         fitted = self._fitter.fit(begun, noise, 3, self._relinearise, own)
         noise = self._no_worse(fitted, self._fitter.estimated(fitted, noise, 60), noise)
         fitted = self._fitter.fit(fitted, noise, 1, self._relinearise)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hil.study.basis import LAWS, PIECES, Piece
+from hil.study.basis import LAWS, Piece
 from hil.study.candidates import Candidate, Column, candidates, columns
 from hil.study.contest import Contender, Contest, odds
 from hil.study.fit import Fitter, Model, Term, Tracks, with_term
@@ -14,8 +14,8 @@ from hil.study.noise import Frame, Noise
 from hil.study.onset import with_onsets
 from hil.study.own_error import variance_of, variance_of_law
 from hil.study.prepare import Case
-from hil.study.race import LawRace, least_gain, share_left
-from hil.study.rig import Rig
+from hil.study.race import LawRace, best_of_each, least_gain, with_law
+from hil.study.rig import Rig, Stack
 from hil.study.screen import Score, inflation, leaders, not_testable, scores, threshold
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
@@ -31,9 +31,11 @@ _FORM = 0.2
 """Share of a cause that its equation may get wrong: what it leaves is no other cause."""
 _CLEARER = 5.0
 """By how much more than the best listed cause a law in no list must explain, log of the odds."""
+_LAWS_BESIDE = 4
+"""Laws that are looked at with noise of their own."""
 _HOPELESS = 0.1
 """Share of the gain asked below which no candidate is looked at with noise of its own."""
-_KINKED = ("late_demand", "ehb_dead_time_s")
+_KINKED = ("ehb_dead_time_s",)
 _TURNS, _MOST_ANEW, _SETTLED, _STALE, _FAR = 12, 3, 3.0, 0.3, 1.0
 _COARSE, _FINE = 0.5, 3.0
 """Finite differences of the vehicle's numbers: in standard deviations of what is known before, and of what data say."""
@@ -184,11 +186,19 @@ class _Search:
         now = self._shifted(z)
         self.rig.keep(now)
         base = self.rig.run(now)
-        sides = np.array([self._side(k, z) for k in range(len(z))])
-        steps = np.where(sides == 0.0, 1.0, sides) * self.steps
-        worlds = [self._shifted(z + step * (np.arange(len(z)) == k)) for k, step in enumerate(steps)]
-        tracks = track_columns(self.rig, self.frame, base, worlds, steps.tolist())
-        self.fitter = Fitter(self.rig, self.frame, self.base_world, self.nuisances, tracks, sides)
+        worlds = [self._shifted(z + step * (np.arange(len(z)) == k)) for k, step in enumerate(self.steps)]
+        tracks = track_columns(self.rig, self.frame, base, worlds, self.steps.tolist())
+        self._both_ways(tracks, base, z)
+        self.fitter = Fitter(self.rig, self.frame, self.base_world, self.nuisances, tracks)
+
+    def _both_ways(self, tracks: Tracks, base: Stack, z: Floats) -> None:
+        """Sensitivities to what acts from step to step, which has a kink at each: their mean of both sides."""
+        for k, nuisance in enumerate(self.nuisances):
+            if nuisance.name in _KINKED:
+                back = self._shifted(z - self.steps[k] * (np.arange(len(z)) == k))
+                other = track_columns(self.rig, self.frame, base, [back], [-float(self.steps[k])])
+                for name, columns in tracks.items():
+                    columns[:, k] = 0.5 * (columns[:, k] + other[name][:, 0])
 
     def _shifted(self, z: Floats) -> World:
         """The car with what is accepted, and its numbers ``z`` off."""
@@ -196,23 +206,6 @@ class _Search:
         for term in self.accepted:
             world = with_term(world, term)
         return world
-
-    def _side(self, k: int, z: Floats) -> float:
-        """Which side of 0 counts for what has a kink there (held demands by steps); 0 for all others."""
-        if self.nuisances[k].name not in _KINKED:
-            return 0.0
-        if z[k] != 0.0:
-            return float(np.sign(z[k]))
-        left = [
-            self._misfit(self._shifted(z + side * self.steps[k] * (np.arange(len(z)) == k))) for side in (1.0, -1.0)
-        ]
-        return 1.0 if left[0] <= left[1] else -1.0
-
-    def _misfit(self, world: World) -> float:
-        """What actuators asked and measured have apart, each as a share of its variance."""
-        stack, measured = self.rig.run(world), self.rig.measured()
-        groups = [group for group in ("pressure", "motor") if group in stack]
-        return sum(float(np.nanvar(measured[g] - stack[g]) / max(np.nanvar(measured[g]), 1e-12)) for g in groups)
 
     def _effect_columns(self, model: Model) -> Tracks:
         world = self.fitter.world(model.z, model.terms)
@@ -260,9 +253,9 @@ class _Search:
         reference = min(moved.cost, contest.reference)
         fitted = [self._gained(c, item, reference - left_over) for c, item in zip(fitted, top, strict=True)]
         clear = sorted((c for c in fitted if c.gained >= found.least_gain), key=odds)
-        law = self._unlisted(found, moved, tighter, reference, min(fitted, key=odds))
+        law = self._unlisted(found, contest, moved, tighter, reference, min(fitted, key=odds))
         if law is not None:
-            polished, tighter = self.fitter.settle(law.model, tighter, 1, 60)
+            polished, tighter = self.fitter.settle(law.model, law.noise, 1, 60)
             first = replace(law, model=polished)
             found.explained += reference - law.cost
             return polished, tighter, [first, *sorted(clear, key=odds)]
@@ -285,7 +278,7 @@ class _Search:
         return polished, tighter, [first, *rest]
 
     def _unlisted(
-        self, found: Diagnosis, model: Model, noise: Noise, reference: float, listed: Contender
+        self, found: Diagnosis, contest: Contest, model: Model, noise: Noise, reference: float, listed: Contender
     ) -> Contender | None:
         """A law in no list that explains more than the best listed cause, beyond noise and the model's own error."""
         if not self.settings.dictionary or any(isinstance(term.candidate, Piece) for term in model.terms):
@@ -293,20 +286,23 @@ class _Search:
         if self.race is None:
             self.say("curves in no list")
             self.race = LawRace(self.fitter, self.fitter.world(model.z, model.terms), model)
-        best = self.race.entries(model, noise)[0]
-        self.say(f"best curve: {best.curve.law.joint} by {best.curve.variable}, gain {best.gain:.0f}")
+        race, leading = self.race, best_of_each(self.race.entries(model, noise), _LAWS_BESIDE)
+        beside = contest.at_once(lambda entry: contest.foreseen(entry.begun, race.columns(entry)), leading)
+        seen = [with_law(entry, *one, contest.reference) for entry, one in zip(leading, beside, strict=True)]
         rival, left = max(0.5 * (reference - odds(listed)), 0.0), min(listed.cost, reference)
+        best, law = min(zip(leading, seen, strict=True), key=lambda one: odds(one[1]))
+        self.say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
         least = least_gain(found.looks + len(LAWS), self.settings.alpha) * inflation(found.screened)
         least = least * variance_of_law(best.curve.law.name) + _FORM**2 * found.explained
-        if best.gain - (reference - left) < least or best.evidence < rival + _CLEARER:
+
+        def clear(law: Contender) -> bool:
+            return left - law.cost >= least and 0.5 * (reference - odds(law)) >= rival + _CLEARER
+
+        if not clear(law):
             return None
-        fitted = self.fitter.fit(self.fitter.at(model.z, (*model.terms, *best.terms), noise), noise, 3)
-        values = np.array([term.value for term in fitted.terms[-PIECES:]])
-        share = share_left(best, values, fitted.covariance[-PIECES:, -PIECES:])
-        law = Contender(fitted.terms[-1], fitted, fitted.cost, share, 0.0, noise, reference - fitted.cost)
-        if left - law.cost < least or 0.5 * (reference - odds(law)) < rival + _CLEARER:
-            return None
-        return law
+        fitted = self.fitter.fit(self.fitter.at(law.model.z, law.model.terms, law.noise), law.noise, 3)
+        law = with_law(best, fitted, law.noise, reference)
+        return law if clear(law) else None
 
     def _stands_beside(self, better: Contender, clear: Contender, least: float) -> bool:
         """Whether a cause that is beyond doubt is so even when a better one, which is not, is let in as an error."""

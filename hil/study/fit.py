@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hil.study.candidates import Candidate
-from hil.study.linear import Sums, solve, sums, track_columns
+from hil.study.linear import Sums, solve_within, sums, track_columns
 from hil.study.noise import Frame, Noise, estimate, first_guess, tracks_of, whiten
 from hil.study.rig import Rig, Stack
 from hil.study.table import Floats
@@ -58,19 +58,15 @@ def with_term(world: World, term: Term) -> World:
 
 
 class Fitter:
-    """Fits models of one case.
-
-    ``sides`` (nuisances,) is +1 or -1 where a nuisance's sensitivity only holds for values above or below 0.
-    """
+    """Fits models of one case; ``nuisance_columns`` are sensitivities to the nuisances in standard deviations."""
 
     def __init__(
-        self, rig: Rig, frame: Frame, base: World, nuisances: Sequence[Nuisance], nuisance_columns: Tracks,
-        sides: Floats | None = None,
-    ) -> None:  # fmt: skip
+        self, rig: Rig, frame: Frame, base: World, nuisances: Sequence[Nuisance], nuisance_columns: Tracks
+    ) -> None:
         self.rig, self.frame, self.base = rig, frame, base
         self.nuisances, self.nuisance_columns = tuple(nuisances), nuisance_columns
-        self.sides = np.zeros(len(self.nuisances)) if sides is None else sides
         self.farthest = np.array([nuisance.farthest for nuisance in self.nuisances])
+        self.lowest = np.where([nuisance.kind == "held" for nuisance in self.nuisances], 0.0, -self.farthest)
         self.radius = float(rig.vehicle.parameters.wheel.rolling_radius_m)
         self._measured = rig.measured()
         self._white_for: Noise | None = None
@@ -142,27 +138,33 @@ class Fitter:
         return best
 
     def _step(self, model: Model, own: Tracks, noise: Noise) -> Model | None:
-        count = len(self.nuisances)
         total = self._total(model, own, noise)
-        free, held = range(len(model.terms)), self._held(total, model)
         for damping in _DAMPING:
-            change, covariance = solve(total, count, free, model.z, damping, held)
-            if self._foretold(total, change, model.z, held) < _WORTH:
+            z, terms, covariance, foretold = self._moved(model, total, damping)
+            if foretold < _WORTH:
                 break
-            moved = self.at(*self._bounded_step(model, change), noise)
+            moved = self.at(z, terms, noise)
             if moved.cost < model.cost:
                 return replace(moved, covariance=covariance)
         return replace(model, covariance=covariance) if model.terms and not model.covariance.size else None
 
-    def _bounded_step(self, model: Model, change: Floats) -> tuple[Floats, tuple[Term, ...]]:
-        """Nuisances and effects after a step, no farther than each may go."""
-        count = len(self.nuisances)
-        z = np.clip(model.z + np.clip(change[:count], -_LARGEST_STEP, _LARGEST_STEP), -self.farthest, self.farthest)
+    def _moved(
+        self, model: Model, total: Floats, damping: float = 0.0
+    ) -> tuple[Floats, tuple[Term, ...], Floats, float]:
+        """Nuisances and effects after a step, no farther than each may go, covariance of the effects, and what the step
+        takes off the cost if the model is linear."""
+        count, values = len(self.nuisances), np.array(model.values())
+        ends = [(term.candidate.parameter.low, term.candidate.parameter.high) for term in model.terms]
+        least, most = np.array(ends).reshape(-1, 2).T
+        low = np.concatenate((np.maximum(self.lowest - model.z, -_LARGEST_STEP), least - values))
+        high = np.concatenate((np.minimum(self.farthest - model.z, _LARGEST_STEP), most - values))
+        low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
+        free = range(len(values))
+        change, covariance, foretold = solve_within(total, count, free, model.z, low, high, damping)
         terms = tuple(
-            replace(term, value=_bounded(term.candidate, term.value + float(step)))
-            for term, step in zip(model.terms, change[count:], strict=True)
+            replace(term, value=float(value)) for term, value in zip(model.terms, values + change[count:], strict=True)
         )
-        return np.where(self.sides * z < 0.0, 0.0, z), terms
+        return model.z + change[:count], terms, covariance, foretold
 
     def _follow(self, before: Model, after: Model, noise: Noise) -> None:
         """Sensitivities that foretell the step just made (Broyden 1965, Math. Comp. 19, eq. 4.5).
@@ -179,22 +181,6 @@ class Fitter:
             moved = (before.residual[name][:, 0] - after.residual[name][:, 0]).astype(np.float32)
             columns += np.outer(moved - columns @ change.astype(np.float32), share)
         self._white_for = None
-
-    @staticmethod
-    def _foretold(total: Floats, change: Floats, z: Floats, held: Sequence[int]) -> float:
-        """What a step takes off the cost if the model is linear."""
-        right = total[1:, 0].copy()
-        right[: len(z)] -= z
-        right[list(held)] = 0.0
-        return float(right @ change)
-
-    def _held(self, total: Floats, model: Model) -> list[int]:
-        """Nuisances at the end of their side, or as far off as they may be, that want to go on."""
-        change, _ = solve(total, len(self.nuisances), range(len(model.terms)), model.z)
-        wanted = model.z + change[: len(self.nuisances)]
-        other_side = (self.sides * wanted < 0.0) & (self.sides * model.z <= 0.0)
-        too_far = (np.abs(model.z) >= self.farthest) & (model.z * wanted > self.farthest**2)
-        return [int(k) for k in np.flatnonzero(other_side | too_far)]
 
     def at_their_end(self, z: Floats) -> list[int]:
         """Nuisances as far off as they may be: they explain nothing more."""
@@ -235,11 +221,16 @@ class Fitter:
         total[np.ix_(at, at)] = outer.T @ outer
         return total
 
-    def foreseen(self, model: Model, own: Tracks, noise: Noise) -> Model:
-        """The model after one linear step, with the residual that sensitivities foretell; ``own`` to its values."""
+    def foreseen(self, model: Model, own: Tracks, noise: Noise, known: Floats | None = None) -> Model:
+        """The model after one linear step, with the residual that sensitivities foretell; ``own`` to its values.
+
+        ``known`` (values,) is their information before any data, for those that data may say nothing of.
+        """
         count, total = len(self.nuisances), self._total(model, own, noise)
-        change, covariance = solve(total, count, range(len(model.terms)), model.z, 0.0, self._held(total, model))
-        z, terms = self._bounded_step(model, change)
+        if known is not None:
+            at = 1 + count + np.arange(len(known))
+            total[at, at] += known
+        z, terms, covariance, _ = self._moved(model, total)
         moved = np.array([new.value - old.value for new, old in zip(terms, model.terms, strict=True)])
         residual = {
             name: values - (self.nuisance_columns[name] @ (z - model.z) + own[name] @ moved)[:, None]
@@ -273,7 +264,3 @@ def _difference(term: Term) -> float:
     parameter = term.candidate.parameter
     size = max(0.02 * abs(parameter.typical), 0.05 * abs(term.value))
     return -size if term.value + size > parameter.high else size
-
-
-def _bounded(candidate: Candidate, value: float) -> float:
-    return float(np.clip(value, candidate.parameter.low, candidate.parameter.high))

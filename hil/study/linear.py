@@ -13,6 +13,7 @@ from hil.study.world import World
 _CHUNK = 48
 _HUBER = 6.0
 _HELD = 1e15
+_ROUNDS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,25 +111,50 @@ def project(
     return Projected(np.asarray(left[0, keep:]), np.asarray(left[keep:, keep:]), float(left[0, 0]) + prior)
 
 
-def solve(
-    total: Floats, nuisances: int, free: Sequence[int], z: Floats, damping: float = 0.0, held: Sequence[int] = ()
-) -> tuple[Floats, Floats]:
-    """Steps of the nuisances and of the columns ``free``, and the covariance of the latter.
+def solve(total: Floats, nuisances: int, free: Sequence[int], z: Floats) -> tuple[Floats, Floats]:
+    """Steps of the nuisances and of the columns ``free``, and the covariance of the latter."""
+    a, right = _normal(total, nuisances, free, z)
+    inverse = np.linalg.inv(a)
+    return np.asarray(inverse @ right), np.asarray(inverse[nuisances:, nuisances:])
 
-    ``damping`` shortens the step in proportion to each number's own information (Marquardt 1963); nuisances that are
-    ``held`` do not move.
+
+def solve_within(
+    total: Floats, nuisances: int, free: Sequence[int], z: Floats, low: Floats, high: Floats, damping: float = 0.0
+) -> tuple[Floats, Floats, float]:
+    """As `solve`, no step below ``low`` or above ``high``, and what it takes off the cost if the model is linear.
+
+    ``damping`` shortens the step in proportion to each number's own information (Marquardt 1963). What would go too far
+    stays at its end while all others are solved for again (active set; Nocedal and Wright 2006, alg. 16.3).
     """
+    a, right = _normal(total, nuisances, free, z)
+    damped = a.copy()
+    damped[range(len(a)), range(len(a))] *= 1.0 + damping
+    change, ended = np.zeros(len(a)), np.zeros(len(a), bool)
+    for _ in range(_ROUNDS):
+        inside = np.flatnonzero(~ended)
+        rest = right[inside] - damped[np.ix_(inside, np.flatnonzero(ended))] @ change[ended]
+        change[inside] = np.linalg.solve(damped[np.ix_(inside, inside)], rest)
+        beyond = ~ended & ((change < low) | (change > high))
+        pull = right - damped @ change
+        back = ended & np.where(change <= low, pull > 0.0, pull < 0.0) & (low < high)
+        if not beyond.any() and not back.any():
+            break
+        change = np.clip(change, low, high)
+        ended = (ended & ~back) | beyond
+    change = np.clip(change, low, high)
+    open_ones = [k for k in range(len(a)) if k >= nuisances or not ended[k]]
+    covariance = np.linalg.inv(a[np.ix_(open_ones, open_ones)])
+    columns = len(a) - nuisances
+    at = len(open_ones) - columns
+    return change, covariance[at:, at:], float(2.0 * right @ change - change @ a @ change)
+
+
+def _normal(total: Floats, nuisances: int, free: Sequence[int], z: Floats) -> tuple[Floats, Floats]:
+    """Normal equations: information with what is known before, and the pull."""
     taken = [1 + k for k in range(nuisances)] + [1 + nuisances + k for k in free]
     a = total[np.ix_(taken, taken)].copy()
     right = total[taken, 0].copy()
     a[range(nuisances), range(nuisances)] += 1.0
     right[:nuisances] -= z
     a[range(len(a)), range(len(a))] += 1e-9 * (1.0 + np.diag(a))
-    a[list(held), list(held)] += _HELD
-    right[list(held)] = 0.0
-    inverse = np.linalg.inv(a)
-    covariance = np.asarray(inverse[nuisances:, nuisances:])
-    if damping > 0.0:
-        a[range(len(a)), range(len(a))] *= 1.0 + damping
-        return np.linalg.solve(a, right), covariance
-    return np.asarray(inverse @ right), covariance
+    return a, right

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from hil.study.basis import PIECES, Curve, curves, places
+from hil.study.contest import Contender
 from hil.study.fit import Fitter, Model, Term, Tracks
 from hil.study.linear import project, track_columns
 from hil.study.noise import Noise
@@ -32,9 +33,9 @@ class Entry:
     choices: int
 
     @property
-    def terms(self) -> tuple[Term, ...]:
-        """As terms of a model."""
-        return tuple(Term(piece, float(value)) for piece, value in zip(self.curve.pieces, self.values, strict=True))
+    def begun(self) -> tuple[Term, ...]:
+        """As terms of a model, where they do nothing yet."""
+        return tuple(Term(piece, 0.0) for piece in self.curve.pieces)
 
 
 class LawRace:
@@ -70,6 +71,14 @@ class LawRace:
             self._columns |= self._simulated(self._parts[leading])
             found = self._ranked(model, noise)
         return found
+
+    def columns(self, entry: Entry) -> Tracks:
+        """Sensitivities to the coefficients of a law at a place."""
+        curve = next(curve for curve in self._parts if curve.law is entry.curve.law)
+        parts = self._parts[curve]
+        taken = next(taken for placed, taken in _offered(curve, parts) if placed.place == entry.curve.place)
+        listed = [self._columns[parts[k].law.name, parts[k].place] for k in taken]
+        return {name: np.sum([columns[name] for columns in listed], axis=0) for name in listed[0]}
 
     def _ranked(self, model: Model, noise: Noise) -> list[Entry]:
         fitter = self._fitter
@@ -118,6 +127,21 @@ def _entry(curve: Curve, b: Floats, q: Floats, choices: int) -> Entry:
 def _volume(information: Floats, usual: float) -> float:
     """Log of the share of its prior that the data leave a law; hats they say nothing of cost nothing."""
     return -0.5 * float(np.linalg.slogdet(np.eye(PIECES) + usual**2 * information)[1])
+
+
+def best_of_each(entries: Sequence[Entry], count: int) -> list[Entry]:
+    """The first of each law, of so many laws."""
+    best: dict[str, Entry] = {}
+    for entry in entries:
+        best.setdefault(entry.curve.law.name, entry)
+    return list(best.values())[:count]
+
+
+def with_law(entry: Entry, model: Model, noise: Noise, reference: float) -> Contender:
+    """A model with the law as its last terms; it takes its cost off ``reference``."""
+    values = np.array([term.value for term in model.terms[-PIECES:]])
+    share = share_left(entry, values, model.covariance[-PIECES:, -PIECES:])
+    return Contender(model.terms[-1], model, model.cost, share, 0.0, noise, reference - model.cost)
 
 
 def share_left(entry: Entry, values: Floats, covariance: Floats) -> float:

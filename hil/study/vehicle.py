@@ -46,7 +46,7 @@ class Nuisance:
 
     ``farthest`` is how many standard deviations it may be off at most; farther off it is a cause to be named.
     ``kind`` says of what: a number of the vehicle (``signed`` if it may be below zero), the discs' temperature at the
-    start, or the latency of a node.
+    start, the latency of a node, or of what holds a demand (never below zero).
     """
 
     name: str

@@ -55,7 +55,7 @@ class World:
             for at, step in zip(nuisance.at, nuisance.step, strict=True):
                 if nuisance.kind == "disc":
                     disc += amount * step
-                elif nuisance.kind == "late":
+                elif nuisance.kind in ("late", "held"):
                     late[at] += amount * step
                 elif nuisance.kind == "tooth":
                     tooth += amount * step
@@ -68,7 +68,9 @@ class World:
 
 def start_nuisances() -> list[Nuisance]:
     """What the logs, not the vehicle, leave open: temperature of the discs, latency of the nodes."""
-    found = [Nuisance(f"late_{node}", (k,), (2e-3,), "late") for k, node in enumerate(LATE)]
+    found = [
+        Nuisance(f"late_{node}", (k,), (2e-3,), "held" if node == "demand" else "late") for k, node in enumerate(LATE)
+    ]
     return [Nuisance("disc_temperature_k", (0,), (15.0,), "disc"), Nuisance("tooth_lag", (0,), (0.5,), "tooth"), *found]
 
 

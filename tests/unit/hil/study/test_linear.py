@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import lsq_linear
 
-from hil.study.linear import project
+from hil.study.linear import project, solve, solve_within
 
 NUISANCES, COLUMNS = 3, 2
 
@@ -35,3 +36,31 @@ def test_nuisances_take_their_part_by_least_squares_with_their_prior(seed):
     moved = np.linalg.solve(a, total[own, 0] - z)
     expected = total[1 + NUISANCES :, 0] - total[1 + NUISANCES :, own] @ moved
     assert found.b == pytest.approx(expected, rel=1e-6, abs=1e-6)
+
+
+@given(seed=st.integers(0, 10_000))
+def test_a_step_within_its_ends_is_the_best_there_is(seed):
+    """Held against bounded least squares on the same problem, tolerances as rows of their own."""
+    rng = np.random.default_rng(seed)
+    columns = rng.standard_normal((40, NUISANCES + 2)) * 10.0 ** rng.uniform(-1.0, 1.0, NUISANCES + 2)
+    joined = np.column_stack((rng.standard_normal(40) * 5.0, columns))
+    z = rng.uniform(-1.0, 1.0, NUISANCES)
+    low, high = -rng.uniform(0.0, 2.0, NUISANCES + 2), rng.uniform(1e-3, 2.0, NUISANCES + 2)
+    change, _, foretold = solve_within(joined.T @ joined, NUISANCES, range(2), z, low, high)
+    prior = np.eye(NUISANCES, NUISANCES + 2)
+    rows, right = np.vstack((columns, prior)), np.concatenate((joined[:, 0], -z))
+    best = lsq_linear(rows, right, (low, high), tol=1e-12, method="bvls")
+    assert ((low - 1e-9 <= change) & (change <= high + 1e-9)).all()
+    left = float(np.sum((rows @ change - right) ** 2))
+    assert left == pytest.approx(2.0 * best.cost, rel=1e-6)
+    assert foretold == pytest.approx(float(right @ right) - left, rel=1e-6, abs=1e-6)
+
+
+def test_a_step_without_ends_is_the_step_of_solve():
+    rng = np.random.default_rng(5)
+    joined = rng.standard_normal((50, 1 + NUISANCES + 1))
+    total, z, far = joined.T @ joined, rng.standard_normal(NUISANCES), np.full(NUISANCES + 1, 1e3)
+    change, covariance, _ = solve_within(total, NUISANCES, [0], z, -far, far)
+    plain, other = solve(total, NUISANCES, [0], z)
+    assert change == pytest.approx(plain, rel=1e-9)
+    assert covariance == pytest.approx(other, rel=1e-9)
