@@ -36,7 +36,8 @@ _LAWS_BESIDE = 4
 _HOPELESS = 0.1
 """Share of the gain asked below which no candidate is looked at with noise of its own."""
 _KINKED = ("ehb_dead_time_s",)
-_TURNS, _MOST_ANEW, _SETTLED, _STALE, _FAR = 12, 3, 3.0, 0.3, 1.0
+_STRAINED = 1.5
+_TURNS, _MOST_ANEW, _SETTLED, _STALE, _FAR = 20, 4, 3.0, 0.3, 1.0
 _COARSE, _FINE = 0.5, 3.0
 """Finite differences of the vehicle's numbers: in standard deviations of what is known before, and of what data say."""
 
@@ -56,6 +57,14 @@ def causes_in(model: Model) -> int:
     """How many causes a model has; the pieces of a law in no list are one."""
     laws = {term.candidate.name.rsplit(".", 1)[0] for term in model.terms if isinstance(term.candidate, Piece)}
     return sum(not isinstance(term.candidate, Piece) for term in model.terms) + len(laws)
+
+
+def strain(z: Floats) -> float:
+    """How much farther the vehicle's numbers went than their tolerance lets them, as a variance, at least 1.
+
+    A model that needs that for these logs errs in what it says of causes too (Birge 1932, Phys. Rev. 40, 207).
+    """
+    return max(1.0, float(z @ z) / max(len(z), 1))
 
 
 @dataclass(eq=False)
@@ -117,10 +126,11 @@ class _Search:
         self._nuisance_columns(np.zeros(len(self.nuisances)))
         nominal, noise = self.fitter.start(self.settings.noise_model)
         self.say("noise, and the vehicle's numbers within their tolerance")
-        model, noise = self._vehicle(nominal, noise)
+        model, quieter = self._vehicle(nominal, noise)
+        found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, quieter, quieter, nominal, model, model)
+        model, noise = self._unbent(found, noise)
         self.say(f"sensitivities of {len(self.candidates)} candidates")
         self.effect_columns = self._effect_columns(model)
-        found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, noise, noise, nominal, model, model)
         sums = self.fitter.screen(model, self.effect_columns, noise)
         found.sums = sums
         found.screened = self._scores(sums, model)
@@ -139,7 +149,8 @@ class _Search:
             self.say(f"accepted {model.terms[-1].candidate.name} = {model.terms[-1].value:.4g}; when it begins")
             model = with_onsets(self.fitter, model, noise)
             model, noise, around = self._bent_back(model, noise, around)
-        found.final, found.noise, found.fitter = model, noise, self.fitter
+        if model.terms:
+            found.final, found.noise, found.fitter = model, noise, self.fitter
         if causes_in(model) > 1:
             self._backward(found)
         return found
@@ -152,19 +163,49 @@ class _Search:
         model, cost, around, anew = nominal, np.inf, nominal.z, 0
         for _ in range(_TURNS):
             noise = self.fitter.estimated(model, noise, 60)
-            model = self.fitter.fit(model, noise, 4)
+            model = self.fitter.fit(model, noise, 4, follow=True)
             settled, cost = cost - model.cost < _SETTLED, model.cost
-            stale = bool(np.abs(model.z - around).max() > _STALE * (1 + 2 * anew))
-            if not settled:
-                continue
-            if self.settings.relinearise and stale and anew < _MOST_ANEW:
+            moved = float(np.abs(model.z - around).max())
+            stale = moved > (_STALE * (1 + 2 * anew) if settled else _FAR)
+            most = _MOST_ANEW if strain(model.z) < _STRAINED else 2 * _MOST_ANEW
+            if self.settings.relinearise and stale and anew < most:
+                self.accepted = model.terms
                 information = np.diag(self.fitter.products(noise))
                 self.steps = np.clip(_FINE / np.sqrt(np.maximum(information, 1e-9)), 0.03, _COARSE)
                 self._nuisance_columns(model.z)
                 around, anew, cost = model.z, anew + 1, np.inf
-            else:
+            elif settled:
                 break
         return model, noise
+
+    def _unbent(self, found: Diagnosis, noise: Noise) -> tuple[Model, Noise]:
+        """The model in which causes are looked for, and its noise.
+
+        Where the vehicle's numbers had to go far, something else may have bent them: then they are fitted once more
+        from the car as handed in, beside what explains most there, and are kept without it if that is clearly better.
+        ``noise`` is that of the car as handed in.
+        """
+        model, quieter = found.base, found.noise
+        if not self.settings.relinearise or strain(model.z) < _STRAINED:
+            return model, quieter
+        self.say("the vehicle's numbers go far: once more from the car as handed in")
+        self._nuisance_columns(found.nominal.z)
+        columns = self._effect_columns(found.nominal)
+        listed = self._scores(self.fitter.screen(found.nominal, columns, noise), found.nominal)
+        contest = Contest(self.fitter, columns, found.nominal, noise, relinearise=True)
+        seen = contest.at_once(contest.profiled, leaders(listed, PLAUSIBLE))
+        if seen:
+            best, beside = max(seen, key=lambda one: one[0].evidence)
+            self.accepted = (Term(best.candidate, best.value),)
+            self._nuisance_columns(found.nominal.z)
+            moved, beside = self._vehicle(self.fitter.at(found.nominal.z, self.accepted, beside), beside)
+            self.accepted = ()
+            gained = self.fitter.cost(model.residual, model.z, quieter) - moved.cost
+            if gained > threshold(len(listed), self.settings.alpha) * strain(moved.z) * variance_of(best.candidate):
+                self.say(f"numbers as they are beside {best.candidate.name}")
+                return self.fitter.at(moved.z, (), beside), beside
+        self.fitter = found.fitter
+        return model, quieter
 
     def _bent_back(self, model: Model, noise: Noise, around: Floats) -> tuple[Model, Noise, Floats]:
         """The model with sensitivities taken anew where a cause let the vehicle's numbers go back far.
@@ -249,11 +290,12 @@ class _Search:
         self.say(f"fitting {len(top)} leaders")
         fitted = contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
         tighter = min(fitted, key=odds).noise
-        moved = self.fitter.fit(model, tighter, 3)
-        reference = min(moved.cost, contest.reference)
+        reference = min(self.fitter.fit(model, tighter, 3).cost, contest.reference)
+        if not model.terms:
+            reference = min(reference, self.fitter.cost(found.base.residual, found.base.z, tighter))
         fitted = [self._gained(c, item, reference - left_over) for c, item in zip(fitted, top, strict=True)]
         clear = sorted((c for c in fitted if c.gained >= found.least_gain), key=odds)
-        law = self._unlisted(found, contest, moved, tighter, reference, min(fitted, key=odds))
+        law = self._unlisted(found, contest, model, tighter, reference, min(fitted, key=odds))
         if law is not None:
             polished, tighter = self.fitter.settle(law.model, law.noise, 1, 60)
             first = replace(law, model=polished)
@@ -296,7 +338,7 @@ class _Search:
         least = least * variance_of_law(best.curve.law.name) + _FORM**2 * found.explained
 
         def clear(law: Contender) -> bool:
-            return left - law.cost >= least and 0.5 * (reference - odds(law)) >= rival + _CLEARER
+            return left - law.cost >= least * strain(law.model.z) and 0.5 * (reference - odds(law)) >= rival + _CLEARER
 
         if not clear(law):
             return None
@@ -310,13 +352,13 @@ class _Search:
             return True
         joint = self.fitter.at(better.model.z, (*better.model.terms, clear.term), better.noise)
         both = self.fitter.fit(joint, better.noise, 2, self.settings.relinearise)
-        return (better.cost - both.cost) / variance_of(clear.term.candidate) >= least
+        return (better.cost - both.cost) / variance_of(clear.term.candidate) >= least * strain(both.z)
 
     @staticmethod
     def _gained(contender: Contender, item: Score, reference: float) -> Contender:
         """With its gain, shared out over the model's own error; more than the screen saw is the noise's doing."""
         gained = min(reference - contender.cost, _OF_SCREEN * item.raw) / variance_of(item.candidate)
-        return replace(contender, gained=gained)
+        return replace(contender, gained=gained / strain(contender.model.z))
 
     def _backward(self, found: Diagnosis) -> None:
         """Take out each cause in turn; what is not missed stays out."""

@@ -116,11 +116,13 @@ class Fitter:
         return track_columns(self.rig, self.frame, model.stack or self.rig.run(world), worlds, steps)
 
     def fit(
-        self, model: Model, noise: Noise, steps: int = 2, relinearise: bool = True, own: Tracks | None = None
-    ) -> Model:
+        self, model: Model, noise: Noise, steps: int = 2, relinearise: bool = True, own: Tracks | None = None,
+        follow: bool = False,
+    ) -> Model:  # fmt: skip
         """Improve nuisances and values; keeps the model where no step does.
 
-        ``own`` are the sensitivities to the values at this model, if they are known.
+        ``own`` are the sensitivities to the values at this model, if they are known; those to the nuisances ``follow``
+        the steps made.
         """
         best = replace(model, cost=self.cost(model.residual, model.z, noise))
         for step in range(steps):
@@ -130,8 +132,8 @@ class Fitter:
             if moved is None:
                 break
             gained = best.cost - moved.cost
-            if not best.terms:
-                self._follow(best, moved, noise)
+            if follow:
+                self._follow(best, moved, own or {}, noise)
             best = moved
             if gained < _WORTH:
                 break
@@ -166,7 +168,7 @@ class Fitter:
         )
         return model.z + change[:count], terms, covariance, foretold
 
-    def _follow(self, before: Model, after: Model, noise: Noise) -> None:
+    def _follow(self, before: Model, after: Model, own: Tracks, noise: Noise) -> None:
         """Sensitivities that foretell the step just made (Broyden 1965, Math. Comp. 19, eq. 4.5).
 
         Numbers are scaled by what the data say of them: one that does not act is given no signature.
@@ -177,8 +179,11 @@ class Fitter:
         if float(change @ change) < _FOLLOWED**2 or squared <= 0.0:
             return
         share = (scaled / squared).astype(np.float32)
+        worth = [new - old for new, old in zip(after.values(), before.values(), strict=True)]
         for name, columns in self.nuisance_columns.items():
             moved = (before.residual[name][:, 0] - after.residual[name][:, 0]).astype(np.float32)
+            if own:
+                moved -= own[name].astype(np.float32) @ np.array(worth, np.float32)
             columns += np.outer(moved - columns @ change.astype(np.float32), share)
         self._white_for = None
 
