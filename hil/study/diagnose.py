@@ -8,18 +8,19 @@ import numpy as np
 from hil.study.basis import LAWS, Piece
 from hil.study.candidates import Candidate, Column, candidates, columns
 from hil.study.contest import Contender, Contest, odds
-from hil.study.fit import Fitter, Model, Term, Tracks, with_term
+from hil.study.fit import Fitter, Model, Term, Tracks
 from hil.study.linear import Sums, project, track_columns
 from hil.study.noise import Frame, Noise
+from hil.study.numbers import STRAINED, Numbers, strain
 from hil.study.onset import with_onsets
 from hil.study.own_error import variance_of, variance_of_law
 from hil.study.prepare import Case
 from hil.study.race import LawRace, best_of_each, least_gain, with_law
-from hil.study.rig import Rig, Stack
+from hil.study.rig import Rig
 from hil.study.screen import Score, inflation, leaders, not_testable, scores, threshold
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
-from hil.study.world import World, start_nuisances
+from hil.study.world import World
 
 Say = Callable[[str], None]
 ALPHA = 0.003
@@ -35,11 +36,6 @@ _LAWS_BESIDE = 4
 """Laws that are looked at with noise of their own."""
 _HOPELESS = 0.1
 """Share of the gain asked below which no candidate is looked at with noise of its own."""
-_KINKED = ("ehb_dead_time_s",)
-_STRAINED = 1.5
-_TURNS, _MOST_ANEW, _SETTLED, _STALE, _FAR = 20, 4, 3.0, 0.3, 1.0
-_COARSE, _FINE = 0.5, 3.0
-"""Finite differences of the vehicle's numbers: in standard deviations of what is known before, and of what data say."""
 
 
 @dataclass(frozen=True)
@@ -57,14 +53,6 @@ def causes_in(model: Model) -> int:
     """How many causes a model has; the pieces of a law in no list are one."""
     laws = {term.candidate.name.rsplit(".", 1)[0] for term in model.terms if isinstance(term.candidate, Piece)}
     return sum(not isinstance(term.candidate, Piece) for term in model.terms) + len(laws)
-
-
-def strain(z: Floats) -> float:
-    """How much farther the vehicle's numbers went than their tolerance lets them, as a variance, at least 1.
-
-    A model that needs that for these logs errs in what it says of causes too (Birge 1932, Phys. Rev. 40, 207).
-    """
-    return max(1.0, float(z @ z) / max(len(z), 1))
 
 
 @dataclass(eq=False)
@@ -110,23 +98,24 @@ class _Search:
         self.settings, self.say = settings, say
         self.rig = Rig(case, vehicle).quieted(base)
         self.frame = Frame.of(self.rig.case)
-        self.nuisances = (*vehicle.nuisances, *start_nuisances())
-        self.base_world = base
+        self.numbers = Numbers(self.rig, self.frame, vehicle, base, settings.relinearise)
         self.columns: list[Column] = columns(vehicle.untold)
         self.candidates: list[Candidate] = candidates(self.columns)
-        self.fitter: Fitter
-        self.accepted: tuple[Term, ...] = ()
         self.effect_columns: Tracks = {}
         self.race: LawRace | None = None
-        self.steps: Floats = np.full(len(self.nuisances), _COARSE)
+
+    @property
+    def fitter(self) -> Fitter:
+        """With the sensitivities to the vehicle's numbers last taken."""
+        return self.numbers.fitter
 
     def run(self) -> Diagnosis:
         """All of it."""
         self.say("replaying the car as handed in")
-        self._nuisance_columns(np.zeros(len(self.nuisances)))
+        self.numbers.anew(np.zeros(len(self.numbers.nuisances)))
         nominal, noise = self.fitter.start(self.settings.noise_model)
         self.say("noise, and the vehicle's numbers within their tolerance")
-        model, quieter = self._vehicle(nominal, noise)
+        model, quieter = self.numbers.fitted(nominal, noise)
         found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, quieter, quieter, nominal, model, model)
         model, noise = self._unbent(found, noise)
         self.say(f"sensitivities of {len(self.candidates)} candidates")
@@ -155,29 +144,6 @@ class _Search:
             self._backward(found)
         return found
 
-    def _vehicle(self, nominal: Model, noise: Noise) -> tuple[Model, Noise]:
-        """The vehicle's numbers and the noise in turn, with sensitivities taken anew until neither moves.
-
-        What the numbers have not explained yet counts as noise, so the first steps are forgiving.
-        """
-        model, cost, around, anew = nominal, np.inf, nominal.z, 0
-        for _ in range(_TURNS):
-            noise = self.fitter.estimated(model, noise, 60)
-            model = self.fitter.fit(model, noise, 4, follow=True)
-            settled, cost = cost - model.cost < _SETTLED, model.cost
-            moved = float(np.abs(model.z - around).max())
-            stale = moved > (_STALE * (1 + 2 * anew) if settled else _FAR)
-            most = _MOST_ANEW if strain(model.z) < _STRAINED else 2 * _MOST_ANEW
-            if self.settings.relinearise and stale and anew < most:
-                self.accepted = model.terms
-                information = np.diag(self.fitter.products(noise))
-                self.steps = np.clip(_FINE / np.sqrt(np.maximum(information, 1e-9)), 0.03, _COARSE)
-                self._nuisance_columns(model.z)
-                around, anew, cost = model.z, anew + 1, np.inf
-            elif settled:
-                break
-        return model, noise
-
     def _unbent(self, found: Diagnosis, noise: Noise) -> tuple[Model, Noise]:
         """The model in which causes are looked for, and its noise.
 
@@ -186,25 +152,24 @@ class _Search:
         ``noise`` is that of the car as handed in.
         """
         model, quieter = found.base, found.noise
-        if not self.settings.relinearise or strain(model.z) < _STRAINED:
+        if not self.settings.relinearise or strain(model.z) < STRAINED:
             return model, quieter
         self.say("the vehicle's numbers go far: once more from the car as handed in")
-        self._nuisance_columns(found.nominal.z)
+        self.numbers.anew(found.nominal.z)
         columns = self._effect_columns(found.nominal)
         listed = self._scores(self.fitter.screen(found.nominal, columns, noise), found.nominal)
         contest = Contest(self.fitter, columns, found.nominal, noise, relinearise=True)
         seen = contest.at_once(contest.profiled, leaders(listed, PLAUSIBLE))
         if seen:
             best, beside = max(seen, key=lambda one: one[0].evidence)
-            self.accepted = (Term(best.candidate, best.value),)
-            self._nuisance_columns(found.nominal.z)
-            moved, beside = self._vehicle(self.fitter.at(found.nominal.z, self.accepted, beside), beside)
-            self.accepted = ()
+            terms = (Term(best.candidate, best.value),)
+            self.numbers.anew(found.nominal.z, terms)
+            moved, beside = self.numbers.fitted(self.fitter.at(found.nominal.z, terms, beside), beside)
             gained = self.fitter.cost(model.residual, model.z, quieter) - moved.cost
             if gained > threshold(len(listed), self.settings.alpha) * strain(moved.z) * variance_of(best.candidate):
                 self.say(f"numbers as they are beside {best.candidate.name}")
                 return self.fitter.at(moved.z, (), beside), beside
-        self.fitter = found.fitter
+        self.numbers.fitter = found.fitter
         return model, quieter
 
     def _bent_back(self, model: Model, noise: Noise, around: Floats) -> tuple[Model, Noise, Floats]:
@@ -212,41 +177,14 @@ class _Search:
 
         Numbers that had stood in for the cause bend what all others seem to explain.
         """
-        if not self.settings.relinearise or float(np.abs(model.z - around).max()) < _FAR:
+        if not self.numbers.went_far(model, around):
             return model, noise, around
         self.say("sensitivities anew beside it")
-        self.accepted = model.terms
-        self._nuisance_columns(model.z)
+        self.numbers.anew(model.z, model.terms)
         model, noise = self.fitter.settle(model, noise, 2, 60)
-        self.accepted = model.terms
         self.effect_columns = self._effect_columns(model)
         self.race = None
         return model, noise, model.z
-
-    def _nuisance_columns(self, z: Floats) -> None:
-        now = self._shifted(z)
-        self.rig.keep(now)
-        base = self.rig.run(now)
-        worlds = [self._shifted(z + step * (np.arange(len(z)) == k)) for k, step in enumerate(self.steps)]
-        tracks = track_columns(self.rig, self.frame, base, worlds, self.steps.tolist())
-        self._both_ways(tracks, base, z)
-        self.fitter = Fitter(self.rig, self.frame, self.base_world, self.nuisances, tracks)
-
-    def _both_ways(self, tracks: Tracks, base: Stack, z: Floats) -> None:
-        """Sensitivities to what acts from step to step, which has a kink at each: their mean of both sides."""
-        for k, nuisance in enumerate(self.nuisances):
-            if nuisance.name in _KINKED:
-                back = self._shifted(z - self.steps[k] * (np.arange(len(z)) == k))
-                other = track_columns(self.rig, self.frame, base, [back], [-float(self.steps[k])])
-                for name, columns in tracks.items():
-                    columns[:, k] = 0.5 * (columns[:, k] + other[name][:, 0])
-
-    def _shifted(self, z: Floats) -> World:
-        """The car with what is accepted, and its numbers ``z`` off."""
-        world = self.base_world.shifted(self.nuisances, z)
-        for term in self.accepted:
-            world = with_term(world, term)
-        return world
 
     def _effect_columns(self, model: Model) -> Tracks:
         world = self.fitter.world(model.z, model.terms)
