@@ -1,4 +1,4 @@
-"""``brakebench perf NAME``: how fast we are, beside a peer or a limit measured in the same run."""
+"""``brakebench perf NAME``: how fast and how right we are, beside a peer or a limit measured in the same run."""
 
 import argparse
 import importlib
@@ -7,13 +7,13 @@ from dataclasses import asdict
 
 from hil.cli.options import add_json
 
-MEASUREMENTS = ("rt", "plant", "ecu", "codec", "loop")
+MEASUREMENTS = ("rt", "plant", "ecu", "codec", "loop", "explain")
 """Each is a module of hil.perf with ``measure() -> list[Row]``."""
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = subparsers.add_parser("perf", help="measure speed beside a peer or a limit, as ratios of one run")
+    parser = subparsers.add_parser("perf", help="measure beside a peer or a limit, as ratios of one run")
     parser.add_argument("name", choices=MEASUREMENTS, help="what to measure")
     add_json(parser)
     parser.set_defaults(run=run)

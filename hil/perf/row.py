@@ -1,4 +1,4 @@
-"""One line of a comparison of speed, and how two sides are timed so that the ratio holds on a noisy machine."""
+"""One line of a comparison, and how two sides are timed so that the ratio holds on a noisy machine."""
 
 import statistics
 from collections.abc import Callable

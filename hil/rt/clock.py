@@ -12,6 +12,9 @@ wall_time_ns = time.time_ns
 cpu_time_ns = time.thread_time_ns
 """Processor time of this thread, ns: for comparisons of speed on a machine that others use too."""
 
+process_cpu_time_ns = time.process_time_ns
+"""Processor time of this process, all its threads, ns: the same, for work that is shared out over threads."""
+
 
 class Clock(Protocol):
     """What a loop needs to know of time."""
