@@ -38,6 +38,15 @@ def odds(contender: Contender) -> float:
     return contender.cost - 2.0 * contender.evidence
 
 
+def worth(contender: Contender) -> float:
+    """Log of the odds for the cause against none, by what it explains beyond the model's own error.
+
+    A number that data tell a thousand times better than its usual size has to explain more before a trace of it is
+    believed (Lindley 1957, Biometrika 44, 187).
+    """
+    return 0.5 * contender.gained + contender.evidence
+
+
 class Contest:
     """One place for a cause in a model.
 

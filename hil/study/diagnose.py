@@ -7,7 +7,7 @@ import numpy as np
 
 from hil.study.basis import LAWS, Piece
 from hil.study.candidates import Candidate, Column, candidates, columns
-from hil.study.contest import Contender, Contest, odds
+from hil.study.contest import Contender, Contest, odds, worth
 from hil.study.fit import Fitter, Model, Term, Tracks
 from hil.study.linear import Sums, project, track_columns
 from hil.study.noise import Frame, Noise
@@ -32,6 +32,8 @@ _FORM = 0.2
 """Share of a cause that its equation may get wrong: what it leaves is no other cause."""
 _CLEARER = 5.0
 """By how much more than the best listed cause a law in no list must explain, log of the odds."""
+_DATED = 2
+"""Contenders for which it is asked when they begin before they are compared."""
 _LAWS_BESIDE = 4
 """Laws that are looked at with noise of their own."""
 _HOPELESS = 0.1
@@ -227,12 +229,13 @@ class _Search:
         left_over = _FORM**2 * found.explained
         self.say(f"fitting {len(top)} leaders")
         fitted = contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
+        fitted = self._since_when(fitted)
         tighter = min(fitted, key=odds).noise
         reference = min(self.fitter.fit(model, tighter, 3).cost, contest.reference)
         if not model.terms:
             reference = min(reference, self.fitter.cost(found.base.residual, found.base.z, tighter))
         fitted = [self._gained(c, item, reference - left_over) for c, item in zip(fitted, top, strict=True)]
-        clear = sorted((c for c in fitted if c.gained >= found.least_gain), key=odds)
+        clear = sorted((c for c in fitted if c.gained >= found.least_gain and worth(c) > 0.0), key=odds)
         law = self._unlisted(found, contest, model, tighter, reference, min(fitted, key=odds))
         if law is not None:
             polished, tighter = self.fitter.settle(law.model, law.noise, 1, 60)
@@ -256,6 +259,18 @@ class _Search:
         rest = sorted((c for c in fitted if c is not best and (c in clear or odds(c) >= odds(best))), key=odds)
         first = replace(best, model=polished, term=polished.terms[-1])
         return polished, tighter, [first, *rest]
+
+    def _since_when(self, fitted: list[Contender]) -> list[Contender]:
+        """The best with the time they begin at: a law by time would explain more than a cause that was always there."""
+        best = sorted(fitted, key=odds)[:_DATED]
+        dated = {id(one): with_onsets(self.fitter, one.model, one.noise) for one in best}
+        found = []
+        for one in fitted:
+            model = dated.get(id(one), one.model)
+            found.append(
+                one if model is one.model else replace(one, model=model, term=model.terms[-1], cost=model.cost)
+            )
+        return found
 
     def _unlisted(
         self, found: Diagnosis, contest: Contest, model: Model, noise: Noise, reference: float, listed: Contender

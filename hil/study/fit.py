@@ -15,7 +15,13 @@ from hil.study.world import World
 
 Tracks = dict[str, Floats]
 _LARGEST_STEP = 8.0
-_DAMPING = (0.0, 0.1, 1.0, 10.0)
+_ATTEMPTS = ((False, 0.0), (True, 0.0), (True, 0.1), (True, 1.0), (True, 10.0))
+"""Ways to make a step, in turn until one improves: whether limits stay where they are, and the damping."""
+_LIMITS = (
+    "battery_charge_power_w", "motor_peak_torque_nm", "motor_rate_limit_nm_s", "motor_fade_start_mps",
+    "motor_fade_end_mps", "ehb_build_rate_pa_s", "ehb_release_rate_pa_s",
+)  # fmt: skip
+"""Numbers that matter on one side alone: a limit that is not met, moved a little too far, spoils any step."""
 _DIVERGED = 1e15
 _WORTH = 1.0
 """A step that takes less off the cost is the last."""
@@ -67,6 +73,7 @@ class Fitter:
         self.nuisances, self.nuisance_columns = tuple(nuisances), nuisance_columns
         self.farthest = np.array([nuisance.farthest for nuisance in self.nuisances])
         self.lowest = np.where([nuisance.kind == "held" for nuisance in self.nuisances], 0.0, -self.farthest)
+        self._limits = [k for k, nuisance in enumerate(self.nuisances) if nuisance.name in _LIMITS]
         self.radius = float(rig.vehicle.parameters.wheel.rolling_radius_m)
         self._measured = rig.measured()
         self._white_for: Noise | None = None
@@ -141,8 +148,8 @@ class Fitter:
 
     def _step(self, model: Model, own: Tracks, noise: Noise) -> Model | None:
         total = self._total(model, own, noise)
-        for damping in _DAMPING:
-            z, terms, covariance, foretold = self._moved(model, total, damping)
+        for hold, damping in _ATTEMPTS:
+            z, terms, covariance, foretold = self._moved(model, total, hold, damping)
             if foretold < _WORTH:
                 break
             moved = self.at(z, terms, noise)
@@ -151,16 +158,18 @@ class Fitter:
         return replace(model, covariance=covariance) if model.terms and not model.covariance.size else None
 
     def _moved(
-        self, model: Model, total: Floats, damping: float = 0.0
+        self, model: Model, total: Floats, hold: bool = False, damping: float = 0.0
     ) -> tuple[Floats, tuple[Term, ...], Floats, float]:
         """Nuisances and effects after a step, no farther than each may go, covariance of the effects, and what the step
-        takes off the cost if the model is linear."""
+        takes off the cost if the model is linear; limits stay where they are if told to ``hold``."""
         count, values = len(self.nuisances), np.array(model.values())
         ends = [(term.candidate.parameter.low, term.candidate.parameter.high) for term in model.terms]
         least, most = np.array(ends).reshape(-1, 2).T
         low = np.concatenate((np.maximum(self.lowest - model.z, -_LARGEST_STEP), least - values))
         high = np.concatenate((np.minimum(self.farthest - model.z, _LARGEST_STEP), most - values))
         low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
+        if hold:
+            low[self._limits] = high[self._limits] = 0.0
         free = range(len(values))
         change, covariance, foretold = solve_within(total, count, free, model.z, low, high, damping)
         terms = tuple(

@@ -13,7 +13,8 @@ from hil.study.prepare import ROW_S
 from hil.study.table import Floats
 
 _ALPHA = 0.003
-_TIMES, _ROUNDS = 7, 3
+_COARSE_S, _FINER, _MOST_TIMES = 0.25, (0.05, 0.01), 80
+"""Steps of the time, s: what begins at once sets hubs swinging, so that only the neighbourhood of the truth fits."""
 _LEAST_BEFORE = 3.0
 """Standard deviations that the cause would have shown before it begins, had it been there."""
 
@@ -37,24 +38,28 @@ def _later(fitter: Fitter, model: Model, noise: Noise, k: int) -> Model | None:
     (drive, before), (same, after) = segments[block - 1], segments[block]
     low, high = before.first, after.last if same == drive else before.last
     value = float(np.clip(b[block:].sum() / q[block:].sum(), *_bounds(model.terms[k])))
-    best: Model | None = None
-    from_s, to_s = low * ROW_S, high * ROW_S
-    for _ in range(_ROUNDS):
-        times = np.linspace(from_s, to_s, _TIMES)
-        tried = [_begun(fitter, model, noise, k, value, drive, float(t)) for t in times]
+    fitter.rig.keep(fitter.world(model.z, _since(model, k, value, drive, low * ROW_S)))
+    times, seen = np.linspace(low * ROW_S, high * ROW_S, _most(high - low)), list[Model]()
+    for finer in (*_FINER, None):
+        tried = [fitter.at(model.z, _since(model, k, value, drive, float(t)), noise) for t in times]
         at = int(np.argmin([one.cost for one in tried]))
-        best = tried[at] if best is None or tried[at].cost < best.cost else best
-        from_s, to_s = float(times[max(at - 1, 0)]), float(times[min(at + 1, _TIMES - 1)])
-    assert best is not None  # there was a round
-    fitted = fitter.fit(best, noise, 3)
+        seen.append(tried[at])
+        if finer is not None:
+            beside = float(times[1] - times[0])
+            times = np.arange(max(times[at] - beside, 0.0), times[at] + beside, finer)
+    fitted = fitter.fit(min(seen, key=lambda one: one.cost), noise, 3)
     return fitted if model.cost - fitted.cost > least else None
 
 
-def _begun(
-    fitter: Fitter, model: Model, noise: Noise, k: int, value: float, drive: int, since_s: float
-) -> Model:  # fmt: skip
+def _since(model: Model, k: int, value: float, drive: int, since_s: float) -> tuple[Term, ...]:
+    """The terms of the model, one of them with another value, from a time on."""
     changed = replace(model.terms[k], value=value, onset=(drive, since_s))
-    return fitter.at(model.z, (*model.terms[:k], changed, *model.terms[k + 1 :]), noise)
+    return (*model.terms[:k], changed, *model.terms[k + 1 :])
+
+
+def _most(rows: int) -> int:
+    """How many times are tried at first."""
+    return int(np.clip(rows * ROW_S / _COARSE_S, 2, _MOST_TIMES)) + 1
 
 
 def _by_manoeuvre(fitter: Fitter, model: Model, noise: Noise, k: int) -> tuple[Floats, Floats]:

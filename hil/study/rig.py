@@ -257,7 +257,7 @@ class Rig:
         """Raw channels of one drive; from what was kept where the worlds cannot differ."""
         if self._kept is None:
             return self._replayed(drive, world, self._columns)[0]
-        needed, kept = apart(world, self._kept[0]), self._kept[1][drive.number]
+        needed, kept = apart(world, self._kept[0], drive), self._kept[1][drive.number]
         differs = [bool(needed & going_on) for going_on in self._going_on[drive.number]]
         return self._replayed(drive, world, self._columns, kept, differs)[0] if any(differs) else kept.table
 

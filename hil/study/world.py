@@ -95,11 +95,10 @@ def _along(theta: Floats, direction: int) -> Floats:
     return turned
 
 
-def apart(one: World, other: World) -> Acting:
-    """What must be going on for two worlds to move differently."""
-    if one.onsets != other.onsets:
-        return Acting.DRIVING
-    found = acting.of_effects(one.theta, other.theta) | acting.of_terms(one.terms, other.terms)
+def apart(one: World, other: World, drive: Drive) -> Acting:
+    """What must be going on in a drive for two worlds to move differently in it."""
+    thetas = (one.theta_in(drive), other.theta_in(drive)) if one.onsets or other.onsets else (one.theta, other.theta)
+    found = acting.of_effects(*thetas) | acting.of_terms(one.terms, other.terms)
     if one.p is not other.p:
         found |= acting.of_parameters(one.p, other.p)
     if one.disc_offset_k != other.disc_offset_k:
