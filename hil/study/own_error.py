@@ -16,6 +16,10 @@ from hil.study.candidates import Candidate
 
 USUAL = 1.5
 """Where nothing was measured."""
+UNSURE, FEW = 2.0, 2.5
+"""Beyond this ratio an estimate is off by the model more than by noise, and by how much is known from twelve drives:
+the quantile asked for is Student's of twelve degrees of freedom, whose square is so much larger than the normal one's
+at 2.5e-5."""
 UNLISTED = "unlisted"
 """Name of all laws in no list."""
 
@@ -38,4 +42,5 @@ def variance_of_law(name: str) -> float:
 
 
 def _variance(effect: str, number: str) -> float:
-    return max(float(_table().get(effect, {}).get(number, USUAL)), 1.0) ** 2
+    ratio = max(float(_table().get(effect, {}).get(number, USUAL)), 1.0)
+    return ratio**2 * (FEW if ratio > UNSURE else 1.0)
