@@ -1,7 +1,7 @@
 """What the rivals of `explain` are given: the residual of the car as handed in and one signature an effect."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -56,11 +56,7 @@ def problem(logs: Sequence[Path], vehicle: Path) -> Problem:
     apart = {group: (values - simulated[group])[:, :, None] for group, values in rig.measured().items()}
     residual = tracks_of(apart, frame, radius_m)
     of = columns(car.untold)
-    worlds = []
-    for column in of:
-        theta = base.theta.copy()
-        theta[column.at] += column.step
-        worlds.append(replace(base, theta=theta))
+    worlds = [column.stepped(base) for column in of]
     signatures = track_columns(rig, frame, simulated, worlds, [column.step for column in of])
     noise = first_guess(residual, frame, enabled=False)
     weights = {name: known / noise.tracks[name].a for name, known in frame.present.items()}

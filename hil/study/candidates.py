@@ -45,6 +45,12 @@ class Column:
         share = _SHARES.get(self.effect.name, _SHARE)
         return self.parameter.typical * share if self.parameter.typical else 0.3 * share * self.parameter.high
 
+    def stepped(self, world: World) -> World:
+        """The world with the number one step off."""
+        theta: Floats = world.theta.copy()
+        theta[self.at] += self.step
+        return replace(world, theta=theta)
+
 
 @dataclass(frozen=True, eq=False)
 class Candidate:

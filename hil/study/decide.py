@@ -272,11 +272,7 @@ def _products(name: str, items: Sequence[Candidate], both_ways: bool) -> Floats:
     """Products of the whitened signatures of the items, (items, items)."""
     ground, of = _ground(name, both_ways), _all()[0]
     needed = sorted({k for candidate in items for k in candidate.columns})
-    worlds = []
-    for k in needed:
-        theta = ground.world.theta.copy()
-        theta[of[k].at] += of[k].step
-        worlds.append(replace(ground.world, theta=theta))
+    worlds = [of[k].stepped(ground.world) for k in needed]
     tracks = track_columns(ground.rig, ground.frame, ground.base, worlds, [of[k].step for k in needed])
     nothing = {track: np.zeros((len(values), 1)) for track, values in tracks.items()}
     q = project(sums(nothing, tracks, ground.frame, ground.noise, 0).total(), 0).q

@@ -61,8 +61,10 @@ def causes_in(model: Model) -> int:
 class Diagnosis:
     """Everything the diagnosis found.
 
-    ``base`` explains with nuisances alone, ``final`` with the accepted causes, which take ``explained`` off
-    chi-squared; ``contenders`` has, for each term of ``final``, all that were fitted in its place, best first.
+    ``base`` explains with nuisances alone; around ``start`` causes are looked for, the same unless something had bent
+    its numbers (``screened`` and ``sums`` are taken there). ``final`` explains with the accepted causes, which take
+    ``explained`` off chi-squared; ``contenders`` has, for each term of ``final``, all that were fitted in its place,
+    best first.
     """
 
     case: Case
@@ -72,6 +74,7 @@ class Diagnosis:
     first_noise: Noise
     nominal: Model
     base: Model
+    start: Model
     final: Model
     contenders: list[list[Contender]] = field(default_factory=list)
     screened: list[Score] = field(default_factory=list)
@@ -118,8 +121,9 @@ class _Search:
         nominal, noise = self.fitter.start(self.settings.noise_model)
         self.say("noise, and the vehicle's numbers within their tolerance")
         model, quieter = self.numbers.fitted(nominal, noise)
-        found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, quieter, quieter, nominal, model, model)
+        found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, quieter, quieter, nominal, model, model, model)
         model, noise = self._unbent(found, noise)
+        found.start = model
         self.say(f"sensitivities of {len(self.candidates)} candidates")
         self.effect_columns = self._effect_columns(model)
         sums = self.fitter.screen(model, self.effect_columns, noise)
@@ -192,11 +196,7 @@ class _Search:
         world = self.fitter.world(model.z, model.terms)
         base = model.stack
         self.rig.keep(world)
-        worlds = []
-        for column in self.columns:
-            theta = world.theta.copy()
-            theta[column.at] += column.step
-            worlds.append(replace(world, theta=theta))
+        worlds = [column.stepped(world) for column in self.columns]
         return track_columns(self.rig, self.frame, base, worlds, [column.step for column in self.columns])
 
     def _scores(self, sums: Sums, model: Model) -> list[Score]:

@@ -148,7 +148,7 @@ class Fitter:
 
     def _step(self, model: Model, own: Tracks, noise: Noise) -> Model | None:
         total = self._total(model, own, noise)
-        for hold, damping in _ATTEMPTS:
+        for hold, damping in _ATTEMPTS if self._limits else _ATTEMPTS[1:]:
             z, terms, covariance, foretold = self._moved(model, total, hold, damping)
             if foretold < _WORTH:
                 break
@@ -188,11 +188,11 @@ class Fitter:
         if float(change @ change) < _FOLLOWED**2 or squared <= 0.0:
             return
         share = (scaled / squared).astype(np.float32)
-        worth = [new - old for new, old in zip(after.values(), before.values(), strict=True)]
+        stepped = [new - old for new, old in zip(after.values(), before.values(), strict=True)]
         for name, columns in self.nuisance_columns.items():
             moved = (before.residual[name][:, 0] - after.residual[name][:, 0]).astype(np.float32)
             if own:
-                moved -= own[name].astype(np.float32) @ np.array(worth, np.float32)
+                moved -= own[name].astype(np.float32) @ np.array(stepped, np.float32)
             columns += np.outer(moved - columns @ change.astype(np.float32), share)
         self._white_for = None
 

@@ -39,7 +39,8 @@ def _later(fitter: Fitter, model: Model, noise: Noise, k: int) -> Model | None:
     low, high = before.first, after.last if same == drive else before.last
     value = float(np.clip(b[block:].sum() / q[block:].sum(), *_bounds(model.terms[k])))
     fitter.rig.keep(fitter.world(model.z, _since(model, k, value, drive, low * ROW_S)))
-    times, seen = np.linspace(low * ROW_S, high * ROW_S, _most(high - low)), list[Model]()
+    times = np.linspace(low * ROW_S, high * ROW_S, _most(high - low))
+    seen: list[Model] = []
     for finer in (*_FINER, None):
         tried = [fitter.at(model.z, _since(model, k, value, drive, float(t)), noise) for t in times]
         at = int(np.argmin([one.cost for one in tried]))
