@@ -31,6 +31,7 @@ Vector = NDArray[np.float64]
 STEP_S = 1e-3
 _NOTHING = np.empty(0, dtype=np.int64)
 _NO_ROWS = np.empty((1, 0))
+_ONE_BY_ONE = np.ones(1, dtype=np.int64)
 NEUTRAL = THETA.neutral()
 
 
@@ -70,19 +71,27 @@ def initial_state(
 
 
 @section
-def delay_demand(x: Vector, u: Vector, dead_time_s: float, step_s: float, delayed: Vector) -> None:
-    """Put the pressure demand into the delay line and write the demand of a dead time ago into ``delayed``."""
-    newest = int(x[X.delay_index])
-    newest = newest + 1 if newest + 1 < DELAY_SLOTS else 0
-    x[X.delay_index] = newest
+def delay_demand(
+    x: Vector, u: Vector, dead_time_s: float, step_s: float, at_once: int, delayed: Vector
+) -> None:  # fmt: skip
+    """Put the pressure demand into the delay line and write the demand of a dead time ago into ``delayed``.
+
+    For so many steps ``at_once``: the mean over them.
+    """
     back = min(dead_time_s / step_s, DELAY_SLOTS - 2.0)
     whole = int(back)
     part = back - whole
-    late, later = (newest - whole) % DELAY_SLOTS, (newest - whole - 1) % DELAY_SLOTS
+    newest = int(x[X.delay_index])
     for i in range(4):
-        line = X.delayed_demand_pa + i * DELAY_SLOTS
-        x[line + newest] = u[U.pressure_demand_pa + i]
-        delayed[U.pressure_demand_pa + i] = (1.0 - part) * x[line + late] + part * x[line + later]
+        delayed[U.pressure_demand_pa + i] = 0.0
+    for _ in range(at_once):
+        newest = newest + 1 if newest + 1 < DELAY_SLOTS else 0
+        late, later = (newest - whole) % DELAY_SLOTS, (newest - whole - 1) % DELAY_SLOTS
+        for i in range(4):
+            line = X.delayed_demand_pa + i * DELAY_SLOTS
+            x[line + newest] = u[U.pressure_demand_pa + i]
+            delayed[U.pressure_demand_pa + i] += ((1.0 - part) * x[line + late] + part * x[line + later]) / at_once
+    x[X.delay_index] = newest
 
 
 @section
@@ -100,16 +109,19 @@ def count_teeth(x: Vector, before: Vector, step_s: float, pitch_rad: float) -> N
 @entry
 def simulate(
     x: Vector, inputs: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, step_s: float, steps: int,
-    method: int, columns: NDArray[np.int64], table: Vector, y: Vector, theta: Vector, terms: Vector, plugins: Vector,
+    at_once: NDArray[np.int64], method: int, columns: NDArray[np.int64], table: Vector, y: Vector, theta: Vector,
+    terms: Vector, plugins: Vector,
 ) -> None:  # fmt: skip
     """Run the car through rows of inputs; the only compiled entry point.
 
     Parameters
     ----------
     x : state (``STATE``), advanced in place.  inputs : one ``INPUT`` a row, each ``steps`` steps long. Demands hold
-        within a row; steering and measured values go linearly towards the next row.
+        within a row; steering and measured values go linearly towards the next row, torque of the motors by what
+        ``motor_torque_bend_nm`` in its middle adds to that in a parabola.
     cut, switch, p : vectors ``CUT``, ``SWITCH``, ``PARAMETER``.  road : rows of `plant.road.road_table`.
-    step_s : s.  method : `plant.integrate.SEMI_IMPLICIT`, `RUNGE_KUTTA_4` or `EXPONENTIAL_4`.
+    step_s : s.  at_once : how many of its steps each row may make as one, (rows,).
+    method : `plant.integrate.SEMI_IMPLICIT`, `RUNGE_KUTTA_4` or `EXPONENTIAL_4`.
     columns : what to note at the start of each row, as indices into the state followed by the outputs.
     table : the notes, shape (rows, columns), written.  y : outputs (``OUTPUT``) at the end, written.
     theta : numbers of all effects (`plant.effects.theta`); onsets act from row to row.
@@ -132,21 +144,28 @@ def simulate(
                 derivative(x, now, cut, switch, q, road, y)
             for k in range(columns.size):
                 table[row, k] = x[columns[k]] if columns[k] < x.size else y[columns[k] - x.size]
-        for step in range(steps):
-            share = (step + 0.5) / steps
+        step = 0
+        while step < steps:
+            together = min(at_once[row], steps - step)
+            long_s = together * step_s
+            share, width = (step + 0.5 * together) / steps, together / steps
             for i in range(U.steering_wheel_rad, now.size):
                 now[i] = inputs[row, i] + share * (inputs[following, i] - inputs[row, i])
-            delay_demand(x, inputs[row], q[P.ehb_dead_time_s], step_s, now)
+            for i in range(4):  # mean of the parabola over the step
+                bend = 4.0 * (share * (1.0 - share) - width * width / 12.0)
+                now[U.motor_torque_nm + i] += bend * inputs[row, U.motor_torque_bend_nm + i]
+            delay_demand(x, inputs[row], q[P.ehb_dead_time_s], step_s, together, now)
             for i in range(4):
                 angles[i] = x[X.wheel_angle_rad + i]
             if method == SEMI_IMPLICIT:
-                semi_implicit_step(x, now, cut, switch, q, road, step_s, y)
+                semi_implicit_step(x, now, cut, switch, q, road, long_s, y)
             elif method == EXPONENTIAL_4:
-                exponential_step(x, now, cut, switch, q, road, step_s, work, y)
+                exponential_step(x, now, cut, switch, q, road, long_s, work, y)
             else:
-                runge_kutta_step(x, now, cut, switch, q, road, step_s, work, y)
-            x[X.time_s] += step_s
-            count_teeth(x, angles, step_s, 2.0 * pi / p[P.sensor_teeth])
+                runge_kutta_step(x, now, cut, switch, q, road, long_s, work, y)
+            x[X.time_s] += long_s
+            count_teeth(x, angles, long_s, 2.0 * pi / p[P.sensor_teeth])
+            step += together
     derivative(x, now, cut, switch, q, road, y)
 
 
@@ -160,8 +179,9 @@ def advance(
     ``steps`` 0 only evaluates the outputs. The vectors are those of `simulate`, ``u`` one ``INPUT``.
     """
     simulate(
-        x, u.reshape(1, -1), cut, switch, p, road, step_s, steps, method, _NOTHING, _NO_ROWS, y, theta, terms, plugins
-    )
+        x, u.reshape(1, -1), cut, switch, p, road, step_s, steps, _ONE_BY_ONE, method, _NOTHING, _NO_ROWS, y, theta,
+        terms, plugins,
+    )  # fmt: skip
 
 
 def column_indices(names: Sequence[str]) -> NDArray[np.int64]:
@@ -214,12 +234,12 @@ def replay(
     cut = CUT.zeros() if cut is None else cut
     switch = healthy() if switch is None else switch
     road = road_table(DRY) if road is None else road
-    indices = column_indices(columns)
+    indices, at_once = column_indices(columns), np.ones(len(rows), np.int64)
     table = np.empty((len(cars), len(rows), len(indices)))
 
     def one(k: int) -> None:  # copies, because for read-only vectors the model would be compiled once more
         simulate(
-            starts[k].copy(), rows, cut, switch, cars[k].copy(), road, step_s, steps, method, indices,
+            starts[k].copy(), rows, cut, switch, cars[k].copy(), road, step_s, steps, at_once, method, indices,
             table[k], OUTPUT.zeros(), thetas[k].copy(), terms, plugins,
         )  # fmt: skip
 

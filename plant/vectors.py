@@ -61,6 +61,7 @@ INPUTS = {
     "wheel_torque_nm": 4,
     "longitudinal_force_n": 4,
     "wheel_speed_rad_s": 4,
+    "motor_torque_bend_nm": 4,  # in the middle of a row, beyond the straight line to the next
 }
 CUTS = {"pressure": 4, "motor_torque": 4, "wheel_torque": 4, "force": 4, "motor_speed": 4}
 CUT_PARTS = len(CUTS)

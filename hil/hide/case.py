@@ -20,6 +20,16 @@ from hil.hide.strengths import ROWS, E
 
 Vector = NDArray[np.float64]
 Table = Mapping[str, Vector]
+NUMBERS = {
+    "mass_offset": ("mass_kg", False), "rotating_inertia": ("wheel_inertia_kg_m2", False),
+    "cog_height": ("cog_height_m", False), "threshold": ("threshold_pressure_pa", False),
+    "ehb_dead_time": ("ehb_dead_time_s", False), "motor_tau": ("motor_time_constant_s", False),
+    "rolling_resistance": ("rolling_resistance", True), "pitch_dive": ("dive_rad_s2_m", True),
+    "slip_stiffness": ("slip_stiffness", True), "tyre_relaxation": ("relaxation_length_m", True),
+    "mu_road": ("tyre_friction", True), "ehb_bandwidth": ("ehb_frequency_hz", True),
+    "battery_soc": ("battery_charge_power_w", True),
+}  # fmt: skip
+"""Effects that a number of the car is, where they act on all of it: added to it, or a share of the nominal one."""
 CALIBRATION_ROUNDS, CALIBRATED, REACHED = 8, 0.03, 0.15
 
 
@@ -143,7 +153,23 @@ def expected_snr(case: Case) -> tuple[float, float]:
 
 def _snr(case: Case, base: Sequence[Table], imitations: Vector) -> tuple[float, float]:
     apart = difference(logs(case, clean=True), base)
-    return signal_to_noise(whitened(apart, base, case.noise), imitations)
+    beside, alone = signal_to_noise(whitened(apart, base, case.noise), imitations)
+    return min(beside, as_number(case)), alone
+
+
+def as_number(case: Case) -> float:
+    """How many standard deviations a number of the car would have to be off to be what is hidden; inf: none can.
+
+    No signal stands out more, however it looks: off by so much, the number imitates it exactly, at that cost in its
+    tolerance. Signatures of one standard deviation do not tell: wheels that swing on their tyres are soon out of phase.
+    """
+    if len(case.hidden) != 1 or case.hidden[0].onset_s is not None or case.hidden[0].wheel != "car":
+        return float("inf")
+    name, of_nominal = NUMBERS.get(case.hidden[0].effect, ("", False))
+    if not name:
+        return float("inf")
+    off = case.hidden[0].magnitude * (getattr(NOMINAL, name) if of_nominal else 1.0)
+    return float(abs(off) / (0.5 * TOLERANCE[name]))
 
 
 def _imitations(case: Case) -> Vector:

@@ -118,13 +118,14 @@ def _integrate(
             late = now + sub * STEP_S
             for i in range(4):
                 demand_pa[i] = _delayed(pressure_demand, i, late - car.ehb_dead_time_s - e[E.ehb_dead_time, i])
+            turned = steering[tick] + (sub + 0.5) / PER_TICK * (steering[min(tick + 1, ticks - 1)] - steering[tick])
             for stage in range(4):
                 share = (0.0, 0.5, 0.5, 1.0)[stage] * STEP_S
                 before = stages[max(stage - 1, 0)]
                 for k in range(STATES):
                     trial[k] = x[k] + share * before[k]
                 rates(
-                    trial, demand_pa, motor_demand[tick], steering[tick], gust[tick, 0], gust[tick, 1],
+                    trial, demand_pa, motor_demand[tick], turned, gust[tick, 0], gust[tick, 1],
                     direction, car, e, law, play, since, stages[stage], y,
                 )  # fmt: skip
                 if stage == 0:

@@ -72,7 +72,9 @@ class Fitter:
         self.rig, self.frame, self.base = rig, frame, base
         self.nuisances, self.nuisance_columns = tuple(nuisances), nuisance_columns
         self.farthest = np.array([nuisance.farthest for nuisance in self.nuisances])
-        self.lowest = np.where([nuisance.kind == "held" for nuisance in self.nuisances], 0.0, -self.farthest)
+        self.lowest = np.where(
+            [nuisance.kind in ("held", "window") for nuisance in self.nuisances], 0.0, -self.farthest
+        )
         self._limits = [k for k, nuisance in enumerate(self.nuisances) if nuisance.name in _LIMITS]
         self.radius = float(rig.vehicle.parameters.wheel.rolling_radius_m)
         self._measured = rig.measured()

@@ -2,28 +2,24 @@
 
 import numpy as np
 
-from hil.study.compiled import compiled
+from hil.study.between import between, straight_between
 from hil.study.prepare import ROW_S
 from hil.study.table import Floats
 from plant.vectors import INPUT
 
+_MEASURED = (("pressure_pa", 1), ("motor_torque_nm", 2), ("motor_torque_bend_nm", 2))
+_STEERING = INPUT.slice("steering_wheel_rad")
 
-def later(values: Floats, rows: float | Floats) -> Floats:
-    """Channels as seen some rows later, straight lines between rows; ``rows`` for all, or for each value."""
-    out = np.empty_like(values)
-    _later(values, np.broadcast_to(np.asarray(rows, np.float64), values.shape), out)
+
+def later(values: Floats, rows: float | Floats, straight: bool = False) -> Floats:
+    """Channels as seen some rows later; ``rows`` for all, or for each value.
+
+    ``straight`` lines between rows for what has corners, as a motor at its rate limit; else `hil.study.between`.
+    """
+    out = np.empty(values.shape)
+    at = np.arange(len(values), dtype=np.float64)[:, None] - np.broadcast_to(rows, values.shape)
+    (straight_between if straight else between)(values, at, out)
     return out
-
-
-@compiled
-def _later(values: Floats, rows: Floats, out: Floats) -> None:
-    last = values.shape[0] - 1
-    for t in range(values.shape[0]):
-        for k in range(values.shape[1]):
-            at = min(max(t - rows[t, k], 0.0), float(last))
-            before = int(at)
-            first = values[before, k]
-            out[t, k] = first + (at - before) * (values[min(before + 1, last), k] - first)
 
 
 def _held_later(values: Floats, rows: float) -> Floats:
@@ -42,10 +38,11 @@ def in_time(inputs: Floats, late_s: tuple[float, ...]) -> Floats:
     if not any(late_s[1:]):
         return inputs
     moved = inputs.copy()
+    moved[:, _STEERING] = later(inputs[:, _STEERING], late_s[4] / ROW_S)
     for part in ("pressure_demand_pa", "motor_demand_nm"):
         where = INPUT.slice(part)
         moved[:, where] = _held_later(inputs[:, where], late_s[3] / ROW_S)
-    for part, late in (("pressure_pa", late_s[1]), ("motor_torque_nm", late_s[2])):
+    for part, late in _MEASURED:
         where = INPUT.slice(part)
-        moved[:, where] = later(inputs[:, where], -late / ROW_S)
+        moved[:, where] = later(inputs[:, where], -late_s[late] / ROW_S, straight=True)
     return moved

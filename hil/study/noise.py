@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import minimize
 
-from hil.study.prepare import Case
+from hil.study.prepare import SINGLES, Case
 from hil.study.table import Floats
 from hil.study.whiten import coloured, moving
 
@@ -54,7 +54,10 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What does not change with the residual: masks, starts, speeds, per sample of all drives."""
+    """What does not change with the residual: masks, starts, speeds, per sample of all drives.
+
+    ``waited`` is the variance of each track that comes of frames that wait for the bus: its slope times their time.
+    """
 
     fresh: Floats
     restart: Floats
@@ -64,6 +67,7 @@ class Frame:
     sample_s: float
     present: Mapping[str, Floats]
     names: tuple[str, ...]
+    waited: Mapping[str, Floats] = field(default_factory=dict)
 
     @classmethod
     def of(cls, case: Case) -> "Frame":
@@ -93,13 +97,32 @@ class Frame:
         return cls(
             np.concatenate(fresh), np.concatenate(restart), np.concatenate([d.moving for d in case.drives]) * 1.0,
             np.concatenate([d.speed_mps for d in case.drives]), case.blocks(), case.sample_s, present, tuple(present),
+            _waited(case),
         )  # fmt: skip
+
+
+def _waited(case: Case) -> dict[str, Floats]:
+    """Variance by waiting of all tracks but the wheels', whose stamps are the log's; two rows a sample wait apart."""
+    found: dict[str, list[Floats]] = {}
+    for drive in case.drives:
+        if drive.samples < 2:
+            return {}
+        for group, values in drive.measured.items():
+            if group in ("wheel", "gps"):
+                continue
+            slopes = np.nan_to_num(np.gradient(values, case.sample_s, axis=0)) * drive.wait_s / drive.stride**0.5
+            if group in SINGLES:
+                found.setdefault(group, []).append(slopes[:, 0] ** 2)
+                continue
+            for mode, weights in zip(MODE_NAMES, MODES, strict=True):
+                found.setdefault(f"{group}.{mode}", []).append((slopes @ weights) ** 2)
+    return {name: np.concatenate(parts) for name, parts in found.items()}
 
 
 def _known(group: str, values: Floats, moving_now: Floats, resting: Floats) -> dict[str, Floats]:
     """Tracks of a group and where they are compared."""
     finite = np.isfinite(values)
-    if group in ("ax", "ay", "yaw", "gps"):
+    if group in SINGLES:
         known = finite[:, 0] & (moving_now + (resting if group != "gps" else 0.0) > 0.5)
         return {group: known * 1.0}
     within = (moving_now > 0.5) if group == "wheel" else np.ones(len(values), bool)
@@ -113,7 +136,7 @@ def tracks_of(stack: Stack, frame: Frame, radius_m: float) -> dict[str, Floats]:
     """Residuals or sensitivities by track; wheel speeds as m/s. Arrays are (samples, channels, columns) by group."""
     found: dict[str, Floats] = {}
     for group, values in stack.items():
-        if group in ("ax", "ay", "yaw", "gps"):
+        if group in SINGLES:
             found[group] = values[:, 0]
             continue
         factor = radius_m if group == "wheel" else 1.0
@@ -142,8 +165,14 @@ def whiten(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> tuple[di
     return out, total
 
 
-def _white(track: Track, known: Floats, speed_mps: Floats) -> Floats:
-    return np.asarray(known * (track.a**2 + (track.b * speed_mps / _REFERENCE_MPS) ** 2))
+def _white(name: str, track: Track, frame: Frame) -> Floats:
+    """Variance of the white noise of a track, by sample; 0 where nothing is known."""
+    variance: float | Floats = track.a**2
+    if track.b:
+        variance = variance + (track.b * frame.speed_mps / _REFERENCE_MPS) ** 2
+    if name in frame.waited:
+        variance = variance + frame.waited[name]
+    return np.asarray(variance * frame.present[name])
 
 
 def _scale(name: str, frame: Frame, noise: Noise) -> Floats:
@@ -181,7 +210,7 @@ def _long(tracks: Mapping[str, Floats], frame: Frame, noise: Noise, columns: int
         if name in tracks:
             y[:, m] = tracks[name] / scale[:, None]
             likelihood -= float(np.log(scale) @ frame.present[name])
-            white[:, m] = _white(noise.tracks[name], frame.present[name], frame.speed_mps)
+            white[:, m] = _white(name, noise.tracks[name], frame)
     on = 1.0 if noise.enabled else 0.0
     colours = np.array([(_factor(tau, frame.sample_s), on * size**2 + 1e-12) for size, tau in noise.disturbances])
     out = np.empty_like(y)
@@ -193,7 +222,7 @@ def _long(tracks: Mapping[str, Floats], frame: Frame, noise: Noise, columns: int
 def _side(name: str, values: Floats, frame: Frame, noise: Noise) -> tuple[float, Floats]:
     scaled, value = _evened(name, values, frame, noise)
     out = np.empty_like(scaled)
-    return value + _filtered(noise.tracks[name], scaled, frame, frame.present[name], noise.enabled, out), out
+    return value + _filtered(name, noise.tracks[name], scaled, frame, noise.enabled, out), out
 
 
 def _evened(name: str, values: Floats, frame: Frame, noise: Noise) -> tuple[Floats, float]:
@@ -202,9 +231,9 @@ def _evened(name: str, values: Floats, frame: Frame, noise: Noise) -> tuple[Floa
     return np.ascontiguousarray(values / scale[:, None]), -float(np.log(scale) @ frame.present[name])
 
 
-def _filtered(track: Track, scaled: Floats, frame: Frame, known: Floats, enabled: bool, out: Floats) -> float:
+def _filtered(name: str, track: Track, scaled: Floats, frame: Frame, enabled: bool, out: Floats) -> float:
     """Innovations of an evened track into ``out``, and their log-likelihood."""
-    white = _white(track, known, frame.speed_mps) if track.b else track.a**2 * known
+    white = _white(name, track, frame)
     colour = track.c**2 if enabled else 0.0
     return float(coloured(scaled, frame.fresh, white, _factor(track.tau_s, frame.sample_s), colour + 1e-16, out))
 
@@ -241,7 +270,7 @@ def _estimate_side(name: str, values: Floats, frame: Frame, noise: Noise, budget
     by_speed = name.startswith("wheel")
 
     scaled, _ = _evened(name, values, frame, noise)
-    known, out = frame.present[name], np.empty_like(scaled)
+    out = np.empty_like(scaled)
 
     def built(z: Floats) -> Track:
         a, b, c, tau = (float(size) for size in np.exp(z))
@@ -249,7 +278,7 @@ def _estimate_side(name: str, values: Floats, frame: Frame, noise: Noise, budget
 
     def cost(z: Floats) -> float:
         beyond = np.clip(np.abs(z) - 16.0, 0.0, None)
-        return -_filtered(built(z), scaled, frame, known, noise.enabled, out) + 1e-3 * float(beyond @ beyond)
+        return -_filtered(name, built(z), scaled, frame, noise.enabled, out) + 1e-3 * float(beyond @ beyond)
 
     a = max(_differences(values[:, 0], frame.present[name]), floor)
     quiet = Track(a, 0.0, 3.0 * a, 0.5)

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from hil.study.between import at_places
 from hil.study.table import (
     MOTOR_DEMAND,
     MOTOR_TORQUE,
@@ -29,6 +30,8 @@ _TRACK = {
     "wheel": WHEEL_SPEED, "pressure": PRESSURE, "motor": MOTOR_TORQUE,
     "ax": ("ax_mps2",), "ay": ("ay_mps2",), "yaw": ("yaw_rate_rad_s",), "gps": ("speed_mps",),
 }  # fmt: skip
+MOTION = (*WHEEL_SPEED, "ax_mps2", "ay_mps2", "yaw_rate_rad_s")
+"""Channels that swing with wheel and tyre within a few samples, but have no corners."""
 SINGLES = ("ax", "ay", "yaw", "gps")
 FILTERED, FILTER_S = ("ax", "ay", "yaw"), 0.2
 """Channels whose simulated sensor has not seen what was before the log, and for how long that shows."""
@@ -55,6 +58,7 @@ class Drive:
     measured : group of tracks -> (samples, channels); NaN where nothing is known.  stride : rows a sample.
     moving, resting : (samples,) where speeds, and where the body at rest is compared.
     speed_mps, pressure_pa : (samples,) about the speed, and the largest pressure.  number : among the drives.
+    wait_s : standard deviation of what two nodes' frames wait more or less than each other.
     """
 
     log: Log
@@ -67,6 +71,7 @@ class Drive:
     speed_mps: Floats
     pressure_pa: Floats
     number: int = 0
+    wait_s: float = 0.0
 
     @property
     def samples(self) -> int:
@@ -221,7 +226,10 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float) -> Dri
             late = 0.4 * float(np.median(np.diff(log.t_s[good]))) if good.sum() > 1 else 0.0  # stamps jitter
             at = np.clip(np.searchsorted(log.t_s[good], grid + late, side="right") - 1, 0, None)
             return np.asarray(values[good][at], np.float64)
-        filled: Floats = np.interp(grid, log.t_s[good], values[good])
+        if name in MOTION:
+            filled = at_places(values[good], np.interp(grid, log.t_s[good], np.arange(good.sum(), dtype=np.float64)))
+        else:
+            filled = np.interp(grid, log.t_s[good], values[good])
         nearest = np.clip(np.searchsorted(log.t_s[good], grid), 1, max(int(good.sum()) - 1, 1))
         gap = np.diff(log.t_s[good])[nearest - 1] if good.sum() > 1 else np.full(rows, np.inf)
         filled[gap > 0.25] = np.nan
@@ -284,7 +292,21 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float) -> Dri
         resting * 1.0,
         slow,
         averaged(brakes[:, None], stride)[:, 0],
+        wait_s=_wait_s(log.t_s),
     )
+
+
+def _wait_s(t_s: Floats) -> float:
+    """How irregular the stamps of frames are, s: what one waits for the bus less what the one before did.
+
+    All nodes wait alike and by themselves, so this is also how much later than its stamp a value of another node was
+    taken, now and then. Gaps are no waiting.
+    """
+    between = np.diff(t_s)
+    if not len(between):
+        return 0.0
+    apart = between - np.median(between)
+    return float(np.sqrt(np.mean(apart[np.abs(apart) < 0.5 * np.median(between)] ** 2)))
 
 
 def _sampled(
@@ -306,7 +328,10 @@ def _sampled(
 def averaged(values: Floats, stride: int) -> Floats:
     """Means of ``stride`` rows, (rows // stride, columns)."""
     rows = len(values) // stride * stride
-    return np.asarray(values[:rows].reshape(-1, stride, values.shape[1]).mean(axis=1))
+    total = values[:rows:stride].copy()
+    for k in range(1, stride):
+        total += values[k:rows:stride]
+    return np.asarray(total / stride)
 
 
 def _filled(values: Floats) -> Floats:

@@ -23,10 +23,14 @@ from plant.friction import mu_equilibrium
 from plant.integrate import EXPONENTIAL_4
 from plant.model import column_indices, healthy, initial_state, simulate
 from plant.road import DRY, road_table
-from plant.vectors import INPUT, OUTPUT, STATE, P, X
+from plant.vectors import INPUT, OUTPUT, STATE, P, U, X
 
-STEPS = 2
+STEPS = 4
+"""Steps in a row where a torque changes quickly; elsewhere they are made as one (`_at_once`)."""
 WORKERS = 2
+_QUICK_NM, _RINGS_ROWS = 3.0, 12
+_QUICK_PA, _FOLLOWS_ROWS = 2e4, 20
+_HARD_MPS2, _CREEPS_MPS = 5.0, 3.0
 DISC_K = 350.0
 _SUFFIX = ("fl", "fr", "rl", "rr")
 _SOURCE = {
@@ -84,6 +88,35 @@ def _powers(speed_mps: Floats, characteristic_mps: float) -> tuple[Floats, Float
     return 2.0 / (1.0 + squared), (1.0 - squared) / (1.0 + squared)
 
 
+def _mean_over(values: Floats, window_rows2: float) -> Floats:
+    """Means over a window about each row, by their second derivative; ``window_rows2`` is its width, squared."""
+    if not window_rows2:
+        return values
+    mean = values.copy()
+    mean[1:-1] += window_rows2 / 24.0 * (values[2:] - 2.0 * values[1:-1] + values[:-2])
+    return mean
+
+
+def _at_once(drive: Drive) -> NDArray[np.int64]:
+    """How many steps each row of a drive makes as one.
+
+    A step of a motor's torque makes wheel and tyre swing against each other, at 20 to 25 Hz and within some 0.1 s; the
+    pressure follows its demand in 0.2 s; standing still and the tyres' limit are stiff. The rest follows any step.
+    """
+
+    def changes(part: str, much: float, rows: int) -> NDArray[np.bool_]:
+        values = drive.inputs[:, INPUT.slice(part)]
+        quick = np.abs(np.diff(values, axis=0, append=values[-1:])).max(axis=1) > much
+        after = np.convolve(quick, np.ones(rows))[: len(quick)] > 0.5
+        after[:-1] |= quick[1:]
+        return np.asarray(after)
+
+    slope = np.gradient(drive.speed_mps, drive.stride * ROW_S) if drive.samples > 1 else drive.speed_mps
+    stiff = np.repeat((np.abs(slope) > _HARD_MPS2) | (drive.speed_mps < _CREEPS_MPS), drive.stride)
+    quick = changes("motor_torque_nm", _QUICK_NM, _RINGS_ROWS) | changes("pressure_demand_pa", _QUICK_PA, _FOLLOWS_ROWS)
+    return np.where(quick, 1, np.where(stiff, STEPS // 2, STEPS))
+
+
 def _between(drive: Drive, segment: Segment, group: str) -> Floats | None:
     """Measured channels of a segment."""
     values = drive.measured.get(group)
@@ -107,13 +140,15 @@ class Rig:
             [acting.in_segment(drive.inputs[s.first : s.last], _between(drive, s, "ay")) for s in drive.segments]
             for drive in case.drives
         ]
+        self._pace = [_at_once(drive) for drive in case.drives]
         self._kept: tuple[World, list[_Kept]] | None = None
         self.runs = 0
 
     def quieted(self, world: World) -> "Rig":
         """A rig whose measured pressures and motor torques are rid of noise.
 
-        What drives the car is the simulated value plus the smoothed difference of the measured one: steps stay sharp.
+        What drives the car is the simulated value plus the smoothed difference of the measured one: steps stay sharp,
+        between two samples too.
         """
         wanted = [(group, part) for group, part in _INPUTS if group in self._groups]
         drives = []
@@ -125,9 +160,26 @@ class Rig:
                 apart = drive.inputs[:, where] - raw[group]
                 window = min(_SMOOTH, (len(apart) - 1) // 2 * 2 + 1)
                 inputs[:, where] = raw[group] + savgol_filter(apart, window, 2, axis=0)
+            if "motor" in self._groups:
+                inputs[:, INPUT.slice("motor_torque_bend_nm")] = self._bend(drive, world)
             drives.append(replace(drive, inputs=inputs, measured=self._without_fading(drive, world)))
         case = replace(self.case, drives=tuple(drives))
         return Rig(case, self.vehicle, self._characteristic(world))
+
+    def _bend(self, drive: Drive, world: World) -> Floats:
+        """Torque of the simulated motors in the middle of each row, beyond the straight line to the next, (rows, 4)."""
+        halves = np.repeat(drive.inputs, 2, axis=0)
+        halves[1:-1:2, U.steering_wheel_rad :] += 0.5 * np.diff(drive.inputs[:, U.steering_wheel_rad :], axis=0)
+        columns = column_indices(_SOURCE["motor"])
+        table = np.empty((len(halves), len(columns)))
+        simulate(
+            self._start(drive, world), halves, self.case.cut, healthy(), world.p, self._road, ROW_S / 2, 1,
+            np.ones(len(halves), np.int64), EXPONENTIAL_4, columns, table, OUTPUT.zeros(), world.theta, world.terms,
+            NO_PLUGINS,
+        )  # fmt: skip
+        torque, middle = table[::2], table[1::2]
+        following = np.concatenate((torque[1:], torque[-1:]))
+        return middle - 0.5 * (torque + following)
 
     @staticmethod
     def _without_fading(drive: Drive, world: World) -> Stack:
@@ -215,9 +267,10 @@ class Rig:
         for group, values in stack.items():
             late = world.late_s[_NODE[group]] if group in _NODE else 0.0
             if late:
-                stack[group] = later(values, late / ROW_S)
-            elif group == "wheel" and world.tooth_share:
-                stack[group] = later(values, self._tooth_rows(values) * world.tooth_share)
+                stack[group] = later(values, late / ROW_S, straight=group in ("pressure", "motor"))
+            elif group == "wheel":
+                seen = _mean_over(values, world.window_rows2)
+                stack[group] = later(seen, self._tooth_rows(values) * world.tooth_share)
         found = {group: averaged(values, drive.stride) for group, values in stack.items()}
         if "wheel" in found:
             self._at_measured_speed(found, drive)
@@ -274,7 +327,7 @@ class Rig:
         inputs = inverted(drive.inputs, theta, ROW_S)
         inputs = in_time(inputs, world.late_s)
         table = np.empty((len(inputs), len(columns)))
-        cut, switch, y = self.case.cut, healthy(), OUTPUT.zeros()
+        cut, switch, y, pace = self.case.cut, healthy(), OUTPUT.zeros(), self._pace[drive.number]
         states = [x.copy()]
         for number, segment in enumerate(drive.segments):
             rows = slice(segment.first, segment.last)
@@ -287,8 +340,8 @@ class Rig:
             if number:
                 self._restart(x, self._speed(drive, segment, world))
             simulate(
-                x, inputs[rows], cut, switch, world.p, self._road, ROW_S / STEPS, STEPS, EXPONENTIAL_4, columns,
-                table[rows], y, theta, world.terms, NO_PLUGINS,
+                x, inputs[rows], cut, switch, world.p, self._road, ROW_S / STEPS, STEPS, pace[rows], EXPONENTIAL_4,
+                columns, table[rows], y, theta, world.terms, NO_PLUGINS,
             )  # fmt: skip
             states.append(x.copy())
         return table, tuple(states)

@@ -14,8 +14,9 @@ from plant.effects.bank import NO_TERMS
 from plant.effects.theta import THETA
 
 _OF_THE_ROAD = (("road_grade", "grade"), ("headwind", "wind_mps"))
-LATE = ("imu", "pressure", "motor", "demand")
-"""Nodes whose frames may come later than the wheel speeds'; demands may be acted on later than they are logged."""
+LATE = ("imu", "pressure", "motor", "demand", "steering")
+"""Nodes whose frames may come later than the wheel speeds'; demands, and the steering wheel, may act later than they
+are logged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,15 +25,16 @@ class World:
 
     ``onsets`` names effects that begin in the middle: number of the drive, and s in it.
     ``tooth_share`` multiplies the lag of a toothed wheel, half the time between two teeth: the speed is told when a
-    tooth has passed.
+    tooth has passed; ``window_rows2`` is the square of the time over which it is a mean, in rows.
     """
 
     p: Floats
     theta: Floats
     terms: Floats = field(default_factory=NO_TERMS.copy)
     disc_offset_k: float = 0.0
-    late_s: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    late_s: tuple[float, ...] = (0.0,) * len(LATE)
     tooth_share: float = 1.0
+    window_rows2: float = 0.0
     onsets: tuple[tuple[str, int, float], ...] = ()
 
     def theta_in(self, drive: Drive) -> Floats:
@@ -51,6 +53,7 @@ class World:
     def shifted(self, nuisances: Sequence[Nuisance], z: Floats) -> "World":
         """With nuisances ``z`` standard deviations off."""
         p, disc, late, tooth = self.p.copy(), self.disc_offset_k, list(self.late_s), self.tooth_share
+        window = self.window_rows2
         for nuisance, amount in zip(nuisances, z, strict=True):
             for at, step in zip(nuisance.at, nuisance.step, strict=True):
                 if nuisance.kind == "disc":
@@ -59,11 +62,13 @@ class World:
                     late[at] += amount * step
                 elif nuisance.kind == "tooth":
                     tooth += amount * step
+                elif nuisance.kind == "window":
+                    window += amount * step
                 elif nuisance.kind == "signed":
                     p[at] += amount * step
                 else:
                     p[at] = _positive(p[at], amount, step)
-        return replace(self, p=p, disc_offset_k=disc, late_s=tuple(late), tooth_share=tooth)
+        return replace(self, p=p, disc_offset_k=disc, late_s=tuple(late), tooth_share=tooth, window_rows2=window)
 
 
 def start_nuisances() -> list[Nuisance]:
@@ -71,7 +76,10 @@ def start_nuisances() -> list[Nuisance]:
     found = [
         Nuisance(f"late_{node}", (k,), (2e-3,), "held" if node == "demand" else "late") for k, node in enumerate(LATE)
     ]
-    return [Nuisance("disc_temperature_k", (0,), (15.0,), "disc"), Nuisance("tooth_lag", (0,), (0.5,), "tooth"), *found]
+    return [
+        Nuisance("disc_temperature_k", (0,), (15.0,), "disc"), Nuisance("tooth_lag", (0,), (0.5,), "tooth"),
+        Nuisance("tooth_window", (0,), (1.0,), "window"), *found,
+    ]  # fmt: skip
 
 
 def _positive(now: float, z: float, step: float) -> float:

@@ -6,10 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from plant.effects.bank import NO_TERMS
+from plant.effects.plugin import NO_PLUGINS
 from plant.integrate import EXPONENTIAL_4, RUNGE_KUTTA_4, SEMI_IMPLICIT
 from plant.model import NEUTRAL, advance, column_indices, compile_model, healthy, initial_state, pack, replay, simulate
 from plant.road import DRY, RoadSegment, road_table
-from plant.vectors import CUT, INPUT, OUTPUT, STATE, SWITCH, U, X, Y
+from plant.vectors import BASE_RATES, CUT, INPUT, OUTPUT, STATE, SWITCH, P, U, X, Y
 
 ROWS = 300
 
@@ -237,3 +239,43 @@ def test_zero_steps_only_look(stop):
     assert np.array_equal(x, start)
     assert y[Y.wheel_load_n] == pytest.approx(1463.0 * 9.81 * 1.39 / 2.59 / 2.0)
     assert STATE.size == x.size
+
+
+def _run(start, inputs, p, step_s, steps, at_once, cut):
+    x, table = start.copy(), np.empty((len(inputs), 1))
+    columns = column_indices(["speed_mps"])
+    simulate(
+        x, inputs, cut, healthy(), p, road_table(DRY), step_s, steps, np.full(len(inputs), at_once, np.int64),
+        EXPONENTIAL_4, columns, table, OUTPUT.zeros(), NEUTRAL, NO_TERMS, NO_PLUGINS,
+    )  # fmt: skip
+    return x
+
+
+def test_steps_made_as_one_are_longer_steps(stop):
+    """What is remembered of the demand counts steps, so there its mean over them acts."""
+    start, inputs, p = stop
+    cut = CUT.zeros()
+    cut[CUT.slice("pressure")] = 1.0
+    inputs[30:, INPUT.slice("pressure_pa")] = 25e5
+    apart = slice(0, BASE_RATES.size)
+    one = _run(start, inputs, p, 1e-3, 10, 5, cut)
+    other = _run(start, inputs, p, 5e-3, 2, 1, cut)
+    made = STATE.slice("pressure_pa").start, STATE.slice("pressure_rate_pa_s").start
+    same = [k for k in range(BASE_RATES.size) if not any(m <= k < m + 4 for m in made)]
+    assert one[same] == pytest.approx(other[same], rel=1e-12, abs=1e-12)
+    assert one[apart] == pytest.approx(other[apart], rel=1e-3, abs=1e-3)
+    short = _run(start, inputs, p, 1e-3, 10, 1, cut)
+    assert one[X.speed_mps] == pytest.approx(short[X.speed_mps], abs=2e-3)
+
+
+@pytest.mark.parametrize("at_once", [1, 2, 4])
+def test_a_torque_bent_between_two_rows_does_what_its_mean_does(stop, at_once):
+    start, inputs, p = stop
+    cut = CUT.zeros()
+    cut[CUT.slice("motor_torque")] = cut[CUT.slice("force")] = 1.0
+    inputs = np.zeros((12, INPUT.size))
+    straight = _run(start, inputs, p, 2.5e-3, 4, at_once, cut)
+    inputs[5, INPUT.slice("motor_torque_bend_nm")] = -60.0
+    bent = _run(start, inputs, p, 2.5e-3, 4, at_once, cut)
+    turned = bent[STATE.slice("wheel_speed_rad_s")] - straight[STATE.slice("wheel_speed_rad_s")]
+    assert turned == pytest.approx(np.full(4, -60.0 * 2.0 / 3.0 * 0.01 / p[P.wheel_inertia_kg_m2]), rel=3e-3)

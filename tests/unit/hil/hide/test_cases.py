@@ -7,11 +7,14 @@ import pytest
 
 from hil.cli.main import main
 from hil.errors import BrakebenchError
-from hil.hide.case import Hidden, _signatures, expected_snr, logs, make_case, scaled_case
+from hil.hide.car import NOMINAL
+from hil.hide.case import NUMBERS, Hidden, _signatures, as_number, expected_snr, logs, make_case, scaled_case
 from hil.hide.cases import FAMILIES, answer, draw, followed_by, read_answer, write
 from hil.hide.catalogue import HIDEABLE, LISTED, TWINS, find
+from hil.hide.drive import drive
 from hil.hide.files import sealed_folder, vehicle_toml
 from hil.hide.manoeuvres import SETS
+from hil.hide.strengths import ROWS, E
 
 GAIN = Hidden("pad_mu_gain", "front", -0.1)
 
@@ -145,3 +148,29 @@ def test_command_line(tmp_path, capsys):
     assert main(["hide", "--effect", "none"]) == 2
     assert main(["hide", "--effect", "none", "--snr", "3", "--out", str(tmp_path / "two")]) == 2
     assert "leave them out" in capsys.readouterr().err
+
+
+def test_what_a_number_of_the_car_is_stands_out_no_more_than_its_tolerance_says():
+    """Off by as many standard deviations as are hidden, the number imitates it exactly."""
+    mass = make_case((Hidden("mass_offset", "car", 75.0),), 3, "low", "stops")
+    assert as_number(mass) == pytest.approx(10.0)
+    assert expected_snr(mass)[0] <= 10.0 < expected_snr(mass)[1]
+    assert as_number(make_case((Hidden("slip_stiffness", "car", -0.25),), 3)) == pytest.approx(0.25 * 22.3 / 1.1)
+    assert as_number(make_case((Hidden("slip_stiffness", "front", -0.25),), 3)) == np.inf
+    assert as_number(make_case((Hidden("mass_offset", "car", 75.0, 12.0),), 3)) == np.inf
+    assert as_number(make_case((GAIN,), 3)) == np.inf
+
+
+@pytest.mark.parametrize("effect", sorted(NUMBERS))
+def test_a_number_off_by_as_much_drives_as_the_effect_does(effect):
+    kind, (name, of_nominal) = find(effect), NUMBERS[effect]
+    size = 0.2 * kind.typical
+    case = make_case((Hidden(effect, "car", size),), 3, "low", "stops")
+    number = getattr(NOMINAL, name) + size * (getattr(NOMINAL, name) if of_nominal else 1.0)
+    manoeuvre, quiet = case.drives[0], np.zeros((case.drives[0].ticks, 2))
+    strength = np.zeros((ROWS, 4))
+    strength[getattr(E, effect)] = kind.strength(size, "car")
+    as_effect = drive(manoeuvre, NOMINAL, strength, np.zeros(ROWS), 0, quiet)
+    as_a_number = drive(manoeuvre, NOMINAL._replace(**{name: number}), np.zeros((ROWS, 4)), np.zeros(ROWS), 0, quiet)
+    rows = min(len(as_effect.states), len(as_a_number.states))
+    assert as_effect.states[:rows] == pytest.approx(as_a_number.states[:rows], rel=1e-6, abs=1e-6)

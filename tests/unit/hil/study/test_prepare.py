@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hil.study.prepare import prepare
+from hil.study.prepare import _wait_s, prepare
 from hil.study.table import Log, make_log
 
 WHEELS = ("fl", "fr", "rl", "rr")
@@ -31,3 +31,13 @@ def test_demands_that_nobody_followed_are_left_out(asked: float, kept: bool) -> 
 
 def test_released_brakes_contradict_nothing() -> None:
     assert "pressure" in prepare([_log(0.0, 0.0)], 0.3).groups
+
+
+def test_stamps_tell_how_long_frames_wait() -> None:
+    """Two waiting times of mean w are sqrt(2) w apart."""
+    rng = np.random.default_rng(1)
+    regular = np.arange(20000) * 0.01
+    assert _wait_s(regular) == pytest.approx(0.0, abs=1e-9)
+    assert _wait_s(regular + rng.exponential(3e-4, 20000)) == pytest.approx(2**0.5 * 3e-4, rel=0.03)
+    gaps = np.concatenate((regular[:900], regular[1000:]))
+    assert _wait_s(gaps) == pytest.approx(0.0, abs=1e-9)

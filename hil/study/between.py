@@ -1,0 +1,44 @@
+"""Values between samples: straight lines, or cubic convolution."""
+
+import numpy as np
+
+from hil.study.compiled import compiled
+from hil.study.table import Floats
+
+
+@compiled
+def between(values: Floats, at: Floats, out: Floats) -> None:
+    """Columns of ``values`` (samples, columns) at fractional numbers of samples ``at`` (rows, columns), into ``out``.
+
+    Through the two samples on each side (Keys 1981, IEEE Trans. ASSP 29, 1153, a = -1/2): a wheel that swings on its
+    tyre passes four samples of 10 ms a period, of which straight lines lose up to a third.
+    """
+    last = values.shape[0] - 1
+    for t in range(at.shape[0]):
+        for k in range(values.shape[1]):
+            place = min(max(at[t, k], 0.0), float(last))
+            i = min(int(place), max(last - 1, 0))
+            s = place - i
+            b, c = values[i, k], values[min(i + 1, last), k]
+            a = values[i - 1, k] if i > 0 else 2.0 * b - c
+            d = values[i + 2, k] if i + 2 <= last else 2.0 * c - b
+            curve = 2.0 * a - 5.0 * b + 4.0 * c - d + s * (3.0 * (b - c) + d - a)
+            out[t, k] = b + 0.5 * s * (c - a + s * curve)
+
+
+@compiled
+def straight_between(values: Floats, at: Floats, out: Floats) -> None:
+    """As `between`, on straight lines."""
+    last = values.shape[0] - 1
+    for t in range(at.shape[0]):
+        for k in range(values.shape[1]):
+            place = min(max(at[t, k], 0.0), float(last))
+            i = int(place)
+            out[t, k] = values[i, k] + (place - i) * (values[min(i + 1, last), k] - values[i, k])
+
+
+def at_places(values: Floats, at: Floats) -> Floats:
+    """One column (samples,) at fractional numbers of samples, (rows,)."""
+    out = np.empty((len(at), 1))
+    between(np.ascontiguousarray(values, np.float64)[:, None], np.asarray(at, np.float64)[:, None], out)
+    return out[:, 0]
