@@ -21,6 +21,7 @@ NEAR_ROWS = 20  # about the moment a motor meets a limit
 SAME_SPEED = 0.005  # share of the speed beyond which a bend is another bend
 _BY_SPEED = {"ay_mps2": 1.7, "yaw_rate_rad_s": 0.7}
 """Powers of the speed that a bend goes with at usual speeds; 2 and 1 for a car without understeer."""
+WAITING = 2.0**0.5  # a frame against the stamp of another node's: two waiting times, exponential and independent
 MOTION = ("wheel_speed_", "ax_", "ay_", "yaw_", "speed_", "motor_torque_")
 
 
@@ -42,10 +43,12 @@ def whitened(differences: Sequence[Table], base: Sequence[Table], noise: Noise) 
         times = np.array([noise.gust_tau_s, noise.slope_tau_s, noise.drift_tau_s, *[noise.sensor_tau_s] * 4])
         torque, unclear = _answered(apart, table, omega)
         known = torque.sum(axis=1) / (NOMINAL.rolling_radius_m * NOMINAL.mass_kg)
+        waits = WAITING * noise.queue_s
+        ax_sd = _taken_late(_deviation(noise.ax_mps2, "ax"), table["ax_mps2"], waits)
         parts.append(
             _motion_innovations(
-                motion, omega, wheel_sd, _deviation(noise.ax_mps2, "ax"), _deviation(noise.speed_mps, "speed"), moving,
-                known, coloured, np.exp(-TICK_S / times),
+                motion, omega, wheel_sd, ax_sd, _deviation(noise.speed_mps, "speed"), moving, known, coloured,
+                np.exp(-TICK_S / times),
             ).ravel()
         )  # fmt: skip
         keep = exp(-TICK_S / noise.sensor_tau_s)
@@ -56,13 +59,16 @@ def whitened(differences: Sequence[Table], base: Sequence[Table], noise: Noise) 
         own += [(f"pressure_{w}_pa", noise.pressure_pa, noise.pressure_drift_pa) for w in WHEELS]
         for i, w in enumerate(WHEELS):
             own_torque = np.where(unclear[:, i], np.nan, apart[f"motor_torque_{w}_nm"] - torque[:, i])
-            parts.append(_innovations(own_torque, _deviation(noise.torque_nm, "motor"), noise.torque_drift_nm, keep))
+            white = _taken_late(_deviation(noise.torque_nm, "motor"), table[f"motor_torque_{w}_nm"], 2.0 * waits)
+            parts.append(_innovations(own_torque, white, noise.torque_drift_nm, keep))
         faster = np.nan_to_num(motion[:, :4].mean(axis=1)) / np.maximum(omega.mean(axis=1), 1.0)
         for name, white, drift in own:
             shown = apart[name]
             if name in _BY_SPEED:  # a bend answers another speed
                 shown = np.where(np.abs(faster) > SAME_SPEED, np.nan, shown - _BY_SPEED[name] * faster * table[name])
-            parts.append(_innovations(shown, _deviation(white, name.split("_")[0]), drift, keep))
+            late = 2.0 * waits if name.startswith("pressure") else waits
+            own_sd = _taken_late(_deviation(white, name.split("_")[0]), table[name], late)
+            parts.append(_innovations(shown, own_sd, drift, keep))
     return np.concatenate(parts)
 
 
@@ -130,18 +136,27 @@ def signal_to_noise(signal: Vector, imitations: Vector) -> tuple[float, float]:
     return max(alone - float(along @ np.linalg.solve(inner, along)), 0.0) ** 0.5, alone**0.5
 
 
+def _taken_late(deviation: float, values: Vector, late_s: float) -> Vector:
+    """White noise of a channel with what its slope makes of a frame that waits, (rows,).
+
+    One frame tells all four wheels, so what it waits does not average out among them: it counts twice in each.
+    """
+    slope = np.gradient(np.nan_to_num(values), TICK_S) if len(values) > 1 else np.zeros(len(values))
+    return np.asarray(np.hypot(deviation, late_s * slope))
+
+
 def _deviation(white: float, channel: str) -> float:
     return float(np.hypot(white, QUANTUM[channel] / 12**0.5))
 
 
 @entry
-def _innovations(z: Vector, white: float, drift: float, keep: float) -> Vector:
+def _innovations(z: Vector, white: Vector, drift: float, keep: float) -> Vector:
     """Normalised innovations of one channel with white and AR(1) noise; 0 where nothing is measured."""
     out = np.zeros(z.size)
     state, variance = 0.0, drift * drift
     for k in range(z.size):
         if z[k] == z[k]:
-            s = variance + white * white
+            s = variance + white[k] * white[k]
             out[k] = (z[k] - state) / s**0.5
             gain = variance / s
             state += gain * (z[k] - state)
@@ -153,7 +168,7 @@ def _innovations(z: Vector, white: float, drift: float, keep: float) -> Vector:
 
 @entry
 def _motion_innovations(
-    motion: Vector, omega: Vector, wheel_sd: Vector, ax_sd: float, speed_sd: float, moving: Vector,
+    motion: Vector, omega: Vector, wheel_sd: Vector, ax_sd: Vector, speed_sd: float, moving: Vector,
     known: Vector, coloured: Vector, keep: Vector,
 ) -> Vector:  # fmt: skip
     """Normalised innovations, (n, 6): wheels, accelerometer, satellite; NaN is no measurement and gives 0.
@@ -176,7 +191,7 @@ def _motion_innovations(
             if j < 4:
                 h[0], h[4 + j], sd = 1.0 / RADIUS_M, omega[k, j], wheel_sd[k, j]
             elif j == 4:
-                h[1], h[3], sd = moving[k], 1.0, ax_sd
+                h[1], h[3], sd = moving[k], 1.0, ax_sd[k]
                 z -= known[k] * moving[k]
             else:
                 h[0], sd = 1.0, speed_sd

@@ -143,6 +143,7 @@ class _Search:
             found.contenders += [list_of] * (len(model.terms) - before)
             self.say(f"accepted {model.terms[-1].candidate.name} = {model.terms[-1].value:.4g}; when it begins")
             model = with_onsets(self.fitter, model, noise)
+            model = self._quieter(model, noise)
             model, noise, around = self._bent_back(model, noise, around)
         if model.terms:
             found.final, found.noise, found.fitter = model, noise, self.fitter
@@ -176,7 +177,15 @@ class _Search:
                 self.say(f"numbers as they are beside {best.candidate.name}")
                 return self.fitter.at(moved.z, (), beside), beside
         self.numbers.fitter = found.fitter
+        self.rig.quieten(self.fitter.world(model.z, model.terms))
         return model, quieter
+
+    def _quieter(self, model: Model, noise: Noise) -> Model:
+        """The model where what drives the car is made by it: a cause may move the steps of pressures and torques."""
+        if not self.settings.relinearise:
+            return model
+        self.rig.quieten(self.fitter.world(model.z, model.terms))
+        return self.fitter.fit(self.fitter.at(model.z, model.terms, noise), noise, 2)
 
     def _bent_back(self, model: Model, noise: Noise, around: Floats) -> tuple[Model, Noise, Floats]:
         """The model with sensitivities taken anew where a cause let the vehicle's numbers go back far.
@@ -187,7 +196,7 @@ class _Search:
             return model, noise, around
         self.say("sensitivities anew beside it")
         self.numbers.anew(model.z, model.terms)
-        model, noise = self.fitter.settle(model, noise, 2, 60)
+        model, noise = self.fitter.settle(self.fitter.at(model.z, model.terms, noise), noise, 2, 60)
         self.effect_columns = self._effect_columns(model)
         self.race = None
         return model, noise, model.z

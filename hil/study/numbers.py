@@ -43,7 +43,10 @@ class Numbers:
         self._steps: Floats = np.full(len(self.nuisances), _COARSE)
 
     def anew(self, z: Floats, terms: Sequence[Term] = ()) -> None:
-        """Take the sensitivities where the numbers are ``z`` standard deviations off, beside these effects."""
+        """Take the sensitivities where the numbers are ``z`` standard deviations off, beside these effects.
+
+        What drives the car is made by that car too (`Rig.quieten`).
+        """
 
         def world(of: Floats) -> World:
             found = self._base.shifted(self.nuisances, of)
@@ -51,6 +54,7 @@ class Numbers:
                 found = with_term(found, term)
             return found
 
+        self._rig.quieten(world(z))
         self._rig.keep(world(z))
         base, own = self._rig.run(world(z)), np.diag(self._steps)
         tracks = track_columns(self._rig, self._frame, base, [world(z + step) for step in own], self._steps.tolist())
@@ -77,6 +81,7 @@ class Numbers:
                 information = np.diag(self.fitter.products(noise))
                 self._steps = np.clip(_FINE / np.sqrt(np.maximum(information, 1e-9)), 0.03, _COARSE)
                 self.anew(model.z, model.terms)
+                model = self.fitter.at(model.z, model.terms, noise)
                 around, times, cost = model.z, times + 1, np.inf
             elif settled:
                 break

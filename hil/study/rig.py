@@ -30,6 +30,7 @@ STEPS = 4
 WORKERS = 2
 _QUICK_NM, _RINGS_ROWS = 3.0, 12
 _QUICK_PA, _FOLLOWS_ROWS = 2e4, 20
+_OF_NOISE = 4.0
 _HARD_MPS2, _CREEPS_MPS = 5.0, 3.0
 DISC_K = 350.0
 _SUFFIX = ("fl", "fr", "rl", "rr")
@@ -106,7 +107,8 @@ def _at_once(drive: Drive) -> NDArray[np.int64]:
 
     def changes(part: str, much: float, rows: int) -> NDArray[np.bool_]:
         values = drive.inputs[:, INPUT.slice(part)]
-        quick = np.abs(np.diff(values, axis=0, append=values[-1:])).max(axis=1) > much
+        apart = np.abs(np.diff(values, axis=0, append=values[-1:])).max(axis=1)
+        quick = apart > max(much, _OF_NOISE * float(np.median(apart)))
         after = np.convolve(quick, np.ones(rows))[: len(quick)] > 0.5
         after[:-1] |= quick[1:]
         return np.asarray(after)
@@ -140,31 +142,40 @@ class Rig:
             [acting.in_segment(drive.inputs[s.first : s.last], _between(drive, s, "ay")) for s in drive.segments]
             for drive in case.drives
         ]
+        self._given = [drive.inputs for drive in case.drives]
         self._pace = [_at_once(drive) for drive in case.drives]
         self._kept: tuple[World, list[_Kept]] | None = None
         self.runs = 0
 
     def quieted(self, world: World) -> "Rig":
-        """A rig whose measured pressures and motor torques are rid of noise.
+        """A rig whose measured pressures and motor torques are rid of noise, those of fading motors left out."""
+        drives = [replace(drive, measured=self._without_fading(drive, world)) for drive in self.case.drives]
+        rig = Rig(replace(self.case, drives=tuple(drives)), self.vehicle, self._characteristic(world))
+        rig.quieten(world)
+        rig._pace = [_at_once(drive) for drive in rig.case.drives]
+        return rig
 
-        What drives the car is the simulated value plus the smoothed difference of the measured one: steps stay sharp,
-        between two samples too.
+    def quieten(self, world: World) -> None:
+        """What drives the car becomes the simulated value plus the smoothed difference of the measured one.
+
+        So steps stay sharp, between two samples too, if this world has what makes them.
         """
         wanted = [(group, part) for group, part in _INPUTS if group in self._groups]
+        self._kept = None
         drives = []
-        for drive in self.case.drives:
+        for drive, given in zip(self.case.drives, self._given, strict=True):
+            drive = replace(drive, inputs=given)
             raw = self._raw(drive, world)
-            inputs = drive.inputs.copy()
+            inputs = given.copy()
             for group, part in wanted:
                 where = INPUT.slice(part)
-                apart = drive.inputs[:, where] - raw[group]
+                apart = given[:, where] - raw[group]
                 window = min(_SMOOTH, (len(apart) - 1) // 2 * 2 + 1)
                 inputs[:, where] = raw[group] + savgol_filter(apart, window, 2, axis=0)
             if "motor" in self._groups:
                 inputs[:, INPUT.slice("motor_torque_bend_nm")] = self._bend(drive, world)
-            drives.append(replace(drive, inputs=inputs, measured=self._without_fading(drive, world)))
-        case = replace(self.case, drives=tuple(drives))
-        return Rig(case, self.vehicle, self._characteristic(world))
+            drives.append(replace(drive, inputs=inputs))
+        self.case = replace(self.case, drives=tuple(drives))
 
     def _bend(self, drive: Drive, world: World) -> Floats:
         """Torque of the simulated motors in the middle of each row, beyond the straight line to the next, (rows, 4)."""
@@ -174,8 +185,8 @@ class Rig:
         table = np.empty((len(halves), len(columns)))
         simulate(
             self._start(drive, world), halves, self.case.cut, healthy(), world.p, self._road, ROW_S / 2, 1,
-            np.ones(len(halves), np.int64), EXPONENTIAL_4, columns, table, OUTPUT.zeros(), world.theta, world.terms,
-            NO_PLUGINS,
+            np.ones(len(halves), np.int64), EXPONENTIAL_4, columns, table, OUTPUT.zeros(), world.theta_in(drive),
+            world.terms, NO_PLUGINS,
         )  # fmt: skip
         torque, middle = table[::2], table[1::2]
         following = np.concatenate((torque[1:], torque[-1:]))
