@@ -59,8 +59,8 @@ def whitened(differences: Sequence[Table], base: Sequence[Table], noise: Noise) 
         own += [(f"pressure_{w}_pa", noise.pressure_pa, noise.pressure_drift_pa) for w in WHEELS]
         for i, w in enumerate(WHEELS):
             own_torque = np.where(unclear[:, i], np.nan, apart[f"motor_torque_{w}_nm"] - torque[:, i])
-            white = _taken_late(_deviation(noise.torque_nm, "motor"), table[f"motor_torque_{w}_nm"], 2.0 * waits)
-            parts.append(_innovations(own_torque, white, noise.torque_drift_nm, keep))
+            torque_sd = _taken_late(_deviation(noise.torque_nm, "motor"), table[f"motor_torque_{w}_nm"], 2.0 * waits)
+            parts.append(_innovations(own_torque, torque_sd, noise.torque_drift_nm, keep))
         faster = np.nan_to_num(motion[:, :4].mean(axis=1)) / np.maximum(omega.mean(axis=1), 1.0)
         for name, white, drift in own:
             shown = apart[name]

@@ -17,6 +17,7 @@ from hil.study.own_error import variance_of, variance_of_law
 from hil.study.prepare import Case
 from hil.study.race import LawRace, best_of_each, least_gain, with_law
 from hil.study.rig import Rig
+from hil.study.same_number import restated
 from hil.study.screen import Score, inflation, leaders, not_testable, scores, threshold
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
@@ -145,10 +146,13 @@ class _Search:
             model = with_onsets(self.fitter, model, noise)
             model = self._quieter(model, noise)
             model, noise, around = self._bent_back(model, noise, around)
+            bent, model = model, restated(model, self.numbers.nuisances, self.fitter.base)
+            around = around + model.z - bent.z
         if model.terms:
             found.final, found.noise, found.fitter = model, noise, self.fitter
         if causes_in(model) > 1:
             self._backward(found)
+            found.final = restated(found.final, self.numbers.nuisances, self.fitter.base)
         return found
 
     def _unbent(self, found: Diagnosis, noise: Noise) -> tuple[Model, Noise]:

@@ -10,6 +10,7 @@ from hil.study.diagnose import Diagnosis
 from hil.study.fit import Model, Tracks
 from hil.study.linear import solve, sums
 from hil.study.noise import Frame
+from hil.study.same_number import same_number
 from hil.study.table import Floats
 
 FOLDS = 4
@@ -117,7 +118,10 @@ def _interval(sums_by: Floats) -> tuple[float, float]:
 
 
 def intervals(found: Diagnosis) -> list[tuple[float, float]]:
-    """95 % interval of each cause's value: curvature of the likelihood, widened where manoeuvres disagree."""
+    """95 % interval of each cause's value: curvature of the likelihood, widened where manoeuvres disagree.
+
+    What is a number of the vehicle is known no better than that number.
+    """
     model, fitter = found.final, found.fitter
     if not model.terms:
         return []
@@ -139,6 +143,11 @@ def intervals(found: Diagnosis) -> list[tuple[float, float]]:
     if draws:
         low, high = np.quantile(np.array(draws), (0.16, 0.84), axis=0)
         spread = np.clip(0.5 * (high - low), curvature, 1.6 * curvature)
+    world = fitter.base.shifted(fitter.nuisances, model.z)
+    same = [same_number(term, fitter.nuisances, world) for term in model.terms]
+    spread = np.array(
+        [s if one is None else max(s, one.deviation(fitter.nuisances)) for s, one in zip(spread, same, strict=True)]
+    )
     return [
         (
             float(np.clip(term.value - 1.96 * s, term.candidate.parameter.low, term.candidate.parameter.high)),

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from hil.study.prepare import prepare
-from hil.study.rig import Rig
+from hil.study.rig import STEPS, Rig
 from hil.study.table import Log, make_log
 from hil.study.vehicle import paper_car
 from hil.study.world import World, nominal
 from plant.effects.theta import THETA
-from plant.vectors import P
+from plant.model import initial_state, pack, replay
+from plant.vectors import INPUT, P
 
 WHEELS = ("fl", "fr", "rl", "rr")
 RECUPERATES, BRAKES = (10.0, 15.0), (19.0, 23.0)
@@ -86,3 +87,68 @@ def test_pads_begin_at_the_rest_value_of_the_car_at_hand(rig):
     weaker = rig.run(_with(level, "pad_mu_gain", "gain", 1.0 / 1.05 - 1.0))["wheel"][-100:]
     weaker = weaker - rig.run(level)["wheel"][-100:]
     assert slower.mean() == pytest.approx(weaker.mean(), rel=0.1)
+
+
+def _driven(time_constant_s: float) -> tuple[Log, np.ndarray]:
+    """A car whose motors step to and fro, as a log of 10 ms, and their torque in the middle of each row."""
+    car = paper_car().parameters
+    car = replace(car, motor=replace(car.motor, time_constant_s=time_constant_s))
+    halves = np.zeros((3200, INPUT.size))
+    t = np.arange(3200) * 0.005
+    halves[:, INPUT.slice("motor_demand_nm")] = np.where((t > 1.9975) & ((t + 0.0025) % 2.0 < 1.0), -120.0, 0.0)[
+        :, None
+    ]
+    names = [f"{name}_{w}" for name in ("wheel_speed_rad_s", "state.motor_torque_nm") for w in WHEELS]
+    table = replay(
+        initial_state(car, 30.0, 350.0, 0.7), halves, pack(car), [*names, "state.imu_longitudinal_mps2"], steps=5,
+    )[0]  # fmt: skip
+    channels = {f"wheel_speed_{w}_rad_s": table[::2, k] for k, w in enumerate(WHEELS)}
+    channels |= {f"motor_torque_{w}_nm": table[::2, 4 + k] for k, w in enumerate(WHEELS)}
+    demand = halves[::2, INPUT.slice("motor_demand_nm").start]
+    channels |= {f"motor_torque_demand_{w}_nm": demand for w in WHEELS}
+    channels |= {f"pressure_{w}_pa": np.zeros(1600) for w in WHEELS}
+    return make_log("log", np.arange(1600) * 0.01, channels | {"ax_mps2": table[::2, 8]}), table[1::2, 4]
+
+
+def _middle(rig: Rig) -> np.ndarray:
+    inputs = rig.case.drives[0].inputs
+    torque = inputs[:, INPUT.at.motor_torque_nm]
+    return 0.5 * (torque[:-1] + torque[1:]) + inputs[:-1, INPUT.at.motor_torque_bend_nm]
+
+
+def test_what_drives_the_car_has_the_steps_of_the_world_that_made_it():
+    """Measured torques smoothed have none; with a lag of the motors that is not theirs they have them wrong."""
+    log, true = _driven(0.02)
+    vehicle = paper_car()
+    rig = Rig(prepare([log], 0.308), vehicle).quieted(nominal(vehicle))
+    right = nominal(vehicle)
+    right.p[P.motor_time_constant_s] = 0.02
+    before = np.abs(_middle(rig) - true[: len(_middle(rig))]).max()
+    rig.quieten(right)
+    after = np.abs(_middle(rig) - true[: len(_middle(rig))]).max()
+    assert before > 10.0
+    assert after < 1.0
+
+
+def test_steps_are_short_where_a_torque_steps_and_noise_is_no_step():
+    log, _ = _driven(0.008)
+    rng = np.random.default_rng(1)
+    noisy = {
+        name: values + 3.0 * rng.standard_normal(len(values)) if name.startswith("motor_torque_f") else values
+        for name, values in log.channels.items()
+    }
+    for one in (log, replace(log, channels=noisy)):
+        paces = Rig(prepare([one], 0.308), paper_car())._pace[0]
+        assert set(paces[205:212]) == {1}
+        assert (paces[260:290] == STEPS).all()
+        assert 0.0 < (paces == 1).mean() < 0.4
+
+
+def test_a_wheel_speed_that_is_a_mean_over_a_window_swings_less():
+    log, _ = _driven(0.008)
+    rig = Rig(prepare([log], 0.308), paper_car())
+    level = nominal(rig.vehicle)
+    sharp, mean = rig.run(level)["wheel"][:, 0], rig.run(replace(level, window_rows2=1.0))["wheel"][:, 0]
+    step = slice(100, 110)
+    assert np.ptp(np.diff(mean[step], 2)) < 0.97 * np.ptp(np.diff(sharp[step], 2))
+    assert mean[130:145] == pytest.approx(sharp[130:145], abs=1e-3)
