@@ -8,9 +8,9 @@ import numpy as np
 from hil.study.candidates import Candidate
 from hil.study.linear import Sums, solve_within, sums, track_columns
 from hil.study.noise import Frame, Noise, estimate, first_guess, tracks_of, whiten
+from hil.study.nuisances import Nuisance
 from hil.study.rig import Rig, Stack
 from hil.study.table import Floats
-from hil.study.vehicle import Nuisance
 from hil.study.world import World
 
 Tracks = dict[str, Floats]

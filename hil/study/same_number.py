@@ -11,8 +11,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from hil.study.fit import Model, Term
+from hil.study.nuisances import Nuisance
 from hil.study.table import Floats
-from hil.study.vehicle import Nuisance
 from hil.study.world import World
 from plant.effects.apply import Q
 from plant.effects.theta import THETA

@@ -7,9 +7,10 @@ import numpy as np
 
 from hil.study import acting
 from hil.study.acting import Acting
+from hil.study.nuisances import Nuisance, factor_of
 from hil.study.prepare import Drive
 from hil.study.table import Floats
-from hil.study.vehicle import Nuisance, Vehicle, factor_of
+from hil.study.vehicle import Vehicle
 from plant.effects.bank import NO_TERMS
 from plant.effects.theta import THETA
 

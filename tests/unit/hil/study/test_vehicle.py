@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from hil.study.nuisances import HALF_WIDTH_TO_SIGMA
 from hil.study.table import UnusableError
-from hil.study.vehicle import HALF_WIDTH_TO_SIGMA, load_vehicle, paper_car, rest_friction
+from hil.study.vehicle import load_vehicle, paper_car, rest_friction
 
 SIX = {
     "mass_kg": 1800.0,
