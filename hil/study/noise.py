@@ -102,20 +102,22 @@ class Frame:
 
 
 def _waited(case: Case) -> dict[str, Floats]:
-    """Variance by waiting of all tracks but the wheels', whose stamps are the log's; two rows a sample wait apart."""
+    """Variance by waiting of all tracks but the wheels', whose stamps are the log's.
+
+    At a corner the steeper side counts; two rows of a sample wait apart.
+    """
     found: dict[str, list[Floats]] = {}
     for drive in case.drives:
-        if drive.samples < 2:
-            return {}
+        wait = drive.wait_s / (drive.stride**0.5 * case.sample_s)
         for group, values in drive.measured.items():
             if group in ("wheel", "gps"):
                 continue
-            slopes = np.nan_to_num(np.gradient(values, case.sample_s, axis=0)) * drive.wait_s / drive.stride**0.5
-            if group in SINGLES:
-                found.setdefault(group, []).append(slopes[:, 0] ** 2)
-                continue
-            for mode, weights in zip(MODE_NAMES, MODES, strict=True):
-                found.setdefault(f"{group}.{mode}", []).append((slopes @ weights) ** 2)
+            weights = np.ones((1, 1)) if group in SINGLES else MODES.T
+            names = [group] if group in SINGLES else [f"{group}.{mode}" for mode in MODE_NAMES]
+            steps = wait * np.abs(np.nan_to_num(np.diff(values, axis=0)) @ weights)
+            ahead, behind = np.pad(steps, ((0, 1), (0, 0))), np.pad(steps, ((1, 0), (0, 0)))
+            for name, column in zip(names, (np.maximum(ahead, behind) ** 2).T, strict=True):
+                found.setdefault(name, []).append(column)
     return {name: np.concatenate(parts) for name, parts in found.items()}
 
 

@@ -1,0 +1,50 @@
+"""Noise of a case: what frames wait for the bus is noise where a channel is steep."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hil.study.noise import Frame, Noise, Track, whiten
+from hil.study.prepare import prepare
+from hil.study.table import Log, make_log
+
+WHEELS = ("fl", "fr", "rl", "rr")
+WAIT_S, NOISE_PA, RAMP_PA_S = 3e-4, 2e3, 2.5e7
+
+
+def _log(rng: np.random.Generator, wait_s: float) -> tuple[Log, np.ndarray]:
+    """Pressures that go up and down quickly, told by frames that wait; and as they were."""
+    t = np.arange(6000) * 0.01
+    stamps = t + wait_s * rng.exponential(1.0, len(t))
+
+    def pressure(at: np.ndarray) -> np.ndarray:
+        return 2e6 + RAMP_PA_S * (np.abs((at % 0.4) - 0.2) - 0.1)
+
+    taken = t + wait_s * rng.exponential(1.0, len(t))
+    channels = {f"wheel_speed_{w}_rad_s": np.full(len(t), 60.0) for w in WHEELS}
+    for w in WHEELS:
+        channels[f"pressure_{w}_pa"] = pressure(taken) + NOISE_PA * rng.standard_normal(len(t))
+        channels[f"pressure_demand_{w}_pa"] = pressure(t)
+    return make_log("log", stamps, channels), pressure(stamps)
+
+
+def test_frames_that_wait_are_noise_where_the_pressure_is_steep() -> None:
+    log, true = _log(np.random.default_rng(1), WAIT_S)
+    case = prepare([log], 0.3)
+    frame = Frame.of(case)
+    rows = len(case.drives[0].measured["pressure"])
+    exact = np.interp(log.t_s[0] + 0.01 * np.arange(2 * rows), log.t_s, true).reshape(-1, 2).mean(axis=1)
+    off = {"pressure.mean": (case.drives[0].measured["pressure"].mean(axis=1) - exact)[:, None]}
+    noise = Noise({"pressure.mean": Track(NOISE_PA / 8**0.5, 0.0, 0.0, 1.0)}, ())
+    white = whiten(off, frame, noise)[0]["pressure.mean"]
+    unaware = whiten(off, replace(frame, waited={}), noise)[0]["pressure.mean"]
+    assert white[5:-5].std() == pytest.approx(1.0, abs=0.15)
+    assert unaware[5:-5].std() > 3.0
+
+
+def test_wheels_carry_the_stamps_and_regular_stamps_wait_for_nothing() -> None:
+    log, _ = _log(np.random.default_rng(1), WAIT_S)
+    assert not any(name.startswith("wheel") for name in Frame.of(prepare([log], 0.3)).waited)
+    regular, _ = _log(np.random.default_rng(1), 0.0)
+    assert max(values.max() for values in Frame.of(prepare([regular], 0.3)).waited.values()) < 1.0
