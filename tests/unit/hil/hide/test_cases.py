@@ -173,4 +173,4 @@ def test_a_number_off_by_as_much_drives_as_the_effect_does(effect):
     as_effect = drive(manoeuvre, NOMINAL, strength, np.zeros(ROWS), 0, quiet)
     as_a_number = drive(manoeuvre, NOMINAL._replace(**{name: number}), np.zeros((ROWS, 4)), np.zeros(ROWS), 0, quiet)
     rows = min(len(as_effect.states), len(as_a_number.states))
-    assert as_effect.states[:rows] == pytest.approx(as_a_number.states[:rows], rel=1e-6, abs=1e-6)
+    np.testing.assert_allclose(as_effect.states[:rows], as_a_number.states[:rows], rtol=1e-6, atol=1e-6)
