@@ -71,9 +71,7 @@ def initial_state(
 
 
 @section
-def delay_demand(
-    x: Vector, u: Vector, dead_time_s: float, step_s: float, at_once: int, delayed: Vector
-) -> None:  # fmt: skip
+def delay_demand(x: Vector, u: Vector, dead_time_s: float, step_s: float, at_once: int, delayed: Vector) -> None:
     """Put the pressure demand into the delay line and write the demand of a dead time ago into ``delayed``.
 
     For so many steps ``at_once``: the mean over them.

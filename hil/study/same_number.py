@@ -62,8 +62,10 @@ def restated(model: Model, nuisances: Sequence[Nuisance], base: World) -> Model:
         without = base.shifted(nuisances, z)
         parameter = term.candidate.parameter
 
-        def off(value: float, term: Term = term, without: World = without, same: Same = same) -> float:
-            return _value(replace(term, value=value), without, same) - wanted  # noqa: B023 (used at once)
+        def off(
+            value: float, term: Term = term, without: World = without, same: Same = same, wanted: float = wanted
+        ) -> float:
+            return _value(replace(term, value=value), without, same) - wanted
 
         if off(parameter.low) * off(parameter.high) >= 0.0:
             continue
