@@ -17,6 +17,7 @@ Vector = NDArray[np.float64]
 GRAVITY_MPS2, NOMINAL_LOAD_N, RELAXATION_LOAD_N = 9.81, 4000.0, 3590.0
 SHAPE_X, SHAPE_Y, SIDE_FRICTION = 1.64, 1.35, 0.9
 FILM_S2_M3 = 0.33
+SHORTEST_S = 1.25e-3  # a tyre about to lift follows no faster: half a step
 LINKS = 0.4  # share of the load transfer that the links pass at once, past the springs
 HUB_HZ, HUB_DAMPING = 15.0, 0.1
 TYRE_HEAT_J_K, TYRE_COOLING_W_K = 9000.0, 30.0
@@ -102,7 +103,8 @@ def wheel(x: Vector, i: int, steer: float, mass: float, car: Car, e: Vector, law
     speed = abs(along)
     length = max(car.relaxation_length_m * (1.0 + e[E.tyre_relaxation, i]) * load / RELAXATION_LOAD_N, 0.03)
     spare = max(1.0 - abs(x[S.slip + i]) * stiff_x / (3.0 * mu * load), 0.15)
-    dx[S.slip + i] = (sliding - speed * x[S.slip + i]) / (length * spare)
+    relaxing = max(length * spare, speed * SHORTEST_S)
+    dx[S.slip + i] = (sliding - speed * x[S.slip + i]) / relaxing
     dx[S.side_slip + i] = (-across - speed * x[S.side_slip + i]) / (2.0 * length)
 
     slow = max(1.0 - speed / LOW_SPEED_MPS, 0.0) * LOW_SPEED_DAMPING_NS_M

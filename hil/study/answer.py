@@ -166,7 +166,7 @@ def _tied(found: Diagnosis) -> Tied | None:
         return None
     term, listed = found.final.terms[0], [score.candidate for score in found.screened]
     projected = project(
-        found.sums.total(), found.sums.nuisances, (), found.start.z, found.fitter.at_their_end(found.start.z)
+        found.sums.total(), found.sums.nuisances, (), found.base.z, found.fitter.at_their_end(found.base.z)
     )
     return tied_set(projected.q, listed, listed.index(term.candidate), term.value)
 

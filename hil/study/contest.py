@@ -47,6 +47,16 @@ def worth(contender: Contender) -> float:
     return 0.5 * contender.gained + contender.evidence
 
 
+def refitted(contender: Contender, model: Model, noise: Noise) -> Contender:
+    """A contender with one cause as fitted otherwise."""
+    term = model.terms[-1]
+    information = 1.0 / max(float(model.covariance[-1, -1]), 1e-30) if model.covariance.size else contender.information
+    evidence = share_of(term.candidate, information, term.value)
+    return replace(
+        contender, term=term, model=model, cost=model.cost, evidence=evidence, information=information, noise=noise
+    )
+
+
 class Contest:
     """One place for a cause in a model.
 
@@ -108,11 +118,18 @@ class Contest:
         return rescored(item, model.terms[-1].value, raw, information), quieter
 
     def contender(self, item: Score, noise: Noise) -> Contender:
-        """A leader fitted from where it does nothing, with the noise that is left beside it."""
+        """A leader fitted from where it does nothing, with the noise that is left beside it.
+
+        Or from a size that by itself explains more: what acts behind a limit does nothing before it.
+        """
         begun, own = self._begun(*self._of(item))
-        fitted = self._fitter.fit(begun, noise, 3, self._relinearise, own)
+        sizes = {item.value, 2.0 * item.value, item.candidate.parameter.typical} - {0.0}
+        inside = [size for size in sizes if item.candidate.parameter.low <= size <= item.candidate.parameter.high]
+        before = replace(begun, cost=self._fitter.cost(begun.residual, begun.z, noise))
+        tried = [self._fitter.at(begun.z, (*begun.terms[:-1], Term(item.candidate, size)), noise) for size in inside]
+        best = min([before, *tried], key=lambda model: model.cost)
+        fitted = self._fitter.fit(best, noise, 3, self._relinearise, own if best is before else None)
         noise = self._no_worse(fitted, self._fitter.estimated(fitted, noise, 60), noise)
         fitted = self._fitter.fit(fitted, noise, 1, self._relinearise)
-        information = 1.0 / max(float(fitted.covariance[-1, -1]), 1e-30) if fitted.covariance.size else item.information
-        evidence = share_of(item.candidate, information, fitted.terms[-1].value)
-        return Contender(fitted.terms[-1], fitted, fitted.cost, evidence, information, noise)
+        begun_with = Contender(fitted.terms[-1], fitted, fitted.cost, 0.0, item.information, noise)
+        return refitted(begun_with, fitted, noise)

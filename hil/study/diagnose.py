@@ -7,8 +7,9 @@ import numpy as np
 
 from hil.study.basis import LAWS, Piece
 from hil.study.candidates import Candidate, Column, candidates, columns
-from hil.study.contest import Contender, Contest, odds, worth
-from hil.study.fit import Fitter, Model, Term, Tracks
+from hil.study.contest import Contender, Contest, odds, refitted, worth
+from hil.study.fit import Fitter, Model, Tracks
+from hil.study.handed_in import Refitted, from_handed_in
 from hil.study.linear import Sums, project, track_columns
 from hil.study.noise import Frame, Noise
 from hil.study.numbers import STRAINED, Numbers, strain
@@ -33,10 +34,16 @@ _FORM = 0.2
 """Share of a cause that its equation may get wrong: what it leaves is no other cause."""
 _CLEARER = 5.0
 """By how much more than the best listed cause a law in no list must explain, log of the odds."""
+_TRIED, _LAWS_TRIED = 10, 2
+"""Leaders, and laws in no list, where the vehicle's numbers go far, places of one effect among them."""
+_LED_ANEW = 3
+"""Leaders that get sensitivities of their own there."""
 _DATED = 2
 """Contenders for which it is asked when they begin before they are compared."""
 _LAWS_BESIDE = 4
 """Laws that are looked at with noise of their own."""
+_SURE = 3.0
+"""Standard deviations, the model's own error among them, that a cause beside another must be away from nothing."""
 _HOPELESS = 0.1
 """Share of the gain asked below which no candidate is looked at with noise of its own."""
 
@@ -62,10 +69,9 @@ def causes_in(model: Model) -> int:
 class Diagnosis:
     """Everything the diagnosis found.
 
-    ``base`` explains with nuisances alone; around ``start`` causes are looked for, the same unless something had bent
-    its numbers (``screened`` and ``sums`` are taken there). ``final`` explains with the accepted causes, which take
-    ``explained`` off chi-squared; ``contenders`` has, for each term of ``final``, all that were fitted in its place,
-    best first.
+    ``base`` explains with nuisances alone (``screened`` and ``sums`` are taken there). ``final`` explains with the
+    accepted causes, which take ``explained`` off chi-squared; ``contenders`` has, for each term of ``final``, all that
+    were fitted in its place, best first.
     """
 
     case: Case
@@ -75,7 +81,6 @@ class Diagnosis:
     first_noise: Noise
     nominal: Model
     base: Model
-    start: Model
     final: Model
     contenders: list[list[Contender]] = field(default_factory=list)
     screened: list[Score] = field(default_factory=list)
@@ -121,10 +126,8 @@ class _Search:
         self.numbers.anew(np.zeros(len(self.numbers.nuisances)))
         nominal, noise = self.fitter.start(self.settings.noise_model)
         self.say("noise, and the vehicle's numbers within their tolerance")
-        model, quieter = self.numbers.fitted(nominal, noise)
-        found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, quieter, quieter, nominal, model, model, model)
-        model, noise = self._unbent(found, noise)
-        found.start = model
+        model, noise = self.numbers.fitted(nominal, noise)
+        found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, noise, noise, nominal, model, model)
         self.say(f"sensitivities of {len(self.candidates)} candidates")
         self.effect_columns = self._effect_columns(model)
         sums = self.fitter.screen(model, self.effect_columns, noise)
@@ -155,34 +158,18 @@ class _Search:
             found.final = restated(found.final, self.numbers.nuisances, self.fitter.base)
         return found
 
-    def _unbent(self, found: Diagnosis, noise: Noise) -> tuple[Model, Noise]:
-        """The model in which causes are looked for, and its noise.
+    def _bent(self, model: Model) -> bool:
+        """Whether something may have bent the vehicle's numbers."""
+        return self.settings.relinearise and not model.terms and strain(model.z) >= STRAINED
 
-        Where the vehicle's numbers had to go far, something else may have bent them: then they are fitted once more
-        from the car as handed in, beside what explains most there, and are kept without it if that is clearly better.
-        ``noise`` is that of the car as handed in.
-        """
-        model, quieter = found.base, found.noise
-        if not self.settings.relinearise or strain(model.z) < STRAINED:
-            return model, quieter
-        self.say("the vehicle's numbers go far: once more from the car as handed in")
-        self.numbers.anew(found.nominal.z)
-        columns = self._effect_columns(found.nominal)
-        listed = self._scores(self.fitter.screen(found.nominal, columns, noise), found.nominal)
-        contest = Contest(self.fitter, columns, found.nominal, noise, relinearise=True)
-        seen = contest.at_once(contest.profiled, leaders(listed, PLAUSIBLE))
-        if seen:
-            best, beside = max(seen, key=lambda one: one[0].evidence)
-            terms = (Term(best.candidate, best.value),)
-            self.numbers.anew(found.nominal.z, terms)
-            moved, beside = self.numbers.fitted(self.fitter.at(found.nominal.z, terms, beside), beside)
-            gained = self.fitter.cost(model.residual, model.z, quieter) - moved.cost
-            if gained > threshold(len(listed), self.settings.alpha) * strain(moved.z) * variance_of(best.candidate):
-                self.say(f"numbers as they are beside {best.candidate.name}")
-                return self.fitter.at(moved.z, (), beside), beside
-        self.numbers.fitter = found.fitter
+    def _from_handed_in(
+        self, model: Model, fitted: Sequence[Contender], refitted: Refitted, anew: int
+    ) -> tuple[list[Contender], float]:
+        """Contenders for a cause of a model fitted from the car as handed in, too; see there."""
+        self.say("once more from the car as handed in")
+        found, without = from_handed_in(self.numbers, fitted, model.terms, refitted, anew)
         self.rig.quieten(self.fitter.world(model.z, model.terms))
-        return model, quieter
+        return found, without
 
     def _quieter(self, model: Model, noise: Noise) -> Model:
         """The model where what drives the car is made by it: a cause may move the steps of pressures and torques."""
@@ -229,27 +216,34 @@ class _Search:
         listed = [
             s for s in listed if (s.candidate.effect.name, s.candidate.parameter.name, s.candidate.place) not in used
         ]
+        bent = self._bent(model)
         plausible = leaders(listed, PLAUSIBLE)
+        if bent:  # and which place is first is bent too
+            plausible = list(dict.fromkeys([*sorted(listed, key=lambda s: -s.evidence)[:PLAUSIBLE], *plausible]))
         if not plausible or max(item.gain for item in plausible) < _HOPELESS * found.least_gain:
             return None
         self.say(f"noise beside {len(plausible)} candidates")
         contest = Contest(self.fitter, self.effect_columns, model, noise, self.settings.relinearise)
         seen = contest.at_once(contest.profiled, plausible)
         beside = {id(item): quieter for item, quieter in seen}
-        top = leaders([item for item, _ in seen], LEADERS)
+        looked = [item for item, _ in seen]
+        top = sorted(looked, key=lambda s: -s.evidence)[:_TRIED] if bent else leaders(looked, LEADERS)
         if not top or max(item.gain for item in top) < 0.4 * found.least_gain:
             return None
         left_over = _FORM**2 * found.explained
         self.say(f"fitting {len(top)} leaders")
         fitted = contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
+        shared = zip(fitted, top, strict=True)
+        most_gained = max(self._gained(c, item, contest.reference - left_over).gained for c, item in shared)
+        without = np.inf
+        if self.settings.relinearise and (bent or most_gained >= found.least_gain):
+            fitted, without = self._from_handed_in(model, fitted, refitted, _LED_ANEW)
         fitted = self._since_when(fitted)
         tighter = min(fitted, key=odds).noise
-        reference = min(self.fitter.fit(model, tighter, 3).cost, contest.reference)
-        if not model.terms:
-            reference = min(reference, self.fitter.cost(found.base.residual, found.base.z, tighter))
+        reference = min(self.fitter.fit(model, tighter, 3).cost, contest.reference, without)
+        law = self._unlisted(found, contest, model, tighter, reference, min(fitted, key=odds))
         fitted = [self._gained(c, item, reference - left_over) for c, item in zip(fitted, top, strict=True)]
         clear = sorted((c for c in fitted if c.gained >= found.least_gain and worth(c) > 0.0), key=odds)
-        law = self._unlisted(found, contest, model, tighter, reference, min(fitted, key=odds))
         if law is not None:
             polished, tighter = self.fitter.settle(law.model, law.noise, 1, 60)
             first = replace(law, model=polished)
@@ -297,20 +291,31 @@ class _Search:
         race, leading = self.race, best_of_each(self.race.entries(model, noise), _LAWS_BESIDE)
         beside = contest.at_once(lambda entry: contest.foreseen(entry.begun, race.columns(entry)), leading)
         seen = [with_law(entry, *one, contest.reference) for entry, one in zip(leading, beside, strict=True)]
-        rival, left = max(0.5 * (reference - odds(listed)), 0.0), min(listed.cost, reference)
-        best, law = min(zip(leading, seen, strict=True), key=lambda one: odds(one[1]))
+        entries = {law.term.candidate.name: entry for law, entry in zip(seen, leading, strict=True)}
+
+        def refitted_law(one: Contender, model: Model, noise: Noise) -> Contender:
+            return with_law(entries[one.term.candidate.name], model, noise, reference)
+
+        if self._bent(model):
+            seen = self._from_handed_in(model, sorted(seen, key=odds)[:_LAWS_TRIED], refitted_law, 1)[0]
+        law = min(seen, key=odds)
+        best = entries[law.term.candidate.name]
         self.say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
         least = least_gain(found.looks + len(LAWS), self.settings.alpha) * inflation(found.screened)
         least = least * variance_of_law(best.curve.law.name) + _FORM**2 * found.explained
 
-        def clear(law: Contender) -> bool:
-            return left - law.cost >= least * strain(law.model.z) and 0.5 * (reference - odds(law)) >= rival + _CLEARER
+        def ahead() -> bool:
+            gained = min(listed.cost, reference) - law.cost
+            rival = (1.0 + _FORM**2) * max(0.5 * (reference - odds(listed)), 0.0)
+            return gained >= least * self._strain(law.model.z) and 0.5 * (reference - odds(law)) >= rival + _CLEARER
 
-        if not clear(law):
+        if ahead() and self.settings.relinearise and not self._bent(model):
+            law = self._from_handed_in(model, [law], refitted_law, 1)[0][0]
+        if not ahead():
             return None
         fitted = self.fitter.fit(self.fitter.at(law.model.z, law.model.terms, law.noise), law.noise, 3)
-        law = with_law(best, fitted, law.noise, reference)
-        return law if clear(law) else None
+        law = refitted_law(law, fitted, law.noise)
+        return law if ahead() else None
 
     def _stands_beside(self, better: Contender, clear: Contender, least: float) -> bool:
         """Whether a cause that is beyond doubt is so even when a better one, which is not, is let in as an error."""
@@ -318,24 +323,29 @@ class _Search:
             return True
         joint = self.fitter.at(better.model.z, (*better.model.terms, clear.term), better.noise)
         both = self.fitter.fit(joint, better.noise, 2, self.settings.relinearise)
-        return (better.cost - both.cost) / variance_of(clear.term.candidate) >= least * strain(both.z)
+        return (better.cost - both.cost) / variance_of(clear.term.candidate) >= least * self._strain(both.z)
 
-    @staticmethod
-    def _gained(contender: Contender, item: Score, reference: float) -> Contender:
+    def _strain(self, z: Floats) -> float:
+        return strain(z, self.fitter.farthest)
+
+    def _gained(self, contender: Contender, item: Score, reference: float) -> Contender:
         """With its gain, shared out over the model's own error; more than the screen saw is the noise's doing."""
         gained = min(reference - contender.cost, _OF_SCREEN * item.raw) / variance_of(item.candidate)
-        return replace(contender, gained=gained / strain(contender.model.z))
+        return replace(contender, gained=gained / self._strain(contender.model.z))
 
     def _backward(self, found: Diagnosis) -> None:
-        """Take out each cause in turn; what is not missed stays out."""
+        """Take out each cause in turn; what is not missed, or may as well be nothing, stays out."""
         model = found.final
         for k in reversed(range(len(model.terms))):
-            if isinstance(model.terms[k].candidate, Piece):
+            term = model.terms[k]
+            if isinstance(term.candidate, Piece):
                 continue
-            rest = tuple(term for j, term in enumerate(model.terms) if j != k)
-            without = self.fitter.fit(self.fitter.at(model.z, rest, found.noise), found.noise, 2)
-            if without.cost - model.cost < found.least_gain * variance_of(model.terms[k].candidate):
-                self.say(f"{model.terms[k].candidate.name} is not needed any more")
+            error = variance_of(term.candidate) * self._strain(model.z)
+            rest = tuple(other for j, other in enumerate(model.terms) if j != k)
+            without = self.fitter.fit(self.fitter.at(model.z, rest, found.noise), found.noise, 5)
+            missed = without.cost - model.cost >= found.least_gain * error
+            if not missed or term.value**2 < _SURE**2 * error * float(model.covariance[k, k]):
+                self.say(f"{term.candidate.name} is not needed any more")
                 model = without
                 del found.contenders[k]
         found.final = model

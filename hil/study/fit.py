@@ -84,6 +84,11 @@ class Fitter:
         self._white: Floats = np.empty((0, 0), np.float32)
         self._products: Floats = np.empty((0, 0))
 
+    def copied(self) -> "Fitter":
+        """One whose sensitivities may follow the steps of another fit."""
+        columns = {name: values.copy() for name, values in self.nuisance_columns.items()}
+        return Fitter(self.rig, self.frame, self.base, self.nuisances, columns)
+
     def world(self, z: Floats, terms: Sequence[Term]) -> World:
         """The world of a model."""
         world = self.base.shifted(self.nuisances, z)

@@ -21,12 +21,16 @@ _COARSE, _FINE = 0.5, 3.0
 _TURNS, _MOST_ANEW, _SETTLED, _STALE, _FAR = 20, 4, 3.0, 0.3, 1.0
 
 
-def strain(z: Floats) -> float:
+def strain(z: Floats, farthest: Floats | float = np.inf) -> float:
     """How much farther the vehicle's numbers went than their tolerance lets them, as a variance, at least 1.
 
-    A model that needs that for these logs errs in what it says of causes too (Birge 1932, Phys. Rev. 40, 207).
+    A model that needs that for these logs errs in what it says of causes too (Birge 1932, Phys. Rev. 40, 207). Where
+    much is strained, a number that went as far as it may (``farthest``) counts as if it wanted to go as far again.
     """
-    return max(1.0, float(z @ z) / max(len(z), 1))
+    squares = np.square(z)
+    if squares.sum() >= STRAINED * len(z):
+        squares = squares * np.where(np.abs(z) >= farthest, 4.0, 1.0)
+    return max(1.0, float(squares.sum()) / max(len(z), 1))
 
 
 class Numbers:

@@ -126,3 +126,11 @@ def test_sets_last_as_long_as_they_say():
     for name in SETS:
         assert len({m.name for m in manoeuvre_set(name)}) == len(manoeuvre_set(name))
     assert manoeuvre_set("full", 3)[1].speed_mps != manoeuvre_set("full")[1].speed_mps
+
+
+def test_a_wheel_that_lifts_drives_on():
+    """With one front calliper all but gone the car turns in under the brakes until a rear wheel is hardly loaded."""
+    strength = np.zeros((ROWS, 4))
+    strength[E.stuck_corner, 0] = 0.4
+    for name in BY_NAME:
+        assert np.isfinite(driven(name, strength).states).all(), name

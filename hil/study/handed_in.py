@@ -1,0 +1,51 @@
+"""Causes that the vehicle's numbers stood in for: fitted from the car as handed in, too.
+
+Numbers that went far leave little of a cause that acts alike, and another one fits what they leave better. From where
+they stand a fit does not find back.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from hil.study.contest import Contender, Contest, odds
+from hil.study.fit import Model, Term
+from hil.study.noise import Noise
+from hil.study.numbers import STRAINED, Numbers, strain
+
+_ROUNDS = 3
+Refitted = Callable[[Contender, Model, Noise], Contender]
+
+
+def from_handed_in(
+    numbers: Numbers, fitted: Sequence[Contender], terms: Sequence[Term], refitted: Refitted, anew: int
+) -> tuple[list[Contender], float]:
+    """The same contenders, each fitted from the car as handed in where that explains more; least cost without any.
+
+    So many of the best get sensitivities ``anew``, with which the numbers are fitted without them, too, beside the
+    ``terms`` that the model has. ``refitted`` gives a contender with another model and noise.
+    """
+    fitter = numbers.fitter
+
+    def again(one: Contender) -> Contender:
+        own, noise = fitter.copied(), one.noise
+        model = own.at(np.zeros(len(numbers.nuisances)), one.model.terms, noise)
+        for _ in range(_ROUNDS):
+            model = own.fit(model, noise, 4, follow=True)
+            noise = own.estimated(model, noise, 60)
+        return min(one, refitted(one, own.fit(model, noise, 2), noise), key=odds)
+
+    found, without = Contest.at_once(again, fitted), np.inf
+    for k in sorted(range(len(found)), key=lambda k: odds(found[k]))[:anew]:
+        one = found[k]
+        numbers.anew(one.model.z, one.model.terms)
+        begun = numbers.fitter.at(one.model.z, one.model.terms, one.noise)
+        if strain(begun.z) >= STRAINED:
+            model, noise = numbers.fitted(begun, one.noise)
+        else:
+            model, noise = numbers.fitter.settle(begun, one.noise, 2, 60)
+        found[k] = min(one, refitted(one, model, noise), key=odds)
+        bare = numbers.fitter.fit(numbers.fitter.at(model.z, terms, noise), noise, 6)
+        without = min(without, numbers.fitter.settle(bare, noise, 2, 60)[0].cost)
+    numbers.fitter = fitter
+    return found, without
