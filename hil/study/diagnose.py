@@ -37,7 +37,7 @@ _CLEARER = 5.0
 _TRIED, _LAWS_TRIED = 10, 2
 """Leaders, and laws in no list, where the vehicle's numbers go far, places of one effect among them."""
 _LED_ANEW = 3
-"""Leaders that get sensitivities of their own there."""
+"""Leaders that get sensitivities of their own, when they are fitted from the car as handed in."""
 _DATED = 2
 """Contenders for which it is asked when they begin before they are compared."""
 _LAWS_BESIDE = 4

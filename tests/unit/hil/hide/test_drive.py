@@ -129,7 +129,7 @@ def test_sets_last_as_long_as_they_say():
 
 
 def test_a_wheel_that_lifts_drives_on():
-    """With one front calliper all but gone the car turns in under the brakes until a rear wheel is hardly loaded."""
+    """With one front calliper 40 % too weak the car turns in under the brakes until a rear wheel is hardly loaded."""
     strength = np.zeros((ROWS, 4))
     strength[E.stuck_corner, 0] = 0.4
     for name in BY_NAME:
