@@ -35,6 +35,8 @@ def test_pads_that_brake_gains_stood_in_for_are_found():
     gains = [k for k, one in enumerate(numbers.nuisances) if one.name.startswith("brake_gain")]
     assert (bent.z[gains] < -2.0).any()
     begun = numbers.fitter.at(bent.z, (Term(pads, 0.0),), noise)
+    begun = numbers.fitter.fit(begun, noise, 3)
+    assert begun.terms[0].value > 0.75 * WEAKER  # as far as a fit comes from there
     stuck = refitted(Contender(begun.terms[0], begun, begun.cost, 0.0, 1.0, noise), begun, noise)
     fitter = numbers.fitter
     (found,), without = from_handed_in(numbers, [stuck], (), refitted, anew=1)
