@@ -114,6 +114,7 @@ class _Search:
         self.candidates: list[Candidate] = candidates(self.columns)
         self.effect_columns: Tracks = {}
         self.race: LawRace | None = None
+        self.began_again = False
 
     @property
     def fitter(self) -> Fitter:
@@ -128,22 +129,17 @@ class _Search:
         self.say("noise, and the vehicle's numbers within their tolerance")
         model, noise = self.numbers.fitted(nominal, noise)
         found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, noise, noise, nominal, model, model)
-        self.say(f"sensitivities of {len(self.candidates)} candidates")
-        self.effect_columns = self._effect_columns(model)
-        sums = self.fitter.screen(model, self.effect_columns, noise)
-        found.sums = sums
-        found.screened = self._scores(sums, model)
-        found.untestable = sorted({*not_testable(found.screened), *self.rig.vehicle.untold})
-        found.looks = _independent(found.screened)
-        found.least_gain = threshold(found.looks, self.settings.alpha) * inflation(found.screened)
+        self._screened(found)
         around = model.z
         while causes_in(model) < self.settings.most_causes:
-            if model.terms:
-                sums = self.fitter.screen(model, self.effect_columns, noise)
-            accepted = self._next(found, model, noise, sums)
+            accepted = self._next(found, model, noise)
             if accepted is None:
                 break
             before, (model, noise, list_of) = len(model.terms), accepted
+            if not list_of:
+                model, noise = self._again(found, model, noise)
+                around = model.z
+                continue
             found.contenders += [list_of] * (len(model.terms) - before)
             self.say(f"accepted {model.terms[-1].candidate.name} = {model.terms[-1].value:.4g}; when it begins")
             model = with_onsets(self.fitter, model, noise)
@@ -158,16 +154,39 @@ class _Search:
             found.final = restated(found.final, self.numbers.nuisances, self.fitter.base)
         return found
 
+    def _screened(self, found: Diagnosis) -> None:
+        """What each candidate explains where the numbers alone explain all they can, and so what is asked of one."""
+        self.say(f"sensitivities of {len(self.candidates)} candidates")
+        self.effect_columns, self.race = self._effect_columns(found.base), None
+        found.sums = self.fitter.screen(found.base, self.effect_columns, found.first_noise)
+        found.screened = self._scores(found.sums, found.base)
+        found.untestable = sorted({*not_testable(found.screened), *self.rig.vehicle.untold})
+        found.looks = _independent(found.screened)
+        found.least_gain = threshold(found.looks, self.settings.alpha) * inflation(found.screened)
+
+    def _again(self, found: Diagnosis, model: Model, noise: Noise) -> tuple[Model, Noise]:
+        """From numbers with which the causes of a model, or none, explain more than those the search went on from."""
+        self.say("once more, from numbers that explain more")
+        self.numbers.anew(model.z, model.terms)
+        model, noise = self.numbers.fitted(self.fitter.at(model.z, model.terms, noise), noise)
+        if model.terms:
+            self.effect_columns, self.race = self._effect_columns(model), None
+        else:
+            found.fitter, found.noise, found.first_noise = self.fitter, noise, noise
+            found.base = found.final = model
+            self._screened(found)
+        return model, noise
+
     def _bent(self, model: Model) -> bool:
         """Whether something may have bent the vehicle's numbers."""
         return self.settings.relinearise and not model.terms and strain(model.z) >= STRAINED
 
     def _from_handed_in(
-        self, model: Model, fitted: Sequence[Contender], refitted: Refitted, anew: int
-    ) -> tuple[list[Contender], float]:
+        self, model: Model, fitted: Sequence[Contender], with_fit: Refitted, anew: int
+    ) -> tuple[list[Contender], tuple[Model, Noise]]:
         """Contenders for a cause of a model fitted from the car as handed in, too; see there."""
         self.say("once more from the car as handed in")
-        found, without = from_handed_in(self.numbers, fitted, model.terms, refitted, anew)
+        found, without = from_handed_in(self.numbers, fitted, model.terms, with_fit, anew)
         self.rig.quieten(self.fitter.world(model.z, model.terms))
         return found, without
 
@@ -188,8 +207,7 @@ class _Search:
         self.say("sensitivities anew beside it")
         self.numbers.anew(model.z, model.terms)
         model, noise = self.fitter.settle(self.fitter.at(model.z, model.terms, noise), noise, 2, 60)
-        self.effect_columns = self._effect_columns(model)
-        self.race = None
+        self.effect_columns, self.race = self._effect_columns(model), None
         return model, noise, model.z
 
     def _effect_columns(self, model: Model) -> Tracks:
@@ -207,10 +225,9 @@ class _Search:
         now = [in_use.get(id(candidate), 0.0) for candidate in self.candidates]
         return scores(self.candidates, projected, accepted, now)
 
-    def _next(
-        self, found: Diagnosis, model: Model, noise: Noise, sums: Sums
-    ) -> tuple[Model, Noise, list[Contender]] | None:
-        """The next cause, if one is beyond doubt."""
+    def _next(self, found: Diagnosis, model: Model, noise: Noise) -> tuple[Model, Noise, list[Contender]] | None:
+        """The next cause, if one is beyond doubt; no contender where the numbers explain more without a further one."""
+        sums = self.fitter.screen(model, self.effect_columns, noise)
         listed = self._scores(sums, model)
         used = {(t.candidate.effect.name, t.candidate.parameter.name, t.candidate.place) for t in model.terms}
         listed = [
@@ -235,12 +252,16 @@ class _Search:
         fitted = contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
         shared = zip(fitted, top, strict=True)
         most_gained = max(self._gained(c, item, contest.reference - left_over).gained for c, item in shared)
-        without = np.inf
+        reference = contest.reference
         if self.settings.relinearise and (bent or most_gained >= found.least_gain):
             fitted, without = self._from_handed_in(model, fitted, refitted, _LED_ANEW)
+            if not self.began_again and reference - without[0].cost > found.least_gain:
+                self.began_again = True
+                return *without, []
+            reference = min(reference, without[0].cost)
         fitted = self._since_when(fitted)
         tighter = min(fitted, key=odds).noise
-        reference = min(self.fitter.fit(model, tighter, 3).cost, contest.reference, without)
+        reference = min(reference, self.fitter.fit(model, tighter, 3).cost)
         law = self._unlisted(found, contest, model, tighter, reference, min(fitted, key=odds))
         fitted = [self._gained(c, item, reference - left_over) for c, item in zip(fitted, top, strict=True)]
         clear = sorted((c for c in fitted if c.gained >= found.least_gain and worth(c) > 0.0), key=odds)
@@ -297,7 +318,8 @@ class _Search:
             return with_law(entries[one.term.candidate.name], model, noise, reference)
 
         if self._bent(model):
-            seen = self._from_handed_in(model, sorted(seen, key=odds)[:_LAWS_TRIED], refitted_law, 1)[0]
+            seen, without = self._from_handed_in(model, sorted(seen, key=odds)[:_LAWS_TRIED], refitted_law, 1)
+            reference = min(reference, without[0].cost)
         law = min(seen, key=odds)
         best = entries[law.term.candidate.name]
         self.say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
@@ -310,7 +332,8 @@ class _Search:
             return gained >= least * self._strain(law.model.z) and 0.5 * (reference - odds(law)) >= rival + _CLEARER
 
         if ahead() and self.settings.relinearise and not self._bent(model):
-            law = self._from_handed_in(model, [law], refitted_law, 1)[0][0]
+            (law,), without = self._from_handed_in(model, [law], refitted_law, 1)
+            reference = min(reference, without[0].cost)
         if not ahead():
             return None
         fitted = self.fitter.fit(self.fitter.at(law.model.z, law.model.terms, law.noise), law.noise, 3)

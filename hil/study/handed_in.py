@@ -19,11 +19,11 @@ Refitted = Callable[[Contender, Model, Noise], Contender]
 
 def from_handed_in(
     numbers: Numbers, fitted: Sequence[Contender], terms: Sequence[Term], refitted: Refitted, anew: int
-) -> tuple[list[Contender], float]:
-    """The same contenders, each fitted from the car as handed in where that explains more; least cost without any.
+) -> tuple[list[Contender], tuple[Model, Noise]]:
+    """The same contenders, each fitted from the car as handed in where that explains more; the best fit without any.
 
-    So many of the best get sensitivities ``anew``, with which the numbers are fitted without them, too, beside the
-    ``terms`` that the model has. ``refitted`` gives a contender with another model and noise.
+    So many of the best (one or more) get sensitivities ``anew``, with which the numbers are fitted without them, too,
+    beside the ``terms`` that the model has. ``refitted`` gives a contender with another model and noise.
     """
     fitter = numbers.fitter
 
@@ -35,7 +35,7 @@ def from_handed_in(
             noise = own.estimated(model, noise, 60)
         return min(one, refitted(one, own.fit(model, noise, 2), noise), key=odds)
 
-    found, without = Contest.at_once(again, fitted), np.inf
+    found, bare = Contest.at_once(again, fitted), []
     for k in sorted(range(len(found)), key=lambda k: odds(found[k]))[:anew]:
         one = found[k]
         numbers.anew(one.model.z, one.model.terms)
@@ -45,7 +45,7 @@ def from_handed_in(
         else:
             model, noise = numbers.fitter.settle(begun, one.noise, 2, 60)
         found[k] = min(one, refitted(one, model, noise), key=odds)
-        bare = numbers.fitter.fit(numbers.fitter.at(model.z, terms, noise), noise, 6)
-        without = min(without, numbers.fitter.settle(bare, noise, 2, 60)[0].cost)
+        without = numbers.fitter.fit(numbers.fitter.at(model.z, terms, noise), noise, 6)
+        bare.append(numbers.fitter.settle(without, noise, 2, 60))
     numbers.fitter = fitter
-    return found, without
+    return found, min(bare, key=lambda fit: fit[0].cost)
