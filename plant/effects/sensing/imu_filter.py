@@ -8,16 +8,21 @@ from plant.layout import Vector
 
 
 def sense(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
-    """tau a'' = a - a''."""
-    at_s, state = memory.get("state", (time_s[0], values[0]))
+    """tau a'' = a - a'', solved for straight lines between samples (Franklin et al. 1998, sec. 6.3).
+
+    A lag much shorter than a sample delays by as much, as it has to: held values would hide it.
+    """
+    at_s, state, before = memory.get("state", (time_s[0], values[0], values[0]))
     step = np.diff(time_s, prepend=at_s)
-    tau = number["time_s"][:, 0]
-    share = np.where(tau > 0.0, -np.expm1(-step / np.maximum(tau, 1e-9)), 1.0)
+    tau = np.maximum(number["time_s"][:, 0], 1e-9)
+    forgotten = -np.expm1(-step / tau)
+    mean = np.where(step > 0.0, forgotten * tau / np.where(step > 0.0, step, 1.0), 1.0)
     out = np.empty_like(values)
     for k in range(len(values)):
-        state = state + share[k] * (values[k] - state) if share[k] < 1.0 else values[k]
+        state = state + forgotten[k] * (before - state) + (1.0 - mean[k]) * (values[k] - before)
+        before = values[k]
         out[k] = state
-    memory["state"] = (time_s[-1], state)
+    memory["state"] = (time_s[-1], state, before)
     return out
 
 

@@ -63,6 +63,16 @@ def test_a_delay_shifts(delay_s, seed):
     np.testing.assert_allclose(shifted[20:, 0], expected, rtol=1e-9)
 
 
+@settings(max_examples=40, deadline=None)
+@given(st.floats(1e-5, 0.1))
+def test_a_low_pass_delays_a_ramp_by_its_lag(lag_s):
+    theta = THETA.set(THETA.neutral(), "imu_filter", {"time_s": lag_s})
+    ramp = np.tile(TIME_S[:, None], WIDTH["imu"])
+    slow = Chain(theta).sense("imu", TIME_S, ramp)
+    settled = 15.0 * lag_s < TIME_S
+    np.testing.assert_allclose(slow[settled], ramp[settled] - lag_s, atol=1e-5 * lag_s)
+
+
 def test_nothing_on_nothing_touched():
     chain, values = Chain(THETA.neutral()), signal("wheel")
     assert chain.sense("wheel", TIME_S, values) is values
