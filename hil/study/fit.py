@@ -11,6 +11,7 @@ from hil.study.noise import Frame, Noise, estimate, first_guess, tracks_of, whit
 from hil.study.nuisances import Nuisance
 from hil.study.rig import Rig, Stack
 from hil.study.table import Floats
+from hil.study.whiten import HUBER
 from hil.study.world import World
 
 Tracks = dict[str, Floats]
@@ -114,9 +115,7 @@ class Fitter:
         """Twice the negative log-likelihood, tolerances included."""
         if not all(np.isfinite(values).all() for values in residual.values()):
             return _DIVERGED
-        whitened, likelihood = whiten(residual, self.frame, noise)
-        excess = sum(float(np.sum(np.clip(np.abs(v[:, 0]) - 6.0, 0.0, None) ** 2)) for v in whitened.values())
-        return -2.0 * likelihood - excess + float(z @ z)
+        return -2.0 * whiten(residual, self.frame, noise)[1] + float(z @ z)
 
     def start(self, enabled: bool = True) -> tuple[Model, Noise]:
         """The car as handed in, and a first guess of the noise."""
@@ -233,7 +232,7 @@ class Fitter:
         }
         innovations, _ = whiten(joined, self.frame, noise)
         outer = np.concatenate([innovations[name] for name in self.frame.names])
-        outer[:, 0] = np.clip(outer[:, 0], -6.0, 6.0)
+        outer[:, 0] = np.clip(outer[:, 0], -HUBER, HUBER)
         count, width = len(self.nuisances), outer.shape[1]
         total = np.empty((count + width, count + width))
         at = [0, *range(1 + count, count + width)]

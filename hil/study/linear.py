@@ -8,10 +8,10 @@ import numpy as np
 from hil.study.noise import Frame, Noise, tracks_of, whiten
 from hil.study.rig import Rig, Stack
 from hil.study.table import Floats
+from hil.study.whiten import HUBER
 from hil.study.world import World
 
 _CHUNK = 48
-_HUBER = 6.0
 _HELD = 1e15
 _ROUNDS = 20
 
@@ -73,7 +73,7 @@ def sums(residual: dict[str, Floats], columns: dict[str, Floats], frame: Frame, 
 
 def _limited(innovations: Floats) -> Floats:
     """Innovations within six standard deviations: a single wild sample is no evidence for a cause."""
-    return np.clip(innovations, -_HUBER, _HUBER)
+    return np.clip(innovations, -HUBER, HUBER)
 
 
 @dataclass(frozen=True, eq=False)

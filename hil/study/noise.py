@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from hil.study.prepare import SINGLES, Case
 from hil.study.table import Floats
-from hil.study.whiten import coloured, moving
+from hil.study.whiten import HUBER, coloured, moving
 
 Stack = Mapping[str, Floats]
 _REFERENCE_MPS = 20.0
@@ -183,6 +183,11 @@ def _scale(name: str, frame: Frame, noise: Noise) -> Floats:
     return np.ones(len(frame.fresh)) if scales is None else np.asarray(scales[np.asarray(frame.blocks, np.int64)])
 
 
+def _limited(innovations: Floats) -> Floats:
+    """Squares, but proportional to the size beyond what the likelihood squares."""
+    return np.minimum(innovations**2, HUBER * np.abs(innovations))
+
+
 def rescaled(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> Noise:
     """Scales of the manoeuvres from the innovations, weak ones drawn towards 1."""
     whitened, _ = whiten(tracks, frame, noise)
@@ -191,7 +196,7 @@ def rescaled(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> Noise:
     found: dict[str, Floats] = {}
     for name in ("long", *(track for track in tracks if track not in _LONG)):
         members = [track for track in _LONG if track in tracks] if name == "long" else [name]
-        squares = sum(np.bincount(blocks, np.clip(whitened[m][:, 0], -8.0, 8.0) ** 2, count) for m in members)
+        squares = sum(np.bincount(blocks, _limited(whitened[m][:, 0]), count) for m in members)
         samples = sum(np.bincount(blocks, frame.present[m], count) for m in members)
         share = np.sqrt((squares + _PRIOR_SAMPLES) / (samples + _PRIOR_SAMPLES))
         before = noise.scales.get(name)

@@ -8,6 +8,8 @@ import numpy as np
 from hil.study.compiled import compiled
 from hil.study.table import Floats
 
+HUBER = 6.0
+"""Innovations beyond so many standard deviations count in proportion, not squared (Huber 1964)."""
 _UNKNOWN = 1e4  # variance of a start that nothing is known of
 
 
@@ -31,7 +33,8 @@ def _coloured(y: Floats, fresh: Floats, white: Floats, phi: float, colour: float
                 state[k] += gain * innovation
                 out[t, k] = innovation * scale
             variance -= gain * variance
-            likelihood -= 0.5 * (out[t, 0] * out[t, 0] + np.log(total))
+            far = max(abs(out[t, 0]) - HUBER, 0.0)
+            likelihood -= 0.5 * (out[t, 0] * out[t, 0] - far * far + np.log(total))
         else:
             for k in range(columns):
                 out[t, k] = 0.0
@@ -100,7 +103,8 @@ def _moving(
             for i in range(5):
                 for j in range(5):
                     cov[i, j] -= h[i] * h[j] / total
-            likelihood -= 0.5 * (out[t, m, 0] ** 2 + np.log(total))
+            far = max(abs(out[t, m, 0]) - HUBER, 0.0)
+            likelihood -= 0.5 * (out[t, m, 0] ** 2 - far * far + np.log(total))
     return likelihood
 
 

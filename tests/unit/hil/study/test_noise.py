@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hil.study.noise import Frame, Noise, Track, whiten
+from hil.study.noise import Frame, Noise, Track, estimate, first_guess, whiten
 from hil.study.prepare import prepare
 from hil.study.table import Log, make_log
 
@@ -48,3 +48,24 @@ def test_wheels_carry_the_stamps_and_regular_stamps_wait_for_nothing() -> None:
     assert not any(name.startswith("wheel") for name in Frame.of(prepare([log], 0.3)).waited)
     regular, _ = _log(np.random.default_rng(1), 0.0)
     assert max(values.max() for values in Frame.of(prepare([regular], 0.3)).waited.values()) < 1.0
+
+
+def test_what_is_far_off_for_a_moment_does_not_make_all_noisier() -> None:
+    """Noise is estimated by the likelihood that numbers are fitted by, or the one spoils what the other gains."""
+    rng = np.random.default_rng(4)
+    log, _ = _log(rng, 0.0)
+    frame = Frame.of(prepare([log], 0.3))
+    samples = len(frame.fresh)
+    quiet = NOISE_PA * rng.standard_normal((samples, 1))
+    off = quiet.copy()
+    off[samples // 2 : samples // 2 + 30] += 200.0 * NOISE_PA * rng.standard_normal((30, 1))
+    sizes = []
+    for values in (quiet, off):
+        tracks = {"pressure.mean": values}
+        start = first_guess(tracks, frame)
+        noise = estimate(tracks, frame, start)
+        assert whiten(tracks, frame, noise)[1] > whiten(tracks, frame, start)[1]
+        track, scales = noise.tracks["pressure.mean"], noise.scales["pressure.mean"]
+        sizes.append(np.hypot(track.a, track.c) * np.median(scales))
+    assert sizes[0] == pytest.approx(NOISE_PA, rel=0.1)
+    assert sizes[1] < 2.5 * sizes[0]
