@@ -9,9 +9,10 @@ from plant.effects.effect import NODES, Effect, Parameter, Scope
 from plant.effects.theta import THETA
 
 _SHARE = 0.05
-_SHARES = {"sus_compliance": 0.5, "regen_fadeout": 0.6, "iwm_field": 1.0}
+_SHARES = {"sus_compliance": 0.5, "regen_fadeout": 0.6, "pressure_hysteresis": 0.5, "stuck_corner": 0.5}
 """Of what is usual, for a finite difference; stiffer hubs would swing too fast for the replay's steps, motors are not
-compared just above the speed where they fade, and they meet the limit of their power only when it is far lower."""
+compared just above the speed where they fade, a play narrower than what is left of noise in the measured pressures
+follows that, and a pressure that is held does nothing below the threshold."""
 PLACES: Mapping[Scope, Mapping[str, tuple[int, ...]]] = {
     Scope.CAR: {"car": (0,)},
     Scope.AXLE: {"car": (0, 1), "front": (0,), "rear": (1,)},

@@ -10,7 +10,7 @@ import numpy as np
 from hil.study.fit import Fitter, Model, Term, Tracks
 from hil.study.noise import Noise
 from hil.study.rig import WORKERS
-from hil.study.screen import Score, rescored, share_of
+from hil.study.screen import Score, rescored, share_of, sized
 
 Item = TypeVar("Item")
 Of = TypeVar("Of")
@@ -111,24 +111,26 @@ class Contest:
         return replace(again, cost=self._fitter.cost(again.residual, again.z, quieter)), quieter
 
     def profiled(self, item: Score) -> tuple[Score, Noise]:
-        """The candidate by one linear step with the noise that is left beside it."""
+        """The candidate with the noise that is left beside it: by one linear step, or at the size of its replay."""
+        if item.replayed:
+            model = self._fitter.at(self._model.z, (*self._model.terms, Term(item.candidate, item.value)), self.noise)
+            quieter = self._no_worse(model, self._fitter.estimated(model, self.noise, 40), self.noise)
+            raw = self.reference - self._fitter.cost(model.residual, model.z, quieter)
+            return sized(item, item.value, max(raw, item.raw)), quieter
         model, quieter = self.foreseen(*self._of(item))
         raw = max(self.reference - model.cost, item.raw)
         information = 1.0 / max(float(model.covariance[-1, -1]), 1e-30)
         return rescored(item, model.terms[-1].value, raw, information), quieter
 
     def contender(self, item: Score, noise: Noise) -> Contender:
-        """A leader fitted from where it does nothing, with the noise that is left beside it.
-
-        Or from a size that by itself explains more: what acts behind a limit does nothing before it.
-        """
+        """A leader fitted from where it does nothing, or was replayed, with the noise that is left beside it."""
         begun, own = self._begun(*self._of(item))
-        sizes = {item.value, 2.0 * item.value, item.candidate.parameter.typical} - {0.0}
-        inside = [size for size in sizes if item.candidate.parameter.low <= size <= item.candidate.parameter.high]
-        before = replace(begun, cost=self._fitter.cost(begun.residual, begun.z, noise))
-        tried = [self._fitter.at(begun.z, (*begun.terms[:-1], Term(item.candidate, size)), noise) for size in inside]
-        best = min([before, *tried], key=lambda model: model.cost)
-        fitted = self._fitter.fit(best, noise, 3, self._relinearise, own if best is before else None)
+        if item.replayed:
+            term = Term(item.candidate, item.value)
+            fitted = self._fitter.at(begun.z, (*begun.terms[:-1], term), noise)
+            fitted = self._fitter.fit(fitted, noise, 3, self._relinearise)
+        else:
+            fitted = self._fitter.fit(begun, noise, 3, self._relinearise, own)
         noise = self._no_worse(fitted, self._fitter.estimated(fitted, noise, 60), noise)
         fitted = self._fitter.fit(fitted, noise, 1, self._relinearise)
         begun_with = Contender(fitted.terms[-1], fitted, fitted.cost, 0.0, item.information, noise)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hil.study.basis import LAWS, Piece
+from hil.study.behind import replayed, silent
 from hil.study.candidates import Candidate, Column, candidates, columns
 from hil.study.contest import Contender, Contest, odds, refitted, worth
 from hil.study.fit import Fitter, Model, Tracks
@@ -159,7 +160,7 @@ class _Search:
         self.say(f"sensitivities of {len(self.candidates)} candidates")
         self.effect_columns, self.race = self._effect_columns(found.base), None
         found.sums = self.fitter.screen(found.base, self.effect_columns, found.first_noise)
-        found.screened = self._scores(found.sums, found.base)
+        found.screened = self._scores(found.sums, found.base, found.first_noise)
         found.untestable = sorted({*not_testable(found.screened), *self.rig.vehicle.untold})
         found.looks = _independent(found.screened)
         found.least_gain = threshold(found.looks, self.settings.alpha) * inflation(found.screened)
@@ -217,18 +218,24 @@ class _Search:
         worlds = [column.stepped(world) for column in self.columns]
         return track_columns(self.rig, self.frame, base, worlds, [column.step for column in self.columns])
 
-    def _scores(self, sums: Sums, model: Model) -> list[Score]:
+    def _scores(self, sums: Sums, model: Model, noise: Noise) -> list[Score]:
         accepted = len(model.terms)
         held = self.fitter.at_their_end(model.z)
         projected = project(sums.total(), sums.nuisances, range(accepted), model.z, held)
         in_use = {id(term.candidate): term.value for term in model.terms}
         now = [in_use.get(id(candidate), 0.0) for candidate in self.candidates]
-        return scores(self.candidates, projected, accepted, now)
+        found = scores(self.candidates, projected, accepted, now)
+        self.rig.keep(self.fitter.world(model.z, model.terms))
+        hidden = [item for item in found if silent(item)]
+        shown = Contest.at_once(lambda item: replayed(self.fitter, model, noise, item), hidden)
+        met = dict(zip(map(id, hidden), shown, strict=True))
+        return [met.get(id(item), item) for item in found]
 
     def _next(self, found: Diagnosis, model: Model, noise: Noise) -> tuple[Model, Noise, list[Contender]] | None:
         """The next cause, if one is beyond doubt; no contender where the numbers explain more without a further one."""
-        sums = self.fitter.screen(model, self.effect_columns, noise)
-        listed = self._scores(sums, model)
+        listed = found.screened
+        if model.terms:
+            listed = self._scores(self.fitter.screen(model, self.effect_columns, noise), model, noise)
         used = {(t.candidate.effect.name, t.candidate.parameter.name, t.candidate.place) for t in model.terms}
         listed = [
             s for s in listed if (s.candidate.effect.name, s.candidate.parameter.name, s.candidate.place) not in used

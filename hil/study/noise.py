@@ -185,7 +185,7 @@ def _scale(name: str, frame: Frame, noise: Noise) -> Floats:
 
 def _limited(innovations: Floats) -> Floats:
     """Squares, but proportional to the size beyond what the likelihood squares."""
-    return np.minimum(innovations**2, HUBER * np.abs(innovations))
+    return np.asarray(np.minimum(innovations**2, HUBER * np.abs(innovations)))
 
 
 def rescaled(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> Noise:

@@ -18,8 +18,11 @@ _MOST_INFLATION = 6.0
 @dataclass(frozen=True, eq=False)
 class Score:
     """One candidate: estimate by one linear step, gain in chi2, log of the Bayes factor against leaving it out;
-    ``raw`` is the gain before it is shared out over the model's own error (`hil.study.own_error`);
-    how many standard deviations its largest allowed value would make (``reach``) and its usual one (``usual``)."""
+    how many standard deviations its largest allowed value would make (``reach``) and its usual one (``usual``).
+
+    ``raw`` is the gain before it is shared out over the model's own error (`hil.study.own_error`); ``replayed`` where
+    it is that of a replay at this value (`hil.study.behind`).
+    """
 
     candidate: Candidate
     value: float
@@ -29,6 +32,7 @@ class Score:
     usual: float
     information: float
     raw: float = 0.0
+    replayed: bool = False
 
 
 def scores(candidates: Sequence[Candidate], projected: Projected, offset: int, now: Sequence[float]) -> list[Score]:
@@ -70,6 +74,11 @@ def rescored(item: Score, value: float, raw: float, information: float) -> Score
     evidence = 0.5 * raw + share_of(item.candidate, information, value)
     gain = raw / variance_of(item.candidate)
     return replace(item, value=value, gain=gain, evidence=evidence, information=information, raw=raw)
+
+
+def sized(item: Score, value: float, raw: float) -> Score:
+    """A candidate that was replayed at a value and takes so much off the cost there."""
+    return replace(rescored(item, value, raw, raw / value**2), replayed=True)
 
 
 def threshold(looks: int, alpha: float) -> float:
