@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.perf.signatures import Problem
-from hil.study.diagnose import ALPHA
+from hil.study.diagnosis import ALPHA
 from hil.study.screen import threshold
 from hil.study.table import Floats
 

@@ -9,7 +9,7 @@ import numpy as np
 from hil.study.basis import Piece, shown
 from hil.study.contest import Contender, odds
 from hil.study.decide import decide_with, write
-from hil.study.diagnose import TIED, Diagnosis
+from hil.study.diagnosis import TIED, Diagnosis
 from hil.study.fit import Term
 from hil.study.linear import project
 from hil.study.measure import Gain, intervals, probabilities

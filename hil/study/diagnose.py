@@ -1,7 +1,7 @@
 """The diagnosis: noise first, then nuisances, then one cause at a time, fitted non-linearly before it is believed."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from hil.study.basis import LAWS, Piece
 from hil.study.behind import replayed, silent
 from hil.study.candidates import Candidate, Column, candidates, columns
 from hil.study.contest import Contender, Contest, odds, refitted, worth
+from hil.study.diagnosis import TIED, Diagnosis, Settings, causes_in
 from hil.study.fit import Fitter, Model, Tracks
 from hil.study.handed_in import Refitted, from_handed_in
 from hil.study.linear import Sums, project, track_columns
@@ -26,11 +27,8 @@ from hil.study.vehicle import Vehicle
 from hil.study.world import World
 
 Say = Callable[[str], None]
-ALPHA = 0.003
-MOST_CAUSES = 3
 PLAUSIBLE, LEADERS = 12, 5
 _OF_SCREEN = 1.5
-TIED = 9.2
 _FORM = 0.2
 """Share of a cause that its equation may get wrong: what it leaves is no other cause."""
 _CLEARER = 5.0
@@ -45,57 +43,11 @@ _LAWS_BESIDE = 4
 """Laws that are looked at with noise of their own."""
 _SURE = 3.0
 """Standard deviations, the model's own error among them, that a cause beside another must be away from nothing."""
-_HOPELESS = 0.1
-"""Share of the gain asked below which no candidate is looked at with noise of its own."""
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What may be switched off, so that the tests can show that it matters."""
-
-    noise_model: bool = True
-    relinearise: bool = True
-    dictionary: bool = True
-    alpha: float = ALPHA
-    most_causes: int = MOST_CAUSES
-
-
-def causes_in(model: Model) -> int:
-    """How many causes a model has; the pieces of a law in no list are one."""
-    laws = {term.candidate.name.rsplit(".", 1)[0] for term in model.terms if isinstance(term.candidate, Piece)}
-    return sum(not isinstance(term.candidate, Piece) for term in model.terms) + len(laws)
-
-
-@dataclass(eq=False)
-class Diagnosis:
-    """Everything the diagnosis found.
-
-    ``base`` explains with nuisances alone (``screened`` and ``sums`` are taken there). ``final`` explains with the
-    accepted causes, which take ``explained`` off chi-squared; ``contenders`` has, for each term of ``final``, all that
-    were fitted in its place, best first.
-    """
-
-    case: Case
-    vehicle: Vehicle
-    fitter: Fitter
-    noise: Noise
-    first_noise: Noise
-    nominal: Model
-    base: Model
-    final: Model
-    contenders: list[list[Contender]] = field(default_factory=list)
-    screened: list[Score] = field(default_factory=list)
-    untestable: list[str] = field(default_factory=list)
-    sums: Sums | None = None
-    looks: int = 0
-    least_gain: float = 0.0
-    explained: float = 0.0
-    remarks: list[str] = field(default_factory=list)
-
-    @property
-    def races(self) -> list[list[Contender]]:
-        """The contenders for each cause; the terms of a law in no list were accepted in one race."""
-        return list({id(listed): listed for listed in self.contenders}.values())
+_HOPELESS, _POOR = 0.1, 0.4
+"""Shares of the gain asked: below the one no candidate is looked at with noise of its own, below the other none is
+fitted."""
+Accepted = tuple[Model, Noise, list[Contender]]
+"""A model with one cause more, the noise beside it, and all that were fitted in its place, best first."""
 
 
 def diagnose(
@@ -231,20 +183,11 @@ class _Search:
         met = dict(zip(map(id, hidden), shown, strict=True))
         return [met.get(id(item), item) for item in found]
 
-    def _next(self, found: Diagnosis, model: Model, noise: Noise) -> tuple[Model, Noise, list[Contender]] | None:
+    def _next(self, found: Diagnosis, model: Model, noise: Noise) -> Accepted | None:
         """The next cause, if one is beyond doubt; no contender where the numbers explain more without a further one."""
-        listed = found.screened
-        if model.terms:
-            listed = self._scores(self.fitter.screen(model, self.effect_columns, noise), model, noise)
-        used = {(t.candidate.effect.name, t.candidate.parameter.name, t.candidate.place) for t in model.terms}
-        listed = [
-            s for s in listed if (s.candidate.effect.name, s.candidate.parameter.name, s.candidate.place) not in used
-        ]
-        bent = self._bent(model)
-        plausible = leaders(listed, PLAUSIBLE)
-        if bent:  # and which place is first is bent too
-            plausible = list(dict.fromkeys([*sorted(listed, key=lambda s: -s.evidence)[:PLAUSIBLE], *plausible]))
-        if not plausible or max(item.gain for item in plausible) < _HOPELESS * found.least_gain:
+        bent, least = self._bent(model), found.least_gain
+        plausible = self._plausible(found, model, noise, bent)
+        if max((item.gain for item in plausible), default=0.0) < _HOPELESS * least:
             return None
         self.say(f"noise beside {len(plausible)} candidates")
         contest = Contest(self.fitter, self.effect_columns, model, noise, self.settings.relinearise)
@@ -252,17 +195,15 @@ class _Search:
         beside = {id(item): quieter for item, quieter in seen}
         looked = [item for item, _ in seen]
         top = sorted(looked, key=lambda s: -s.evidence)[:_TRIED] if bent else leaders(looked, LEADERS)
-        if not top or max(item.gain for item in top) < 0.4 * found.least_gain:
+        if max((item.gain for item in top), default=0.0) < _POOR * least:
             return None
-        left_over = _FORM**2 * found.explained
         self.say(f"fitting {len(top)} leaders")
         fitted = contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
-        shared = zip(fitted, top, strict=True)
-        most_gained = max(self._gained(c, item, contest.reference - left_over).gained for c, item in shared)
-        reference = contest.reference
-        if self.settings.relinearise and (bent or most_gained >= found.least_gain):
+        reference, left_over = contest.reference, _FORM**2 * found.explained
+        gained = [self._gained(c, item, reference - left_over).gained for c, item in zip(fitted, top, strict=True)]
+        if self.settings.relinearise and (bent or max(gained) >= least):
             fitted, without = self._from_handed_in(model, fitted, refitted, _LED_ANEW)
-            if not self.began_again and reference - without[0].cost > found.least_gain:
+            if not self.began_again and reference - without[0].cost > least:
                 self.began_again = True
                 return *without, []
             reference = min(reference, without[0].cost)
@@ -271,29 +212,44 @@ class _Search:
         reference = min(reference, self.fitter.fit(model, tighter, 3).cost)
         law = self._unlisted(found, contest, model, tighter, reference, min(fitted, key=odds))
         fitted = [self._gained(c, item, reference - left_over) for c, item in zip(fitted, top, strict=True)]
-        clear = sorted((c for c in fitted if c.gained >= found.least_gain and worth(c) > 0.0), key=odds)
+        clear = sorted((c for c in fitted if c.gained >= least and worth(c) > 0.0), key=odds)
         if law is not None:
-            polished, tighter = self.fitter.settle(law.model, law.noise, 1, 60)
-            first = replace(law, model=polished)
             found.explained += reference - law.cost
-            return polished, tighter, [first, *sorted(clear, key=odds)]
-        if not clear:
-            most = max(fitted, key=lambda c: c.gained)
-            self.say(f"{most.term.candidate.name} gains {most.gained:.1f}, {found.least_gain:.1f} is asked")
+            polished, tighter = self.fitter.settle(law.model, law.noise, 1, 60)
+            return polished, tighter, [replace(law, model=polished), *clear]
+        best = self._standing(fitted, clear, least)
+        if best is None:
             return None
-        better = min(fitted, key=odds)
-        least = found.least_gain
-        standing = [c for c in clear if c is better or self._stands_beside(better, c, least)]
-        if not standing:
-            self.say(f"{better.term.candidate.name} explains more, and the model errs there; nothing stands beside it")
-            return None
-        best = standing[0]
         found.explained += reference - best.cost
         polished = self.fitter.fit(best.model, best.noise, 4, self.settings.relinearise)
         polished, tighter = self.fitter.settle(polished, best.noise, 2, 60)
         rest = sorted((c for c in fitted if c is not best and (c in clear or odds(c) >= odds(best))), key=odds)
-        first = replace(best, model=polished, term=polished.terms[-1])
-        return polished, tighter, [first, *rest]
+        return polished, tighter, [replace(best, model=polished, term=polished.terms[-1]), *rest]
+
+    def _plausible(self, found: Diagnosis, model: Model, noise: Noise, bent: bool) -> list[Score]:
+        """Candidates that explain most by one step and are not in the model yet."""
+        listed = found.screened
+        if model.terms:
+            listed = self._scores(self.fitter.screen(model, self.effect_columns, noise), model, noise)
+        used = {_number(term.candidate) for term in model.terms}
+        listed = [item for item in listed if _number(item.candidate) not in used]
+        plausible = leaders(listed, PLAUSIBLE)
+        if bent:  # and which place is first is bent too
+            plausible = list(dict.fromkeys([*sorted(listed, key=lambda s: -s.evidence)[:PLAUSIBLE], *plausible]))
+        return plausible
+
+    def _standing(self, fitted: list[Contender], clear: list[Contender], least: float) -> Contender | None:
+        """The best that is beyond doubt, beside one that explains more and is not, too."""
+        if not clear:
+            most = max(fitted, key=lambda c: c.gained)
+            self.say(f"{most.term.candidate.name} gains {most.gained:.1f}, {least:.1f} is asked")
+            return None
+        better = min(fitted, key=odds)
+        standing = (c for c in clear if c is better or self._stands_beside(better, c, least))
+        best = next(standing, None)
+        if best is None:
+            self.say(f"{better.term.candidate.name} explains more, and the model errs there; nothing stands beside it")
+        return best
 
     def _since_when(self, fitted: list[Contender]) -> list[Contender]:
         """The best with the time they begin at: a law by time would explain more than a cause that was always there."""
@@ -379,6 +335,11 @@ class _Search:
                 model = without
                 del found.contenders[k]
         found.final = model
+
+
+def _number(candidate: Candidate) -> tuple[str, str, str]:
+    """What tells a candidate from others."""
+    return candidate.effect.name, candidate.parameter.name, candidate.place
 
 
 def _independent(found: Sequence[Score]) -> int:

@@ -9,7 +9,8 @@ from dbc.database import parse_database
 from hil.study.answer import Answer, answer
 from hil.study.channel_map import load_map
 from hil.study.consistency.check import Consistency, check, unforced
-from hil.study.diagnose import Say, Settings, diagnose
+from hil.study.diagnose import Say, diagnose
+from hil.study.diagnosis import Settings
 from hil.study.extension import load_extension, write_extension
 from hil.study.measure import gains
 from hil.study.patterns import wrongs

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.study.contest import Contender
-from hil.study.diagnose import Diagnosis
+from hil.study.diagnosis import Diagnosis
 from hil.study.fit import Model, Tracks
 from hil.study.linear import solve, sums
 from hil.study.noise import Frame

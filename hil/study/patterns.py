@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import spearmanr
 
-from hil.study.diagnose import Diagnosis
+from hil.study.diagnosis import Diagnosis
 from hil.study.noise import Frame, Noise
 from hil.study.prepare import Case
 from hil.study.table import Floats

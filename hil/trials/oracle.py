@@ -10,7 +10,7 @@ from hil.hide.case import Case
 from hil.hide.files import write
 from hil.study.answer import Answer
 from hil.study.candidates import candidates, columns
-from hil.study.diagnose import Diagnosis, Settings
+from hil.study.diagnosis import Diagnosis, Settings
 from hil.study.explain import explain
 from hil.study.fit import Fitter
 from hil.study.measure import gains

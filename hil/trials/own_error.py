@@ -11,7 +11,7 @@ from hil.hide.cases import draw
 from hil.hide.files import write
 from hil.study.answer import Answer
 from hil.study.basis import PIECES
-from hil.study.diagnose import Diagnosis, Settings
+from hil.study.diagnosis import Diagnosis, Settings
 from hil.study.explain import explain
 from hil.study.own_error import UNLISTED, USUAL
 from hil.study.race import LawRace

@@ -11,7 +11,7 @@ from hil.hide.case import Case
 from hil.hide.cases import draw, followed_by
 from hil.hide.files import read_answer, write
 from hil.study.answer import Answer
-from hil.study.diagnose import Settings
+from hil.study.diagnosis import Settings
 from hil.study.explain import explain
 from hil.study.table import UnusableError
 from hil.trials import oracle

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from hil.hide.cases import SEPARABLE, draw
-from hil.study.diagnose import Settings
+from hil.study.diagnosis import Settings
 from hil.trials.run import run_case
 
 SEED = 7

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from outsider import VEHICLE, logs
 
-from hil.study.diagnose import Settings
+from hil.study.diagnosis import Settings
 from hil.study.explain import explain
 from hil.study.extension import load_extension
 
