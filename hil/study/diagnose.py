@@ -35,6 +35,8 @@ _CLEARER = 5.0
 """By how much more than the best listed cause a law in no list must explain, log of the odds."""
 _TRIED, _LAWS_TRIED = 10, 2
 """Leaders, and laws in no list, where the vehicle's numbers go far, places of one effect among them."""
+_NEAR = 0.2
+"""Share of what the best explains by one step, below which no other is fitted from the car as handed in."""
 _LED_ANEW = 3
 """Leaders that get sensitivities of their own, when they are fitted from the car as handed in."""
 _DATED = 2
@@ -135,11 +137,11 @@ class _Search:
         return self.settings.relinearise and not model.terms and strain(model.z) >= STRAINED
 
     def _from_handed_in(
-        self, model: Model, fitted: Sequence[Contender], with_fit: Refitted, anew: int
+        self, model: Model, fitted: Sequence[Contender], with_fit: Refitted, reference: float, anew: int
     ) -> tuple[list[Contender], tuple[Model, Noise]]:
         """Contenders for a cause of a model fitted from the car as handed in, too; see there."""
         self.say("once more from the car as handed in")
-        found, without = from_handed_in(self.numbers, fitted, model.terms, with_fit, anew)
+        found, without = from_handed_in(self.numbers, fitted, model.terms, with_fit, reference, anew)
         self.rig.quieten(self.fitter.world(model.z, model.terms))
         return found, without
 
@@ -151,7 +153,7 @@ class _Search:
         return self.fitter.fit(self.fitter.at(model.z, model.terms, noise), noise, 2)
 
     def _bent_back(self, model: Model, noise: Noise, around: Floats) -> tuple[Model, Noise, Floats]:
-        """The model with sensitivities taken anew where a cause let the vehicle's numbers go back far.
+        """The model with sensitivities to the numbers taken anew where a cause let them go back far.
 
         Numbers that had stood in for the cause bend what all others seem to explain.
         """
@@ -160,7 +162,6 @@ class _Search:
         self.say("sensitivities anew beside it")
         self.numbers.anew(model.z, model.terms)
         model, noise = self.fitter.settle(self.fitter.at(model.z, model.terms, noise), noise, 2, 60)
-        self.effect_columns, self.race = self._effect_columns(model), None
         return model, noise, model.z
 
     def _effect_columns(self, model: Model) -> Tracks:
@@ -202,7 +203,11 @@ class _Search:
         reference, left_over = contest.reference, _FORM**2 * found.explained
         gained = [self._gained(c, item, reference - left_over).gained for c, item in zip(fitted, top, strict=True)]
         if self.settings.relinearise and (bent or max(gained) >= least):
-            fitted, without = self._from_handed_in(model, fitted, refitted, _LED_ANEW)
+            most = max(item.raw for item in top)
+            near = [c for c, item in zip(fitted, top, strict=True) if bent or item.raw >= _NEAR * most]
+            refound, without = self._from_handed_in(model, near, refitted, reference, _LED_ANEW)
+            better = dict(zip(map(id, near), refound, strict=True))
+            fitted = [better.get(id(c), c) for c in fitted]
             if not self.began_again and reference - without[0].cost > least:
                 self.began_again = True
                 return *without, []
@@ -271,8 +276,8 @@ class _Search:
             return None
         if self.race is None:
             self.say("curves in no list")
-            self.race = LawRace(self.fitter, self.fitter.world(model.z, model.terms), model)
-        race, leading = self.race, best_of_each(self.race.entries(model, noise), _LAWS_BESIDE)
+            self.race = LawRace(self.fitter, self.fitter.world(model.z, model.terms))
+        race, leading = self.race, best_of_each(self.race.entries(self.fitter, model, noise), _LAWS_BESIDE)
         beside = contest.at_once(lambda entry: contest.foreseen(entry.begun, race.columns(entry)), leading)
         seen = [with_law(entry, *one, contest.reference) for entry, one in zip(leading, beside, strict=True)]
         entries = {law.term.candidate.name: entry for law, entry in zip(seen, leading, strict=True)}
@@ -281,7 +286,9 @@ class _Search:
             return with_law(entries[one.term.candidate.name], model, noise, reference)
 
         if self._bent(model):
-            seen, without = self._from_handed_in(model, sorted(seen, key=odds)[:_LAWS_TRIED], refitted_law, 1)
+            seen, without = self._from_handed_in(
+                model, sorted(seen, key=odds)[:_LAWS_TRIED], refitted_law, reference, 1
+            )
             reference = min(reference, without[0].cost)
         law = min(seen, key=odds)
         best = entries[law.term.candidate.name]
@@ -295,7 +302,7 @@ class _Search:
             return gained >= least * self._strain(law.model.z) and 0.5 * (reference - odds(law)) >= rival + _CLEARER
 
         if ahead() and self.settings.relinearise and not self._bent(model):
-            (law,), without = self._from_handed_in(model, [law], refitted_law, 1)
+            (law,), without = self._from_handed_in(model, [law], refitted_law, reference, 1)
             reference = min(reference, without[0].cost)
         if not ahead():
             return None

@@ -13,17 +13,19 @@ from hil.study.fit import Model, Term
 from hil.study.noise import Noise
 from hil.study.numbers import STRAINED, Numbers, strain
 
-_ROUNDS = 3
+_ROUNDS, _RIVAL = 3, 1.0 / 3.0
 Refitted = Callable[[Contender, Model, Noise], Contender]
 
 
 def from_handed_in(
-    numbers: Numbers, fitted: Sequence[Contender], terms: Sequence[Term], refitted: Refitted, anew: int
-) -> tuple[list[Contender], tuple[Model, Noise]]:
+    numbers: Numbers, fitted: Sequence[Contender], terms: Sequence[Term], refitted: Refitted, reference: float,
+    anew: int,
+) -> tuple[list[Contender], tuple[Model, Noise]]:  # fmt: skip
     """The same contenders, each fitted from the car as handed in where that explains more; the best fit without any.
 
-    So many of the best (one or more) get sensitivities ``anew``, with which the numbers are fitted without them, too,
-    beside the ``terms`` that the model has. ``refitted`` gives a contender with another model and noise.
+    So many of the best (one or more) get sensitivities ``anew``, if they take a third as much off the ``reference`` as
+    the very best. With those the numbers are fitted without them, too, beside the ``terms`` that the model has.
+    ``refitted`` gives a contender with another model and noise.
     """
     fitter = numbers.fitter
 
@@ -36,7 +38,9 @@ def from_handed_in(
         return min(one, refitted(one, own.fit(model, noise, 2), noise), key=odds)
 
     found, bare = Contest.at_once(again, fitted), []
-    for k in sorted(range(len(found)), key=lambda k: odds(found[k]))[:anew]:
+    leading = sorted(range(len(found)), key=lambda k: odds(found[k]))[:anew]
+    least = reference - _RIVAL * max(reference - odds(found[leading[0]]), 0.0)
+    for k in (k for k in leading if k == leading[0] or odds(found[k]) <= least):
         one = found[k]
         numbers.anew(one.model.z, one.model.terms)
         begun = numbers.fitter.at(one.model.z, one.model.terms, one.noise)

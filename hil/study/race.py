@@ -41,10 +41,9 @@ class Entry:
 class LawRace:
     """Sensitivities to all laws at one model, simulated once; wheel by wheel for the law that leads."""
 
-    def __init__(self, fitter: Fitter, world: World, model: Model) -> None:
-        self._fitter, self._world = fitter, world
-        fitter.rig.keep(world)
-        self._base = model.stack or fitter.rig.run(world)
+    def __init__(self, fitter: Fitter, world: World) -> None:
+        self._rig, self._frame, self._world = fitter.rig, fitter.frame, world
+        self._rig.keep(world)
         self._parts = {curve: [curve.at(place) for place in _parts(curve)] for curve in curves(fitter.rig, world)}
         self._columns = self._simulated([part for parts in self._parts.values() for part in parts])
 
@@ -53,7 +52,7 @@ class LawRace:
         pieces = [piece for part in parts for piece in part.pieces]
         steps = [_SHARE * piece.law.usual for piece in pieces]
         worlds = [piece.applied(self._world, step) for piece, step in zip(pieces, steps, strict=True)]
-        all_of = track_columns(self._fitter.rig, self._fitter.frame, self._base, worlds, steps)
+        all_of = track_columns(self._rig, self._frame, self._rig.run(self._world), worlds, steps)
         return {
             (part.law.name, part.place): {
                 name: values[:, PIECES * k : PIECES * (k + 1)] for name, values in all_of.items()
@@ -61,15 +60,15 @@ class LawRace:
             for k, part in enumerate(parts)
         }
 
-    def entries(self, model: Model, noise: Noise) -> list[Entry]:
-        """Every law at every place it was simulated for, the best first."""
-        found = self._ranked(model, noise)
+    def entries(self, fitter: Fitter, model: Model, noise: Noise) -> list[Entry]:
+        """Every law at every place it was simulated for, the best first, by the fitter's sensitivities to numbers."""
+        found = self._ranked(fitter, model, noise)
         leading = next(curve for curve in self._parts if curve.law is found[0].curve.law)
         if len(self._parts[leading]) == len(_AXLES):
             self._parts[leading] = [leading.at(wheel) for wheel in Scope.WHEEL.members]
-            self._fitter.rig.keep(self._world)
+            self._rig.keep(self._world)
             self._columns |= self._simulated(self._parts[leading])
-            found = self._ranked(model, noise)
+            found = self._ranked(fitter, model, noise)
         return found
 
     def columns(self, entry: Entry) -> Tracks:
@@ -80,10 +79,9 @@ class LawRace:
         listed = [self._columns[parts[k].law.name, parts[k].place] for k in taken]
         return {name: np.sum([columns[name] for columns in listed], axis=0) for name in listed[0]}
 
-    def _ranked(self, model: Model, noise: Noise) -> list[Entry]:
-        fitter = self._fitter
+    def _ranked(self, fitter: Fitter, model: Model, noise: Noise) -> list[Entry]:
         listed = [self._columns[part.law.name, part.place] for parts in self._parts.values() for part in parts]
-        joined = {name: np.hstack([columns[name] for columns in listed]) for name in fitter.frame.names}
+        joined = {name: np.hstack([columns[name] for columns in listed]) for name in self._frame.names}
         sums = fitter.screen(model, joined, noise)
         accepted = len(model.terms)
         projected = project(sums.total(), sums.nuisances, range(accepted), model.z, fitter.at_their_end(model.z))

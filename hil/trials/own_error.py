@@ -52,7 +52,7 @@ def _by_law(found: Diagnosis) -> Gains:
     """Gains of the laws in no list, by coefficient."""
     fitter, model = found.fitter, found.base
     gains: Gains = defaultdict(list)
-    for entry in LawRace(fitter, fitter.world(model.z, ()), model).entries(model, found.noise):
+    for entry in LawRace(fitter, fitter.world(model.z, ())).entries(fitter, model, found.noise):
         gains[UNLISTED, entry.curve.law.name].append(entry.gain / PIECES)
     return gains
 

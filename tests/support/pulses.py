@@ -2,9 +2,14 @@
 
 import numpy as np
 
+from hil.study.prepare import prepare
+from hil.study.rig import Rig
 from hil.study.table import Log, make_log
+from hil.study.vehicle import Vehicle
+from hil.study.world import nominal
 
 WHEELS = ("fl", "fr", "rl", "rr")
+FOLLOWED = (("pressure", "pa"), ("motor_torque", "nm"))
 
 
 def log_of_pulses() -> Log:
@@ -18,3 +23,15 @@ def log_of_pulses() -> Log:
         channels |= {f"pressure_{wheel}_pa": 9e5 * brakes, f"pressure_demand_{wheel}_pa": 9e5 * brakes}
         channels |= {f"motor_torque_{wheel}_nm": -60.0 * pulses, f"motor_torque_demand_{wheel}_nm": -60.0 * pulses}
     return make_log("log", t, channels)
+
+
+def log_as_driven(vehicle: Vehicle, radius_m: float) -> Log:
+    """The same pulses as brakes and motors follow them, so that what drives the car is what was measured."""
+    log = log_of_pulses()
+    rig = Rig(prepare([log], radius_m), vehicle)
+    followed = [(quantity, unit, wheel) for quantity, unit in FOLLOWED for wheel in WHEELS]
+    values = rig.states(nominal(vehicle), [f"state.{quantity}_{unit}_{wheel}" for quantity, unit, wheel in followed])
+    told = [f"{quantity}_{wheel}_{unit}" for quantity, unit, wheel in followed]
+    rows = len(values)
+    channels = {name: column[:rows] for name, column in log.channels.items()}
+    return make_log("log", log.t_s[:rows], channels | dict(zip(told, values.T, strict=True)))
