@@ -37,6 +37,9 @@ _TRIED, _LAWS_TRIED = 10, 2
 """Leaders, and laws in no list, where the vehicle's numbers go far, places of one effect among them."""
 _NEAR = 0.2
 """Share of what the best explains by one step, below which no other is fitted from the car as handed in."""
+_MISLED = 1.0 / 3.0
+"""Share of what a cause explains, by which the fit without any must have been worse than it can be, for the search to
+begin again from a better one."""
 _LED_ANEW = 3
 """Leaders that get sensitivities of their own, when they are fitted from the car as handed in."""
 _DATED = 2
@@ -208,10 +211,12 @@ class _Search:
             refound, without = self._from_handed_in(model, near, refitted, reference, _LED_ANEW)
             better = dict(zip(map(id, near), refound, strict=True))
             fitted = [better.get(id(c), c) for c in fitted]
-            if not self.began_again and reference - without[0].cost > least:
+            bare = without[0].cost
+            worse, more = reference - bare, bare - min(c.cost for c in fitted)
+            if not self.began_again and worse > max(least, _MISLED * more):
                 self.began_again = True
                 return *without, []
-            reference = min(reference, without[0].cost)
+            reference = min(reference, bare)
         fitted = self._since_when(fitted)
         tighter = min(fitted, key=odds).noise
         reference = min(reference, self.fitter.fit(model, tighter, 3).cost)
