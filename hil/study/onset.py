@@ -9,10 +9,11 @@ from hil.study.basis import Piece
 from hil.study.fit import Fitter, Model, Term
 from hil.study.linear import sums
 from hil.study.noise import Noise
+from hil.study.own_error import variance_of
 from hil.study.prepare import ROW_S
 from hil.study.table import Floats
 
-_ALPHA = 0.003
+_ALPHA = 3e-4
 _COARSE_S, _FINER, _MOST_TIMES = 0.25, (0.05, 0.01), 80
 """Steps of the time, s: what begins at once sets hubs swinging, so that only the neighbourhood of the truth fits."""
 _LEAST_BEFORE = 3.0
@@ -20,7 +21,10 @@ _LEAST_BEFORE = 3.0
 
 
 def with_onsets(fitter: Fitter, model: Model, noise: Noise) -> Model:
-    """The model with a beginning for each cause that was clearly absent before."""
+    """The model with a beginning for each cause that was clearly absent before.
+
+    A time that may be chosen is one more way to fit what the model gets wrong, and is asked for more than that.
+    """
     for k, term in enumerate(model.terms):
         if term.onset is None and not isinstance(term.candidate, Piece):
             later = _later(fitter, model, noise, k)
@@ -34,12 +38,12 @@ def _later(fitter: Fitter, model: Model, noise: Noise, k: int) -> Model | None:
     if block is None:
         return None
     segments = fitter.rig.case.segments
-    least = float(chi2.isf(_ALPHA / len(b), 1))
     (drive, before), (same, after) = segments[block - 1], segments[block]
     low, high = before.first, after.last if same == drive else before.last
     value = float(np.clip(b[block:].sum() / q[block:].sum(), *_bounds(model.terms[k])))
     fitter.rig.keep(fitter.world(model.z, _since(model, k, value, drive, low * ROW_S)))
     times = np.linspace(low * ROW_S, high * ROW_S, _most(high - low))
+    least = float(chi2.isf(_ALPHA / (len(b) * len(times)), 1)) * variance_of(model.terms[k].candidate)
     seen: list[Model] = []
     for finer in (*_FINER, None):
         tried = [fitter.at(model.z, _since(model, k, value, drive, float(t)), noise) for t in times]
