@@ -15,7 +15,7 @@ from hil.study.handed_in import Refitted, from_handed_in
 from hil.study.linear import Sums, project, track_columns
 from hil.study.noise import Frame, Noise
 from hil.study.numbers import STRAINED, Numbers, strain
-from hil.study.onset import with_onsets
+from hil.study.onset import price, with_onsets
 from hil.study.own_error import variance_of, variance_of_law
 from hil.study.prepare import Case
 from hil.study.race import LawRace, best_of_each, least_gain, with_law
@@ -327,9 +327,13 @@ class _Search:
         return strain(z, self.fitter.farthest)
 
     def _gained(self, contender: Contender, item: Score, reference: float) -> Contender:
-        """With its gain, shared out over the model's own error; more than the screen saw is the noise's doing."""
+        """With its gain, shared out over the model's own error and less what a chosen beginning takes.
+
+        More than the screen saw is the noise's doing.
+        """
         gained = min(reference - contender.cost, _OF_SCREEN * item.raw) / variance_of(item.candidate)
-        return replace(contender, gained=gained / self._strain(contender.model.z))
+        gained = gained / self._strain(contender.model.z) - price(contender.term, self.frame)
+        return replace(contender, gained=gained)
 
     def _backward(self, found: Diagnosis) -> None:
         """Take out each cause in turn; what is not missed, or may as well be nothing, stays out."""

@@ -8,7 +8,7 @@ from scipy.stats import chi2
 from hil.study.basis import Piece
 from hil.study.fit import Fitter, Model, Term
 from hil.study.linear import sums
-from hil.study.noise import Noise
+from hil.study.noise import Frame, Noise
 from hil.study.own_error import variance_of
 from hil.study.prepare import ROW_S
 from hil.study.table import Floats
@@ -30,6 +30,13 @@ def with_onsets(fitter: Fitter, model: Model, noise: Noise) -> Model:
             later = _later(fitter, model, noise, k)
             model = model if later is None else later
     return model
+
+
+def price(term: Term, frame: Frame) -> float:
+    """What of a gain goes to the choice of a time to begin at: twice the log of how many were offered."""
+    if term.onset is None:
+        return 0.0
+    return 2.0 * float(np.log(len(frame.fresh) * frame.sample_s / _COARSE_S))
 
 
 def _later(fitter: Fitter, model: Model, noise: Noise, k: int) -> Model | None:

@@ -1,10 +1,14 @@
 """When a cause begins, from what each manoeuvre says of it."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil.study.onset import begin_of
+from hil.study.candidates import candidates, columns
+from hil.study.fit import Term
+from hil.study.noise import Frame
+from hil.study.onset import begin_of, price
 
 
 def _products(value: float, begin: int, strength: list[float], seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -29,3 +33,11 @@ def test_what_was_always_there_has_none():
 def test_manoeuvres_that_do_not_show_it_prove_no_beginning():
     assert begin_of(*_products(1.0, 0, [0.1, 0.1, 0.1, 9.0, 9.0], 1)) is None
     assert begin_of(*_products(1.0, 3, [0.1, 0.1, 0.1, 9.0, 9.0], 1)) is None
+
+
+def test_a_time_costs_what_its_choice_among_many_is_worth():
+    samples = np.zeros(9000)
+    frame = Frame(samples, samples, samples, samples, samples, 0.02, {}, ())
+    (drag,) = [one for one in candidates(columns()) if one.name == "residual_drag@car"]
+    assert price(Term(drag, 5.0), frame) == 0.0
+    assert price(Term(drag, 5.0, (0, 12.0)), frame) == pytest.approx(2.0 * np.log(720.0))
