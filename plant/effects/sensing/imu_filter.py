@@ -14,12 +14,16 @@ def sense(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Me
     """
     at_s, state, before = memory.get("state", (time_s[0], values[0], values[0]))
     step = np.diff(time_s, prepend=at_s)
-    tau = np.maximum(number["time_s"][:, 0], 1e-9)
-    forgotten = -np.expm1(-step / tau)
-    mean = np.where(step > 0.0, forgotten * tau / np.where(step > 0.0, step, 1.0), 1.0)
+    tau = number["time_s"][:, 0]
+    slow = np.maximum(tau, 1e-9)
+    forgotten = -np.expm1(-step / slow)
+    mean = np.where(step > 0.0, forgotten * slow / np.where(step > 0.0, step, 1.0), 1.0)
     out = np.empty_like(values)
     for k in range(len(values)):
-        state = state + forgotten[k] * (before - state) + (1.0 - mean[k]) * (values[k] - before)
+        if tau[k] > 0.0:
+            state = state + forgotten[k] * (before - state) + (1.0 - mean[k]) * (values[k] - before)
+        else:
+            state = values[k]
         before = values[k]
         out[k] = state
     memory["state"] = (time_s[-1], state, before)
