@@ -7,7 +7,7 @@ or a ``Literal`` for a named choice.
 """
 
 import dataclasses
-import math
+import sys
 import tomllib
 import typing
 from collections.abc import Mapping
@@ -106,13 +106,14 @@ def _entry(entry: Any, hint: Any, where: str) -> Any:
         if entry.get("unit") != unit:
             raise ParameterError(f"{where}: expected unit {unit!r}, got {entry.get('unit')!r}; convert the value")
         tolerance = entry.get("tolerance")
-        if tolerance is None or not _is_number(tolerance) or tolerance < 0:
+        if tolerance is None or not is_number(tolerance) or tolerance < 0:
             raise ParameterError(f"{where}: expected a tolerance >= 0 in {unit!r} (half width), got {tolerance!r}")
     return _check(entry["value"], hint, where)
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+def is_number(value: Any) -> bool:
+    """Whether a value is a finite number that a float holds."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 def _check(value: Any, hint: Any, where: str) -> Any:
@@ -141,7 +142,7 @@ def _check(value: Any, hint: Any, where: str) -> Any:
 
 
 def _number(value: Any, kind: type, unit: str, low: float, high: float, where: str) -> Any:
-    if not _is_number(value) or (kind is int and not isinstance(value, int)):
+    if not is_number(value) or (kind is int and not isinstance(value, int)):
         raise ParameterError(f"{where}: expected a {'whole number' if kind is int else 'number'}, got {value!r}")
     if not low <= value <= high:
         raise ParameterError(f"{where}: expected {low:g} to {high:g} {unit}, got {value!r}")

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hil.parameters import load_set, override
+from hil.parameters import is_number, load_set, override
 from hil.study.nuisances import BRAKE_K, CONSTANT_EPSILON_W, Nuisance, guessed, listed
 from hil.study.table import Floats, UnusableError
 from hil.study.vehicle_keys import ALIASES, DERIVED, OF_SECTION, SPECIAL, UNLIMITED, WIDE
@@ -172,7 +172,7 @@ def _derive(
 
 def _number(value: Any, where: str) -> Any:
     numbers = value if isinstance(value, list) else [value]
-    if not numbers or any(isinstance(v, bool) or not isinstance(v, int | float) or not np.isfinite(v) for v in numbers):
+    if not numbers or not all(map(is_number, numbers)):
         raise UnusableError(f"{where}: expected a number, got {value!r}")
     return value
 

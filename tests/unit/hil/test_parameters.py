@@ -54,6 +54,8 @@ def test_a_good_set(read):
         ('1463, unit = "kg"', '1463, unit = "t"', r"body.mass_kg: expected unit 'kg', got 't'"),
         ("value = 1463", "value = 14630", r"body.mass_kg: expected 500 to 5000 kg, got 14630"),
         ("value = 1463", "value = nan", r"body.mass_kg: expected a number, got nan"),
+        ("value = 1463", "value = 1" + 400 * "0", r"body.mass_kg: expected a number, got 10000"),
+        ("tolerance = 75", "tolerance = 1" + 400 * "0", r"body.mass_kg: expected a tolerance >= 0"),
         ("value = 1463", "value = true", r"body.mass_kg: expected a number, got True"),
         ("value = 4,", "value = 3.5,", r"body.wheels: expected a whole number, got 3.5"),
         ("[1.52, 1.51]", "[1.52]", r"body.track_m: expected a list of 2 numbers in 'm', got \[1.52\]"),

@@ -49,7 +49,7 @@ def test_the_shipped_car_keeps_its_own_numbers() -> None:
     assert np.isfinite(car.p).all()
 
 
-@pytest.mark.parametrize("value", ["heavy", True, [], float("nan")])
+@pytest.mark.parametrize("value", ["heavy", True, [], float("nan"), 10**400])
 def test_what_is_no_number_is_refused(value: object) -> None:
     if isinstance(value, str):
         assert load_vehicle({**SIX, "colour": value})
