@@ -12,6 +12,7 @@ from typing import Any
 
 from hil.errors import BrakebenchError
 from hil.generators import GENERATORS, Points
+from hil.parameters import is_number
 from plant.manoeuvre import Trace
 
 MOST_POINTS = 1_000_000
@@ -29,15 +30,9 @@ class Files:
     read: list[bytes] = field(default_factory=list)
 
 
-def as_number(value: object) -> float | None:
+def as_number(value: Any) -> float | None:
     """A finite float, or None where the value is no such number."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    try:
-        number = float(value)
-    except OverflowError:
-        return None
-    return number if math.isfinite(number) else None
+    return float(value) if is_number(value) else None
 
 
 class Table:

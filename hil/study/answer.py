@@ -11,9 +11,10 @@ from hil.study.contest import Contender, odds
 from hil.study.decide import decide_with, write
 from hil.study.diagnosis import TIED, Diagnosis
 from hil.study.fit import Term
+from hil.study.intervals import half_width, intervals
 from hil.study.linear import project
-from hil.study.measure import Gain, intervals, probabilities
-from hil.study.own_error import UNLISTED
+from hil.study.measure import Gain, probabilities
+from hil.study.own_error import UNLISTED, variance_of_law
 from hil.study.patterns import WORDS, Wrong
 from hil.study.tied import Tied, tied_set
 
@@ -129,7 +130,9 @@ def _unlisted(found: Diagnosis, piece: Piece, listed: list[Contender]) -> dict[s
         "effect": UNLISTED, "title": piece.effect.title, "joint": piece.law.joint, "wheel": piece.place,
         "parameters": {}, "probability": probabilities(listed)[0], "onset": None, "onset_s": None,
         "variables": [piece.variable], "adds": piece.law.adds,
-        "curve": shown(pieces, [terms[k].value for k in own], covariance[np.ix_(own, own)]),
+        "curve": shown(
+            pieces, [terms[k].value for k in own], variance_of_law(piece.law.name) * covariance[np.ix_(own, own)]
+        ),
     }  # fmt: skip
 
 
@@ -147,7 +150,7 @@ def _rivals(found: Diagnosis) -> list[tuple[Contender, float]]:
 
 def _rival(contender: Contender, chance: float) -> dict[str, Any]:
     candidate, value = contender.term.candidate, contender.term.value
-    half = 1.96 / max(contender.information, 1e-30) ** 0.5
+    half = half_width(candidate, value, max(contender.information, 1e-30) ** -0.5)
     return {
         "effect": candidate.effect.name, "title": candidate.effect.title, "wheel": candidate.place,
         "joint": candidate.effect.joints[0] if candidate.effect.joints else "",

@@ -36,7 +36,7 @@ _CLEARER = 5.0
 _TRIED, _LAWS_TRIED = 10, 2
 """Leaders, and laws in no list, where the vehicle's numbers go far, places of one effect among them."""
 _NEAR = 0.2
-"""Share of what the best explains by one step, below which no other is fitted from the car as handed in."""
+"""Share of what the best explains, by one step or fitted, below which no other is fitted from the car as handed in."""
 _MISLED = 1.0 / 3.0
 """Share of what a cause explains, by which the fit without any must have been worse than it can be, for the search to
 begin again from a better one."""
@@ -206,8 +206,8 @@ class _Search:
         reference, left_over = contest.reference, _FORM**2 * found.explained
         gained = [self._gained(c, item, reference - left_over).gained for c, item in zip(fitted, top, strict=True)]
         if self.settings.relinearise and (bent or max(gained) >= least):
-            most = max(item.raw for item in top)
-            near = [c for c, item in zip(fitted, top, strict=True) if bent or item.raw >= _NEAR * most]
+            explain = [max(item.raw, reference - c.cost) for c, item in zip(fitted, top, strict=True)]
+            near = [c for c, much in zip(fitted, explain, strict=True) if bent or much >= _NEAR * max(explain)]
             refound, without = self._from_handed_in(model, near, refitted, reference, _LED_ANEW)
             better = dict(zip(map(id, near), refound, strict=True))
             fitted = [better.get(id(c), c) for c in fitted]

@@ -10,7 +10,6 @@ from hil.study.diagnosis import Diagnosis
 from hil.study.fit import Model, Tracks
 from hil.study.linear import solve, sums
 from hil.study.noise import Frame
-from hil.study.same_number import same_number
 from hil.study.table import Floats
 
 FOLDS = 4
@@ -117,46 +116,6 @@ def _interval(sums_by: Floats) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def intervals(found: Diagnosis) -> list[tuple[float, float]]:
-    """95 % interval of each cause's value: curvature of the likelihood, widened where manoeuvres disagree.
-
-    What is a number of the vehicle is known no better than that number.
-    """
-    model, fitter = found.final, found.fitter
-    if not model.terms:
-        return []
-    own = fitter.term_columns(model)
-    columns = {name: np.hstack([values, own[name]]) for name, values in fitter.nuisance_columns.items()}
-    count = len(fitter.nuisances)
-    of = sums(model.residual, columns, fitter.frame, found.noise, count)
-    free = list(range(len(model.terms)))
-    _, covariance = solve(of.total(), count, free, model.z)
-    curvature = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    rng = np.random.default_rng(1)
-    manoeuvres = len(of.matrix)
-    draws = []
-    for _ in range(60 if manoeuvres >= 6 else 0):
-        weights = rng.multinomial(manoeuvres, np.full(manoeuvres, 1.0 / manoeuvres)).astype(np.float64)
-        change, _ = solve(of.total(weights), count, free, model.z)
-        draws.append(change[count:])
-    spread = curvature
-    if draws:
-        low, high = np.quantile(np.array(draws), (0.16, 0.84), axis=0)
-        spread = np.clip(0.5 * (high - low), curvature, 1.6 * curvature)
-    world = fitter.base.shifted(fitter.nuisances, model.z)
-    same = [same_number(term, fitter.nuisances, world) for term in model.terms]
-    spread = np.array(
-        [s if one is None else max(s, one.deviation(fitter.nuisances)) for s, one in zip(spread, same, strict=True)]
-    )
-    return [
-        (
-            float(np.clip(term.value - 1.96 * s, term.candidate.parameter.low, term.candidate.parameter.high)),
-            float(np.clip(term.value + 1.96 * s, term.candidate.parameter.low, term.candidate.parameter.high)),
-        )
-        for term, s in zip(model.terms, spread, strict=True)
-    ]
-
-
 def probabilities(contenders: Sequence[Contender], tempering: float = 1.5) -> list[float]:
     """Softmax of the log-odds, tempered: two contenders are less far apart than an exact noise model would say."""
     logs = np.array([(-0.5 * c.cost + c.evidence) / tempering for c in contenders])
@@ -165,4 +124,4 @@ def probabilities(contenders: Sequence[Contender], tempering: float = 1.5) -> li
     return [float(v) for v in weights / weights.sum()]
 
 
-__all__ = ["Gain", "best_wrong", "gains", "held_out", "intervals", "probabilities"]
+__all__ = ["Gain", "best_wrong", "gains", "held_out", "probabilities"]
