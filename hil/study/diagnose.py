@@ -29,8 +29,8 @@ from hil.study.world import World
 Say = Callable[[str], None]
 PLAUSIBLE, LEADERS = 12, 5
 _OF_SCREEN = 1.5
-_FORM = 0.2
-"""Share of a cause that its equation may get wrong: what it leaves is no other cause."""
+_FORM, _FORM_THERE = 0.2, 0.35
+"""Share of a cause that its equation may get wrong, elsewhere and at its own joints: what it leaves is no other one."""
 _CLEARER = 5.0
 """By how much more than the best listed cause a law in no list must explain, log of the odds."""
 _TRIED, _LAWS_TRIED = 10, 2
@@ -191,7 +191,7 @@ class _Search:
         """The next cause, if one is beyond doubt; no contender where the numbers explain more without a further one."""
         bent, least = self._bent(model), found.least_gain
         plausible = self._plausible(found, model, noise, bent)
-        if max((item.gain for item in plausible), default=0.0) < _HOPELESS * least:
+        if self._most(found, model, plausible) < _HOPELESS * least:
             return None
         self.say(f"noise beside {len(plausible)} candidates")
         contest = Contest(self.fitter, self.effect_columns, model, noise, self.settings.relinearise)
@@ -199,13 +199,18 @@ class _Search:
         beside = {id(item): quieter for item, quieter in seen}
         looked = [item for item, _ in seen]
         top = sorted(looked, key=lambda s: -s.evidence)[:_TRIED] if bent else leaders(looked, LEADERS)
-        if max((item.gain for item in top), default=0.0) < _POOR * least:
+        if self._most(found, model, top) < _POOR * least:
             return None
         self.say(f"fitting {len(top)} leaders")
         fitted = contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
-        reference, left_over = contest.reference, _FORM**2 * found.explained
-        gained = [self._gained(c, item, reference - left_over).gained for c, item in zip(fitted, top, strict=True)]
-        if self.settings.relinearise and (bent or max(gained) >= least):
+        reference, left_over = contest.reference, [self._left_over(found, model, item.candidate) for item in top]
+
+        def gained() -> list[Contender]:
+            listed = zip(fitted, top, left_over, strict=True)
+            return [self._gained(one, item, reference - left) for one, item, left in listed]
+
+        most_gained = max(one.gained for one in gained())
+        if self.settings.relinearise and (bent or most_gained >= least):
             explain = [max(item.raw, reference - c.cost) for c, item in zip(fitted, top, strict=True)]
             near = [c for c, much in zip(fitted, explain, strict=True) if bent or much >= _NEAR * max(explain)]
             refound, without = self._from_handed_in(model, near, refitted, reference, _LED_ANEW)
@@ -221,7 +226,7 @@ class _Search:
         tighter = min(fitted, key=odds).noise
         reference = min(reference, self.fitter.fit(model, tighter, 3).cost)
         law = self._unlisted(found, contest, model, tighter, reference, min(fitted, key=odds))
-        fitted = [self._gained(c, item, reference - left_over) for c, item in zip(fitted, top, strict=True)]
+        fitted = gained()
         clear = sorted((c for c in fitted if c.gained >= least and worth(c) > 0.0), key=odds)
         if law is not None:
             found.explained += reference - law.cost
@@ -299,7 +304,7 @@ class _Search:
         best = entries[law.term.candidate.name]
         self.say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
         least = least_gain(found.looks + len(LAWS), self.settings.alpha) * inflation(found.screened)
-        least = least * variance_of_law(best.curve.law.name) + _FORM**2 * found.explained
+        least = least * variance_of_law(best.curve.law.name) + self._left_over(found, model, best.curve.pieces[0])
 
         def ahead() -> bool:
             gained = min(listed.cost, reference) - law.cost
@@ -334,6 +339,18 @@ class _Search:
         gained = min(reference - contender.cost, _OF_SCREEN * item.raw) / variance_of(item.candidate)
         gained = gained / self._strain(contender.model.z) - price(contender.term, self.frame)
         return replace(contender, gained=gained)
+
+    def _most(self, found: Diagnosis, model: Model, listed: Sequence[Score]) -> float:
+        """Most that a candidate gains by one step, beyond what the causes in the model may leave."""
+        left = [self._left_over(found, model, item.candidate) / variance_of(item.candidate) for item in listed]
+        return max((item.gain - less for item, less in zip(listed, left, strict=True)), default=0.0)
+
+    @staticmethod
+    def _left_over(found: Diagnosis, model: Model, candidate: Candidate) -> float:
+        """What the causes in the model may leave for one more, by the form of their equations."""
+        taken = {joint for term in model.terms for joint in term.candidate.effect.joints}
+        share = _FORM_THERE if taken.intersection(candidate.effect.joints) else _FORM
+        return share**2 * found.explained
 
     def _backward(self, found: Diagnosis) -> None:
         """Take out each cause in turn; what is not missed, or may as well be nothing, stays out."""
