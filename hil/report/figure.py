@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from hil.report.palette import INK, SEVERITY_COLOURS, Stroke, strokes
 from hil.report.report import Chart, Curve, Event, Floats, Lane, Number, Panel, Report, Section, Span
 from hil.report.units import Unit, shown, symbol
@@ -25,6 +27,7 @@ _PLOT, _CHART, _LANE, _LINE = 1.25, 2.3, 0.34, 0.19  # in: heights of a plot, a 
 _SOFT, _RULE, _GRID = "#57636F", "#C9D1D9", "#E8ECF0"
 _VERDICT_COLOURS = {"passed": "#1D7A4F", "failed": "#B3261E", "incomplete": "#9A6700"}
 _NUMBERS_A_ROW = 7
+_ROW, _LETTER, _MOST_LETTERS = 0.16, 0.062, 36  # in: height of a named row, width of a letter of its name
 _LETTERS = 84  # of 7 points that the narrowest timeline holds
 
 
@@ -37,10 +40,12 @@ def write_figure(report: Report, path: Path, dpi: int = 130) -> None:
 
 
 class _Cell:
-    """One field of the grid: its height without legend, its strokes' names, and how to fill it."""
+    """One field of the grid: its height without legend, its strokes' names, how to fill it; room on the left, in."""
 
-    def __init__(self, title: str, names: Sequence[str], height: float, fill: Callable[["Axes"], None]) -> None:
-        self.title, self.names, self.height, self.fill = title, names, height, fill
+    def __init__(
+        self, title: str, names: Sequence[str], height: float, fill: Callable[["Axes"], None], beside: float = 0.0
+    ) -> None:
+        self.title, self.names, self.height, self.fill, self.beside = title, names, height, fill, beside
 
     def legend_columns(self, width: float) -> int:
         """Return the most legend columns that fit ``width`` in."""
@@ -82,9 +87,9 @@ def draw(report: Report) -> "Figure":
         for row in grid:
             head, tall = max(cell.head(width) for cell in row), max(cell.height for cell in row)
             for column, cell in enumerate(row):
-                left = _EDGE + _LEFT + column * (width + _LEFT + _GAP)
-                bottom = top - head - tall
-                axes = figure.add_axes((left / WIDTH_IN, bottom / height, width / WIDTH_IN, tall / height))
+                left = _EDGE + _LEFT + column * (width + _LEFT + _GAP) + cell.beside
+                bottom, wide = top - head - tall, width - cell.beside
+                axes = figure.add_axes((left / WIDTH_IN, bottom / height, wide / WIDTH_IN, tall / height))
                 _prepare(axes)
                 cell.fill(axes)
                 _legend(axes, cell, width, tall)
@@ -153,7 +158,10 @@ def _cells(section: Section) -> list[_Cell]:
             )
     for chart in section.charts:
         names = [clean(curve.name) for curve in chart.curves]
-        cells.append(_Cell(clean(chart.title), names, _CHART, _chart_filler(chart)))
+        height = max(_CHART, _ROW * len(chart.rows))
+        beside = max((_LETTER * min(len(row), _MOST_LETTERS) for row in chart.rows), default=_LEFT) - _LEFT
+        fill = _row_filler(chart) if chart.rows else _chart_filler(chart)
+        cells.append(_Cell(clean(chart.title), names, height, fill, max(beside, 0.0)))
     return cells
 
 
@@ -287,6 +295,23 @@ def _chart_filler(chart: Chart) -> Callable[["Axes"], None]:
             _interval(axes, chart, curve, stroke)
         axes.set_xlabel(_titled(chart.x_label, chart.x_unit), fontsize=7.5, color=_SOFT, labelpad=1, parse_math=False)
         axes.set_ylabel(_titled(chart.y_label, chart.y_unit), fontsize=7.5, color=_SOFT, labelpad=2, parse_math=False)
+
+    return fill
+
+
+def _row_filler(chart: Chart) -> Callable[["Axes"], None]:
+    def fill(axes: "Axes") -> None:
+        for curve, stroke in zip(chart.curves, strokes(chart.curves), strict=True):
+            _stroke(axes, shown(curve.y, chart.y_unit), curve.x, stroke)
+            if curve.low is not None and curve.high is not None:
+                low, high = shown(curve.low, chart.y_unit), shown(curve.high, chart.y_unit)
+                axes.hlines(curve.x, low, high, color=stroke.colour, linewidth=1.0)
+        places = np.arange(1, len(chart.rows) + 1)
+        axes.set_yticks(places, [_cut(clean(row), _MOST_LETTERS) for row in chart.rows])
+        for label in axes.get_yticklabels():
+            label.set_parse_math(False)
+        axes.set_ylim(len(chart.rows) + 0.6, 0.4)
+        axes.set_xlabel(_titled(chart.y_label, chart.y_unit), fontsize=7.5, color=_SOFT, labelpad=1, parse_math=False)
 
     return fill
 

@@ -116,7 +116,23 @@ def chart_figure(chart: Chart, pool: Pool) -> Figure:
     layout |= {"hovermode": "closest", "margin": {**layout["margin"], "b": 44}}
     layout["xaxis"]["title"] = {"text": _axis(chart.x_label, x_unit), "standoff": 6}
     layout["yaxis"]["title"] = {"text": _axis(chart.y_label, y_unit), "standoff": 4}
-    return {"data": data, "layout": layout}
+    return _turned(chart, data, layout) if chart.rows else {"data": data, "layout": layout}
+
+
+def _turned(chart: Chart, data: list[Figure], layout: Figure) -> Figure:
+    """Return a plot with named rows in place of the x axis."""
+    other = {"x": "y", "y": "x", "error_y": "error_x"}
+    names = [inert(name) for name in chart.rows]
+    turned = [{other.get(key, key): value for key, value in curve.items()} for curve in data]
+    unit = inert(symbol(chart.y_unit))
+    for curve in turned:
+        curve["hovertemplate"] = f"{curve['name']}<br>%{{x:.5~r}} {unit}<extra></extra>"
+        if curve["mode"] == "markers":
+            curve["customdata"] = [names[round(y) - 1] for y in curve["y"]]
+            curve["hovertemplate"] = f"%{{customdata}}<br>{curve['hovertemplate']}"
+    rows = {"tickvals": list(range(1, len(names) + 1)), "ticktext": names, "range": [len(names) + 0.6, 0.4]}
+    values, places = layout["yaxis"], layout["xaxis"] | rows | {"automargin": True, "title": {"text": ""}}
+    return {"data": turned, "layout": layout | {"xaxis": values, "yaxis": places}}
 
 
 def _axis(label: str, unit: str) -> str:

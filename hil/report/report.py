@@ -137,7 +137,15 @@ class Curve:
 
 @dataclass(frozen=True)
 class Chart:
-    """Curves and points over anything but time."""
+    """Curves and points over anything but time.
+
+    ``rows`` are names for x = 1, 2, ...: then each has a line of its own, the first on top, with values to the right.
+
+    Raises
+    ------
+    ValueError
+        Points beside the rows.
+    """
 
     title: str
     x_label: str
@@ -145,6 +153,15 @@ class Chart:
     y_label: str
     y_unit: Unit
     curves: tuple[Curve, ...] = ()
+    rows: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for curve in self.curves if self.rows else ():
+            if curve.style == "points" and not np.isin(curve.x, np.arange(1, len(self.rows) + 1)).all():
+                raise ValueError(
+                    f"chart {self.title!r}, points {curve.name!r}: expected x from 1 to {len(self.rows)}, one for each "
+                    f"row, got {curve.x.tolist()}; number the rows from 1"
+                )
 
 
 @dataclass(frozen=True)

@@ -193,6 +193,9 @@ def _spark(t_s: Floats, y: Floats, span: tuple[float, float], scale: tuple[float
 def _chart(chart: Chart, width: int) -> Iterator[str]:
     axes = [(chart.y_label, chart.y_unit), (chart.x_label, chart.x_unit)]
     y_name, x_name = (clean(label) + (f" [{clean(symbol(unit))}]" if symbol(unit) else "") for label, unit in axes)
+    if chart.rows:
+        yield from _table(_by_row(chart, y_name, x_name), width, lambda text, _: text)
+        return
     rows = []
     for curve in chart.curves:
         x, y = shown(curve.x, chart.x_unit), shown(curve.y, chart.y_unit)
@@ -200,6 +203,17 @@ def _chart(chart: Chart, width: int) -> Iterator[str]:
         rows.append((curve.name, int(x.size), *ends))
     heads = ("curve", "points", "x min", "x max", "y min", "y max")
     yield from _table(Table(chart.title, heads, tuple(rows), f"{y_name} over {x_name}"), width, lambda text, _: text)
+
+
+def _by_row(chart: Chart, y_name: str, x_name: str) -> Table:
+    """A chart with named rows: one column a curve."""
+    points = [curve for curve in chart.curves if curve.style == "points"]
+    at = [dict(zip(curve.x.tolist(), shown(curve.y, chart.y_unit).tolist(), strict=True)) for curve in points]
+    rows = [
+        (name, *(None if k not in values else float(f"{values[k]:.4g}") for values in at))
+        for k, name in enumerate(chart.rows, 1)
+    ]
+    return Table(chart.title, (x_name, *(curve.name for curve in points)), tuple(rows), y_name)
 
 
 def _table(table: Table, width: int, paint: Paint) -> Iterator[str]:

@@ -189,33 +189,18 @@ class _Search:
 
     def _next(self, found: Diagnosis, model: Model, noise: Noise) -> Accepted | None:
         """The next cause, if one is beyond doubt; no contender where the numbers explain more without a further one."""
-        bent, least = self._bent(model), found.least_gain
-        plausible = self._plausible(found, model, noise, bent)
-        if self._most(found, model, plausible) < _HOPELESS * least:
+        least, leading = found.least_gain, self._leading(found, model, noise)
+        if leading is None:
             return None
-        self.say(f"noise beside {len(plausible)} candidates")
-        contest = Contest(self.fitter, self.effect_columns, model, noise, self.settings.relinearise)
-        seen = contest.at_once(contest.profiled, plausible)
-        beside = {id(item): quieter for item, quieter in seen}
-        looked = [item for item, _ in seen]
-        top = sorted(looked, key=lambda s: -s.evidence)[:_TRIED] if bent else leaders(looked, LEADERS)
-        if self._most(found, model, top) < _POOR * least:
-            return None
-        self.say(f"fitting {len(top)} leaders")
-        fitted = contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
+        contest, top, fitted = leading
         reference, left_over = contest.reference, [self._left_over(found, model, item.candidate) for item in top]
 
         def gained() -> list[Contender]:
             listed = zip(fitted, top, left_over, strict=True)
             return [self._gained(one, item, reference - left) for one, item, left in listed]
 
-        most_gained = max(one.gained for one in gained())
-        if self.settings.relinearise and (bent or most_gained >= least):
-            explain = [max(item.raw, reference - c.cost) for c, item in zip(fitted, top, strict=True)]
-            near = [c for c, much in zip(fitted, explain, strict=True) if bent or much >= _NEAR * max(explain)]
-            refound, without = self._from_handed_in(model, near, refitted, reference, _LED_ANEW)
-            better = dict(zip(map(id, near), refound, strict=True))
-            fitted = [better.get(id(c), c) for c in fitted]
+        if self.settings.relinearise and (self._bent(model) or max(one.gained for one in gained()) >= least):
+            fitted, without = self._fitted_again(model, fitted, top, reference)
             bare = without[0].cost
             worse, more = reference - bare, bare - min(c.cost for c in fitted)
             if not self.began_again and worse > max(least, _MISLED * more):
@@ -240,6 +225,36 @@ class _Search:
         polished, tighter = self.fitter.settle(polished, best.noise, 2, 60)
         rest = sorted((c for c in fitted if c is not best and (c in clear or odds(c) >= odds(best))), key=odds)
         return polished, tighter, [replace(best, model=polished, term=polished.terms[-1]), *rest]
+
+    def _leading(
+        self, found: Diagnosis, model: Model, noise: Noise
+    ) -> tuple[Contest, list[Score], list[Contender]] | None:
+        """The race for the next cause, its leaders and their fits; None where none can be beyond doubt."""
+        bent, least = self._bent(model), found.least_gain
+        plausible = self._plausible(found, model, noise, bent)
+        if self._most(found, model, plausible) < _HOPELESS * least:
+            return None
+        self.say(f"noise beside {len(plausible)} candidates")
+        contest = Contest(self.fitter, self.effect_columns, model, noise, self.settings.relinearise)
+        seen = contest.at_once(contest.profiled, plausible)
+        beside = {id(item): quieter for item, quieter in seen}
+        looked = [item for item, _ in seen]
+        top = sorted(looked, key=lambda s: -s.evidence)[:_TRIED] if bent else leaders(looked, LEADERS)
+        if self._most(found, model, top) < _POOR * least:
+            return None
+        self.say(f"fitting {len(top)} leaders")
+        return contest, top, contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
+
+    def _fitted_again(
+        self, model: Model, fitted: list[Contender], top: list[Score], reference: float
+    ) -> tuple[list[Contender], tuple[Model, Noise]]:
+        """Contenders, those that explain much fitted from the car as handed in too, and the best fit without any."""
+        explain = [max(item.raw, reference - c.cost) for c, item in zip(fitted, top, strict=True)]
+        least = 0.0 if self._bent(model) else _NEAR * max(explain)
+        near = [c for c, much in zip(fitted, explain, strict=True) if much >= least]
+        refound, without = self._from_handed_in(model, near, refitted, reference, _LED_ANEW)
+        better = dict(zip(map(id, near), refound, strict=True))
+        return [better.get(id(c), c) for c in fitted], without
 
     def _plausible(self, found: Diagnosis, model: Model, noise: Noise, bent: bool) -> list[Score]:
         """Candidates that explain most by one step and are not in the model yet."""

@@ -245,8 +245,9 @@ def _race(answer: Answer) -> Section:
         )
     )
     bars = Curve("gain", np.arange(1.0, len(top) + 1.0), np.array([s.gain for s in top]), style="points")
-    asked = Curve("asked", np.array([1.0, float(max(len(top), 2))]), np.full(2, found.least_gain), style="demand")
-    chart = Chart("Explained by each candidate alone", "rank in the screen", "", "Δχ²", "", (bars, asked))
+    asked = Curve("asked of a cause", np.array([0.5, len(top) + 0.5]), np.full(2, found.least_gain), style="demand")
+    names = tuple(s.candidate.name for s in top)
+    chart = Chart("Explained by each candidate alone", "candidate", "", "Δχ²", "", (bars, asked), names)
     return Section("Candidates", tables=tuple(tables), charts=(chart,) if top else ())
 
 
@@ -281,9 +282,9 @@ def _gain_charts(answer: Answer) -> tuple[Chart, ...]:
     if all(g.best_wrong is not None for g in gains):
         wrong = np.array([g.best_wrong for g in gains], np.float64) / before
         curves.append(Curve("best wrong effect", x, wrong, style="points", group="rl"))
-    curves.append(Curve("handed in", x, np.ones(len(gains)), style="demand"))
-    title = "Held-out error against the simulation as handed in"
-    return (Chart(title, "channel, in the order of the table", "", "error / error as handed in", "", tuple(curves)),)
+    curves.append(Curve("handed in", np.array([0.5, len(gains) + 0.5]), np.ones(2), style="demand"))
+    title, names = "Held-out error against the simulation as handed in", tuple(WORDS[g.channel] for g in gains)
+    return (Chart(title, "channel", "", "error / error as handed in", "", tuple(curves), names),)
 
 
 def _limits(answer: Answer) -> Section:

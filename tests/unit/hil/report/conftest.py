@@ -41,6 +41,9 @@ def full_report() -> Report:
         "N",
         (Curve("model", x, x * 2, x, x * 3), Curve("data", x, x, x - 1, x + 1, "points")),
     )
+    points = Curve("gain", x, 100.0 * x, 90.0 * x, 110.0 * x, "points")
+    asked = Curve("asked", np.array([0.5, 3.5]), np.full(2, 150.0), style="demand")
+    ranked = Chart("Candidates", "candidate", "", "gain", "", (points, asked), ("mass", "radius", "drag"))
     table = Table("Rates", ("message", "rate, Hz"), (("BRAKE_PEDAL", 100.25), ("STEERING", None)), "as received")
     return Report(
         title="A stop",
@@ -55,7 +58,7 @@ def full_report() -> Report:
         ),
         sections=(
             Section("Braking", (speed, pressure), lanes, text="On a dry road."),
-            Section("Study", charts=(chart,), tables=(table,)),
+            Section("Study", charts=(chart, ranked), tables=(table,)),
         ),
         provenance={"scenario": {"file": "stop72.toml", "mu": 0.123456789}, "seeds": [1, 7], "python": "3.11"},
     )

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from hil.report.figure import draw, write_figure
-from hil.report.report import Event, Lane, Number, Panel, Report, Section, Span, Trace, Verdict
+from hil.report.report import Chart, Curve, Event, Lane, Number, Panel, Report, Section, Span, Trace, Verdict
 
 
 def _texts(figure: Figure) -> str:
@@ -29,7 +29,7 @@ def test_the_picture_shows_names_and_numbers(full_report: Report) -> None:
         "asked",
     ):
         assert name in text
-    for name in ("ECU mode", "NORMAL", "bus_off", "Fit", "Slip", "Force", "data"):
+    for name in ("ECU mode", "NORMAL", "bus_off", "Fit", "Slip", "Force", "data", "mass", "radius", "drag"):
         assert name in text
     lines = {line.get_color() for axes in figure.axes for line in axes.lines}
     assert {"#0072B2", "#009E73", "#6E7781"} <= lines
@@ -48,7 +48,8 @@ def test_any_name_is_drawn_as_it_is(name: str, tmp_path: Path) -> None:
     x = np.array([0.0, 1.0])
     lane = Lane(name, (Span(0.0, 1.0, name),), (Event(0.2, name),))
     traces = (Trace(name, x, x, group="fl"), Trace(name, x, x, "demand"))
-    section = Section(name, (Panel(name, name, traces),), (lane,))
+    ranked = Chart(name, name, "", name, "", (Curve(name, x + 1.0, x, x, x, "points"),), (name, name))
+    section = Section(name, (Panel(name, name, traces),), (lane,), (ranked,))
     report = Report(name, Verdict.PASSED, name, (Number(name, name, name, name, name),), (section,))
     write_figure(report, tmp_path / "r.svg")
     if name.isprintable():

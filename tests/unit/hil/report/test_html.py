@@ -72,6 +72,18 @@ def test_all_content_is_on_the_page(full_report: Report, shown: list[str]) -> No
     assert (fit["xaxis"]["title"]["text"], fit["yaxis"]["title"]["text"]) == ("Slip in &#37;", "Force in N")
 
 
+def test_named_rows_lie_along_the_y_axis_the_first_on_top(full_report: Report) -> None:
+    figure = page_without_plotly(full_report).figures[3]
+    rows, (points, asked) = figure["layout"]["yaxis"], figure["data"]
+    assert (rows["ticktext"], rows["tickvals"]) == (["mass", "radius", "drag"], [1, 2, 3])
+    assert rows["range"][0] > rows["range"][1]
+    assert (points["x"], points["y"]) == ([100.0, 200.0, 300.0], [1.0, 2.0, 3.0])
+    assert points["error_x"]["array"] == pytest.approx([10.0, 20.0, 30.0])
+    assert points["customdata"] == ["mass", "radius", "drag"]
+    assert (asked["x"], asked["y"]) == ([150.0, 150.0], [0.5, 3.5])
+    assert figure["layout"]["xaxis"]["title"]["text"] == "gain"
+
+
 def test_every_sample_is_on_the_page_in_the_shown_unit(full_report: Report) -> None:
     page = page_without_plotly(full_report)
     for panel, figure in zip(full_report.sections[0].panels, page.figures, strict=False):
@@ -103,7 +115,8 @@ def _everything_named(name: str) -> Report:
     panel = Panel(name, name, (Trace(name, x, x, group=name),))
     lane = Lane(name, (Span(0.0, 0.5, name),), (Event(0.7, name),))
     chart = Chart(name, name, name, name, name, (Curve(name, x, x, x, x),))
-    section = Section(name, (panel,), (lane,), (chart,), (Table(name, (name,), ((name,),), name),), name)
+    ranked = Chart(name, name, name, name, name, (Curve(name, x + 1.0, x, x, x, "points"),), (name, name))
+    section = Section(name, (panel,), (lane,), (chart, ranked), (Table(name, (name,), ((name,),), name),), name)
     numbers = (Number(name, name, name, name, name, False),)
     return Report(name, Verdict.FAILED, name, numbers, (section,), {name: {name: name}, "list": [name]})
 
@@ -118,8 +131,10 @@ def _harmless(name: str) -> None:
         labels += [
             figure["layout"][axis]["title"]["text"] for axis in ("xaxis", "yaxis") if "title" in figure["layout"][axis]
         ]
+        labels += figure["layout"]["yaxis"].get("ticktext", [])
+        labels += [row for trace in figure["data"] for row in trace.get("customdata", [])]
         for label in labels:
-            own = re.sub(r"<br>|<extra></extra>|%\{[xy]:\.\d(f|~r)\}", "", label)
+            own = re.sub(r"<br>|<extra></extra>|%\{customdata\}|%\{[xy]:\.\d(f|~r)\}", "", label)
             assert not re.search(r"[<>$]|%\{", own)
             assert not re.search(r"&(?!(amp|lt|gt|#37|#36);)", own)
 

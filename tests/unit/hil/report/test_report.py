@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from hil.report.palette import INK, NEUTRAL, SERIES, WHEEL_COLOURS, strokes
-from hil.report.report import Curve, Event, Lane, Panel, Section, Span, Table, Trace
+from hil.report.report import Chart, Curve, Event, Lane, Panel, Section, Span, Table, Trace
 from hil.report.units import BAR, DEG_C, KMH, shown, symbol
 
 
@@ -92,3 +92,11 @@ def test_wheels_keep_their_colour_demands_are_neutral_dashes_and_groups_share_on
     front, rear = strokes([Trace("f", x, x, "demand", "fl"), Trace("r", x, x, "demand", "rl")])
     assert front.colour == rear.colour == NEUTRAL
     assert front.dash != rear.dash
+
+
+def test_points_beside_the_named_rows_are_refused() -> None:
+    points = Curve("gain", np.array([0.0, 1.0]), np.array([1.0, 2.0]), style="points")
+    with pytest.raises(
+        ValueError, match=r"chart 'c', points 'gain': expected x from 1 to 2, .* number the rows from 1"
+    ):
+        Chart("c", "", "", "", "", (points,), ("a", "b"))

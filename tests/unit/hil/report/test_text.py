@@ -99,6 +99,17 @@ def test_many_events_are_counted_not_hidden() -> None:
     assert f"{500 - MOST_EVENTS} more of 500" in text
 
 
+def test_a_chart_with_named_rows_is_a_table_of_its_points(full_report: Report) -> None:
+    text = render_text(full_report, 100)
+    lines = text[text.index("Candidates") :].splitlines()
+    assert [line.split() for line in lines[1:5]] == [
+        ["candidate", "gain"],
+        ["mass", "100.0"],
+        ["radius", "200.0"],
+        ["drag", "300.0"],
+    ]
+
+
 def test_a_table_too_wide_is_printed_cell_by_cell() -> None:
     table = Table("T", tuple(f"column {i}" for i in range(12)), (tuple(range(1000, 1012)),))
     text = render_text(Report("r", sections=(Section("s", tables=(table,)),)), 60)
