@@ -28,6 +28,7 @@ _SOFT, _RULE, _GRID = "#57636F", "#C9D1D9", "#E8ECF0"
 _VERDICT_COLOURS = {"passed": "#1D7A4F", "failed": "#B3261E", "incomplete": "#9A6700"}
 _NUMBERS_A_ROW = 7
 _ROW, _LETTER, _MOST_LETTERS = 0.16, 0.062, 36  # in: height of a named row, width of a letter of its name
+_DOT = 5.0  # points: marker of a named row
 _LETTERS = 84  # of 7 points that the narrowest timeline holds
 
 
@@ -48,7 +49,8 @@ class _Cell:
         self.title, self.names, self.height, self.fill, self.beside = title, names, height, fill, beside
 
     def legend_columns(self, width: float) -> int:
-        """Return the most legend columns that fit ``width`` in."""
+        """Return the most legend columns that fit a field of ``width`` in."""
+        width -= self.beside
         widths = [0.056 * len(name) + 0.4 for name in self.names]
         for columns in range(len(widths), 1, -1):
             if sum(max(widths[i::columns]) for i in range(columns)) <= width:
@@ -239,11 +241,13 @@ def _marks(timeline: Sequence[Lane]) -> list[tuple[float, str]]:
     return [(span.start_s, SEVERITY_COLOURS[span.severity]) for span in spans]
 
 
-def _stroke(axes: "Axes", x: Floats, y: Floats, stroke: Stroke) -> None:
+def _stroke(axes: "Axes", x: Floats, y: Floats, stroke: Stroke, size: float = 3.0) -> None:
     width = stroke.width * 0.8
     dash = (0.0, tuple(length / 1.6 for length in stroke.dash)) if stroke.dash else "solid"
     if stroke.points:
-        axes.plot(x, y, linestyle="none", marker="o", markersize=3, color=stroke.colour, alpha=0.75, markeredgewidth=0)
+        axes.plot(
+            x, y, linestyle="none", marker="o", markersize=size, color=stroke.colour, alpha=0.75, markeredgewidth=0
+        )
     else:
         axes.plot(x, y, color=stroke.colour, linewidth=width, linestyle=dash)
 
@@ -302,7 +306,7 @@ def _chart_filler(chart: Chart) -> Callable[["Axes"], None]:
 def _row_filler(chart: Chart) -> Callable[["Axes"], None]:
     def fill(axes: "Axes") -> None:
         for curve, stroke in zip(chart.curves, strokes(chart.curves), strict=True):
-            _stroke(axes, shown(curve.y, chart.y_unit), curve.x, stroke)
+            _stroke(axes, shown(curve.y, chart.y_unit), curve.x, stroke, _DOT)
             if curve.low is not None and curve.high is not None:
                 low, high = shown(curve.low, chart.y_unit), shown(curve.high, chart.y_unit)
                 axes.hlines(curve.x, low, high, color=stroke.colour, linewidth=1.0)
