@@ -184,7 +184,7 @@ class Rig:
         columns = column_indices(_SOURCE["motor"])
         table = np.empty((len(halves), len(columns)))
         simulate(
-            self._start(drive, world), halves, self.case.cut, healthy(), world.p, self._road, ROW_S / 2, 1,
+            self._start(drive, world, halves[0]), halves, self.case.cut, healthy(), world.p, self._road, ROW_S / 2, 1,
             np.ones(len(halves), np.int64), EXPONENTIAL_4, columns, table, OUTPUT.zeros(), world.theta_in(drive),
             world.terms, NO_PLUGINS,
         )  # fmt: skip
@@ -250,7 +250,8 @@ class Rig:
         """Measured channels of all drives."""
         return {g: np.concatenate([drive.measured[g] for drive in self.case.drives]) for g in self._groups}
 
-    def _start(self, drive: Drive, world: World) -> Floats:
+    def _start(self, drive: Drive, world: World, given: Floats) -> Floats:
+        """State at the first row; ``given`` are its inputs, what the sensors add taken off."""
         log, first = drive.log, drive.segments[0]
         soc = log.channels.get("soc")
         charge = 0.7 if soc is None else float(np.nanmean(soc[:20]))
@@ -262,8 +263,8 @@ class Rig:
         speed = self._speed(drive, first, world)
         x[X.speed_mps] = speed
         x[STATE.slice("wheel_speed_rad_s")] = speed / _radius_m(world)
-        x[STATE.slice("pressure_pa")] = np.clip(drive.inputs[0, INPUT.slice("pressure_pa")], 0.0, None)
-        x[STATE.slice("motor_torque_nm")] = drive.inputs[0, INPUT.slice("motor_torque_nm")]
+        x[STATE.slice("pressure_pa")] = np.clip(given[INPUT.slice("pressure_pa")], 0.0, None)
+        x[STATE.slice("motor_torque_nm")] = given[INPUT.slice("motor_torque_nm")]
         return x
 
     def _speed(self, drive: Drive, segment: Segment, world: World) -> float:
@@ -333,10 +334,9 @@ class Rig:
 
         Segments that do not differ are taken from ``kept``; what moves slowly goes on from where it was.
         """
-        x = self._start(drive, world)
         theta = world.theta_in(drive)
-        inputs = inverted(drive.inputs, theta, ROW_S)
-        inputs = in_time(inputs, world.late_s)
+        inputs = in_time(inverted(drive.inputs, theta, ROW_S), world.late_s)
+        x = self._start(drive, world, inputs[0])
         table = np.empty((len(inputs), len(columns)))
         cut, switch, y, pace = self.case.cut, healthy(), OUTPUT.zeros(), self._pace[drive.number]
         states = [x.copy()]
