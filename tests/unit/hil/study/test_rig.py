@@ -67,6 +67,15 @@ def test_a_kept_world_changes_no_result(rig, effect, number, value):
         assert apart <= 2e-3 * max(np.abs(values - rig.run(level)[group]).max(), 1e-9), group
 
 
+def test_a_sensor_that_tells_too_much_does_not_press_the_pads_at_the_start():
+    """The offset is in the first sample as in all others: no pressure that was never there has to be let off."""
+    log, offset = _log(), 1e5
+    told = {f"pressure_{w}_pa": log.channels[f"pressure_{w}_pa"] + offset for w in WHEELS}
+    rig = Rig(prepare([make_log("log", log.t_s, {**log.channels, **told})], 0.308), paper_car())
+    pressure = rig.run(_with(nominal(rig.vehicle), "pressure_offset", "offset_pa", offset))["pressure"]
+    assert pressure[:100] == pytest.approx(offset, abs=1.0)
+
+
 def test_brakes_change_nothing_before_they_are_applied(rig):
     level = nominal(rig.vehicle)
     rig.keep(level)
