@@ -2,7 +2,10 @@
 
 import json
 
+import pytest
 
+
+@pytest.mark.slow
 def test_virtual_and_real_time_agree(brakebench, channel, tmp_path, short):
     result = json.loads(brakebench("compare", short, "--bus", channel, "--json", "--out", "both").stdout)
     distance, lateness = result["stop_distance_m"], result["lateness_ms"]

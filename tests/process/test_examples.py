@@ -30,7 +30,7 @@ def test_objects_in_virtual_time(start, name):
     [
         pytest.param("ecu", ["own_ecu.py", "{spec}"], marks=pytest.mark.slow),
         ("ecu", ["plain_ecu.py", "brakebench", "{name}"]),
-        ("plant", ["own_plant.py", "{spec}"]),
+        pytest.param("plant", ["own_plant.py", "{spec}"], marks=pytest.mark.slow),
     ],
 )
 def test_processes_of_ones_own(start, channel, short, role, script):

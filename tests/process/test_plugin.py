@@ -162,6 +162,7 @@ def test_without_takeover_it_fails_with_recording_figure_and_report(run_pytest):
     assert "BRK-8: failed (1 test)" in out
 
 
+@pytest.mark.slow
 def test_fixtures_in_parallel(run_pytest, tmp_path):
     out = output(run_pytest(FIXTURES + MOTOR_LOSS, "-n", "2", "--brakebench-out", "files", conftest=NO_TAKEOVER), 1)
     assert "12 passed" in out

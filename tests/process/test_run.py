@@ -90,6 +90,7 @@ def every_frame_keeps_its_cycle_time(brakebench, tmp_path, result):
         assert np.median(np.diff(t_s[t_s > 0.0])) == pytest.approx(cycle_s, rel=0.02)
 
 
+@pytest.mark.slow
 def test_two_benches_side_by_side(start, short):
     first, second = start("run", short, "--json", "--bus", "auto"), start("run", short, "--json", "--bus", "auto")
     results = [result_of(first), result_of(second)]
@@ -98,7 +99,7 @@ def test_two_benches_side_by_side(start, short):
     assert all((r["frames_lost"], r["frames_corrupt"], r["processes"]) == (0, 0, 2) for r in results)
 
 
-@pytest.mark.parametrize("after_s", [0.1, pytest.param(1.0, marks=pytest.mark.slow), 3.0])
+@pytest.mark.parametrize("after_s", [0.1, *(pytest.param(t, marks=pytest.mark.slow) for t in (1.0, 3.0))])
 @pytest.mark.parametrize("victim", ["plant", "ecu"])
 def test_a_killed_node_is_survived_and_named(start, channel, tmp_path, victim, after_s):
     bench = start("run", "--json", "--bus", channel, "--out", "out")
@@ -192,6 +193,7 @@ def test_nodes_started_separately_find_each_other(start, channel, tmp_path, shor
     assert leftovers(channel) == []
 
 
+@pytest.mark.slow
 def test_python_can_logger_sees_every_frame(start, channel, tmp_path, short):
     bench = start("run", short, "--json", "--bus", channel)
     name = channel.removeprefix("loopback:")

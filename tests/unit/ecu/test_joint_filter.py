@@ -175,6 +175,7 @@ def test_a_locked_wheel_gives_what_the_road_gives(parameters):
     assert state[FRICTION] == pytest.approx([0.38] * 4, rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_same_source_runs_uncompiled(parameters):
     car = SmallCar(parameters)
     car.run(0.5)

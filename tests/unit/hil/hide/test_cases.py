@@ -91,6 +91,7 @@ def test_logs_repeat_themselves():
             np.testing.assert_array_equal(one[name], other[name])
 
 
+@pytest.mark.slow
 def test_magnitude_is_scaled_for_the_snr():
     case = make_case((Hidden("tyre_radius", "fl", -0.008),), 5, "medium", "stops")
     for target in (5.0, 15.0):
