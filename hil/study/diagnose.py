@@ -9,7 +9,7 @@ from hil.study.basis import LAWS, Piece
 from hil.study.behind import replayed, silent
 from hil.study.candidates import Candidate, Column, candidates, columns
 from hil.study.contest import Contender, Contest, odds, refitted, worth
-from hil.study.diagnosis import TIED, Diagnosis, Settings, causes_in
+from hil.study.diagnosis import FORM, TIED, Diagnosis, Settings, causes_in, left_over
 from hil.study.fit import Fitter, Model, Tracks
 from hil.study.handed_in import Refitted, from_handed_in
 from hil.study.linear import Sums, project, track_columns
@@ -29,8 +29,6 @@ from hil.study.world import World
 Say = Callable[[str], None]
 PLAUSIBLE, LEADERS = 12, 5
 _OF_SCREEN = 1.5
-_FORM, _FORM_THERE = 0.2, 0.35
-"""Share of a cause that its equation may get wrong, elsewhere and at its own joints: what it leaves is no other one."""
 _CLEARER = 5.0
 """By how much more than the best listed cause a law in no list must explain, log of the odds."""
 _TRIED, _LAWS_TRIED = 10, 2
@@ -193,11 +191,11 @@ class _Search:
         if leading is None:
             return None
         contest, top, fitted = leading
-        reference, left_over = contest.reference, [self._left_over(found, model, item.candidate) for item in top]
+        reference, left = contest.reference, [left_over(found.explained, model.terms, item.candidate) for item in top]
 
         def gained() -> list[Contender]:
-            listed = zip(fitted, top, left_over, strict=True)
-            return [self._gained(one, item, reference - left) for one, item, left in listed]
+            listed = zip(fitted, top, left, strict=True)
+            return [self._gained(one, item, reference - less) for one, item, less in listed]
 
         if self.settings.relinearise and (self._bent(model) or max(one.gained for one in gained()) >= least):
             fitted, without = self._fitted_again(model, fitted, top, reference)
@@ -319,11 +317,13 @@ class _Search:
         best = entries[law.term.candidate.name]
         self.say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
         least = least_gain(found.looks + len(LAWS), self.settings.alpha) * inflation(found.screened)
-        least = least * variance_of_law(best.curve.law.name) + self._left_over(found, model, best.curve.pieces[0])
+        least = least * variance_of_law(best.curve.law.name) + left_over(
+            found.explained, model.terms, best.curve.pieces[0]
+        )
 
         def ahead() -> bool:
             gained = min(listed.cost, reference) - law.cost
-            rival = (1.0 + _FORM**2) * max(0.5 * (reference - odds(listed)), 0.0)
+            rival = (1.0 + FORM**2) * max(0.5 * (reference - odds(listed)), 0.0)
             return gained >= least * self._strain(law.model.z) and 0.5 * (reference - odds(law)) >= rival + _CLEARER
 
         if ahead() and self.settings.relinearise and not self._bent(model):
@@ -357,15 +357,11 @@ class _Search:
 
     def _most(self, found: Diagnosis, model: Model, listed: Sequence[Score]) -> float:
         """Most that a candidate gains by one step, beyond what the causes in the model may leave."""
-        left = [self._left_over(found, model, item.candidate) / variance_of(item.candidate) for item in listed]
-        return max((item.gain - less for item, less in zip(listed, left, strict=True)), default=0.0)
 
-    @staticmethod
-    def _left_over(found: Diagnosis, model: Model, candidate: Candidate) -> float:
-        """What the causes in the model may leave for one more, by the form of their equations."""
-        taken = {joint for term in model.terms for joint in term.candidate.effect.joints}
-        share = _FORM_THERE if taken.intersection(candidate.effect.joints) else _FORM
-        return share**2 * found.explained
+        def beyond(item: Score) -> float:
+            return item.gain - left_over(found.explained, model.terms, item.candidate) / variance_of(item.candidate)
+
+        return max(map(beyond, listed), default=0.0)
 
     def _backward(self, found: Diagnosis) -> None:
         """Take out each cause in turn; what is not missed, or may as well be nothing, stays out."""
