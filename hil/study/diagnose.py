@@ -9,9 +9,10 @@ from hil.study.basis import LAWS, Piece
 from hil.study.behind import replayed, silent
 from hil.study.candidates import Candidate, Column, candidates, columns
 from hil.study.contest import Contender, Contest, odds, refitted, worth
-from hil.study.diagnosis import FORM, TIED, Diagnosis, Settings, causes_in, left_over
+from hil.study.diagnosis import TIED, Diagnosis, Settings, causes_in
 from hil.study.fit import Fitter, Model, Tracks
 from hil.study.handed_in import Refitted, from_handed_in
+from hil.study.left_over import FORM, LeftOver
 from hil.study.linear import Sums, project, track_columns
 from hil.study.noise import Frame, Noise
 from hil.study.numbers import STRAINED, Numbers, strain
@@ -187,15 +188,16 @@ class _Search:
 
     def _next(self, found: Diagnosis, model: Model, noise: Noise) -> Accepted | None:
         """The next cause, if one is beyond doubt; no contender where the numbers explain more without a further one."""
-        least, leading = found.least_gain, self._leading(found, model, noise)
+        left = LeftOver(found.explained, self.fitter, model, noise, self.effect_columns)
+        least, leading = found.least_gain, self._leading(found, model, noise, left)
         if leading is None:
             return None
         contest, top, fitted = leading
-        reference, left = contest.reference, [left_over(found.explained, model.terms, item.candidate) for item in top]
+        reference = contest.reference
 
         def gained() -> list[Contender]:
-            listed = zip(fitted, top, left, strict=True)
-            return [self._gained(one, item, reference - less) for one, item, less in listed]
+            listed = zip(fitted, top, strict=True)
+            return [self._gained(one, item, reference - left.of(item.candidate)) for one, item in listed]
 
         if self.settings.relinearise and (self._bent(model) or max(one.gained for one in gained()) >= least):
             fitted, without = self._fitted_again(model, fitted, top, reference)
@@ -208,7 +210,7 @@ class _Search:
         fitted = self._since_when(fitted)
         tighter = min(fitted, key=odds).noise
         reference = min(reference, self.fitter.fit(model, tighter, 3).cost)
-        law = self._unlisted(found, contest, model, tighter, reference, min(fitted, key=odds))
+        law = self._unlisted(found, contest, model, tighter, reference, min(fitted, key=odds), left)
         fitted = gained()
         clear = sorted((c for c in fitted if c.gained >= least and worth(c) > 0.0), key=odds)
         if law is not None:
@@ -225,12 +227,12 @@ class _Search:
         return polished, tighter, [replace(best, model=polished, term=polished.terms[-1]), *rest]
 
     def _leading(
-        self, found: Diagnosis, model: Model, noise: Noise
+        self, found: Diagnosis, model: Model, noise: Noise, left: LeftOver
     ) -> tuple[Contest, list[Score], list[Contender]] | None:
         """The race for the next cause, its leaders and their fits; None where none can be beyond doubt."""
         bent, least = self._bent(model), found.least_gain
         plausible = self._plausible(found, model, noise, bent)
-        if self._most(found, model, plausible) < _HOPELESS * least:
+        if _most(plausible, left) < _HOPELESS * least:
             return None
         self.say(f"noise beside {len(plausible)} candidates")
         contest = Contest(self.fitter, self.effect_columns, model, noise, self.settings.relinearise)
@@ -238,7 +240,7 @@ class _Search:
         beside = {id(item): quieter for item, quieter in seen}
         looked = [item for item, _ in seen]
         top = sorted(looked, key=lambda s: -s.evidence)[:_TRIED] if bent else leaders(looked, LEADERS)
-        if self._most(found, model, top) < _POOR * least:
+        if _most(top, left) < _POOR * least:
             return None
         self.say(f"fitting {len(top)} leaders")
         return contest, top, contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
@@ -292,7 +294,14 @@ class _Search:
         return found
 
     def _unlisted(
-        self, found: Diagnosis, contest: Contest, model: Model, noise: Noise, reference: float, listed: Contender
+        self,
+        found: Diagnosis,
+        contest: Contest,
+        model: Model,
+        noise: Noise,
+        reference: float,
+        listed: Contender,
+        left: LeftOver,
     ) -> Contender | None:
         """A law in no list that explains more than the best listed cause, beyond noise and the model's own error."""
         if not self.settings.dictionary or any(isinstance(term.candidate, Piece) for term in model.terms):
@@ -317,9 +326,9 @@ class _Search:
         best = entries[law.term.candidate.name]
         self.say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
         least = least_gain(found.looks + len(LAWS), self.settings.alpha) * inflation(found.screened)
-        least = least * variance_of_law(best.curve.law.name) + left_over(
-            found.explained, model.terms, best.curve.pieces[0]
-        )
+        signature = {name: columns @ best.values[:, None] for name, columns in race.columns(best).items()}
+        left_there = left.of_signature(best.curve.pieces[0].effect, signature)
+        least = least * variance_of_law(best.curve.law.name) + left_there
 
         def ahead() -> bool:
             gained = min(listed.cost, reference) - law.cost
@@ -355,14 +364,6 @@ class _Search:
         gained = gained / self._strain(contender.model.z) - price(contender.term, self.frame)
         return replace(contender, gained=gained)
 
-    def _most(self, found: Diagnosis, model: Model, listed: Sequence[Score]) -> float:
-        """Most that a candidate gains by one step, beyond what the causes in the model may leave."""
-
-        def beyond(item: Score) -> float:
-            return item.gain - left_over(found.explained, model.terms, item.candidate) / variance_of(item.candidate)
-
-        return max(map(beyond, listed), default=0.0)
-
     def _backward(self, found: Diagnosis) -> None:
         """Take out each cause in turn; what is not missed, or may as well be nothing, stays out."""
         model = found.final
@@ -384,6 +385,11 @@ class _Search:
 def _number(candidate: Candidate) -> tuple[str, str, str]:
     """What tells a candidate from others."""
     return candidate.effect.name, candidate.parameter.name, candidate.place
+
+
+def _most(listed: Sequence[Score], left: LeftOver) -> float:
+    """Most that a candidate gains by one step, beyond what the causes in the model may leave."""
+    return max((item.gain - left.of(item.candidate) / variance_of(item.candidate) for item in listed), default=0.0)
 
 
 def _independent(found: Sequence[Score]) -> int:

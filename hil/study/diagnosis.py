@@ -1,12 +1,10 @@
 """What a diagnosis may be told, and all that it found."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from hil.study.basis import Piece
-from hil.study.candidates import Candidate
 from hil.study.contest import Contender
-from hil.study.fit import Fitter, Model, Term
+from hil.study.fit import Fitter, Model
 from hil.study.linear import Sums
 from hil.study.noise import Noise
 from hil.study.prepare import Case
@@ -19,9 +17,6 @@ rest is kept for tails heavier than that (decision 0065)."""
 MOST_CAUSES = 3
 TIED = 9.2
 """Twice the log of the odds, 100 to 1, within which causes are not told apart."""
-
-FORM, FORM_THERE = 0.2, 0.35
-"""Share of a cause that its equation may get wrong, elsewhere and at its own joints: what it leaves is no other one."""
 
 
 @dataclass(frozen=True)
@@ -39,17 +34,6 @@ def causes_in(model: Model) -> int:
     """How many causes a model has; the pieces of a law in no list are one."""
     laws = {term.candidate.name.rsplit(".", 1)[0] for term in model.terms if isinstance(term.candidate, Piece)}
     return sum(not isinstance(term.candidate, Piece) for term in model.terms) + len(laws)
-
-
-def left_over(explained: float, terms: Sequence[Term], candidate: Candidate) -> float:
-    """What of chi-squared causes may leave for one more, by the form of their equations.
-
-    Parameters
-    ----------
-    explained : what the causes ``terms`` take off chi-squared.
-    """
-    taken = {joint for term in terms for joint in term.candidate.effect.joints}
-    return (FORM_THERE if taken.intersection(candidate.effect.joints) else FORM) ** 2 * explained
 
 
 @dataclass(eq=False)
