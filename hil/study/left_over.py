@@ -13,11 +13,11 @@ FORM, FORM_THERE = 0.2, 0.35
 
 
 class LeftOver:
-    """What the causes of a model may leave for one more: a share of what they ``explain``, as far as both act together.
+    """What the causes of a model may leave for one more: a share of what they ``explain``.
 
-    If their equations err by a share f in every track of every manoeuvre, a signature with energies e there takes at
-    most f^2 (sum sqrt(e P))^2 / sum e off chi-squared, P being the energies of the causes (Cauchy and Schwarz). What
-    is seen in other channels or at other times than they are is none of theirs.
+    At their own joints all of it. Elsewhere as far as both act together: if their equations err by a share f in every
+    track of every manoeuvre, a signature with energies e there takes at most f^2 (sum sqrt(e P))^2 / sum e off
+    chi-squared, P being the energies of the causes (Cauchy and Schwarz).
     """
 
     def __init__(self, explained: float, fitter: Fitter, model: Model, noise: Noise, columns: Tracks) -> None:
@@ -41,9 +41,10 @@ class LeftOver:
         """Of chi-squared, for an effect with this signature, (samples, 1)."""
         if not self._joints:
             return 0.0
-        share = FORM_THERE if self._joints.intersection(effect.joints) else FORM
+        if self._joints.intersection(effect.joints):
+            return FORM_THERE**2 * self._explained
         together = overlap(self._energies, energies(columns, self._frame, self._noise))
-        return share**2 * self._explained * together
+        return FORM**2 * self._explained * together
 
 
 def energies(columns: Tracks, frame: Frame, noise: Noise) -> Floats:
