@@ -7,6 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from hil.study.candidates import Candidate
 from hil.study.fit import Fitter, Model, Term, Tracks
 from hil.study.noise import Noise
 from hil.study.rig import WORKERS
@@ -55,6 +56,17 @@ def refitted(contender: Contender, model: Model, noise: Noise) -> Contender:
     return replace(
         contender, term=term, model=model, cost=model.cost, evidence=evidence, information=information, noise=noise
     )
+
+
+def elsewhere(fitter: Fitter, best: Contender, places: Sequence[Candidate], relinearise: bool) -> list[Contender]:
+    """A cause at other places, each fitted from where the best ended, with its noise."""
+
+    def placed(candidate: Candidate) -> Contender:
+        terms = (*best.model.terms[:-1], replace(best.term, candidate=candidate))
+        model = fitter.at(best.model.z, terms, best.noise)
+        return refitted(best, fitter.fit(model, best.noise, 3, relinearise), best.noise)
+
+    return Contest.at_once(placed, places)
 
 
 class Contest:

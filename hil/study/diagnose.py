@@ -8,7 +8,7 @@ import numpy as np
 from hil.study.basis import LAWS, Piece
 from hil.study.behind import replayed, silent
 from hil.study.candidates import Candidate, Column, candidates, columns
-from hil.study.contest import Contender, Contest, odds, refitted, worth
+from hil.study.contest import Contender, Contest, elsewhere, odds, refitted, worth
 from hil.study.diagnosis import TIED, Diagnosis, Settings, causes_in
 from hil.study.fit import Fitter, Model, Tracks
 from hil.study.handed_in import Refitted, from_handed_in
@@ -220,10 +220,13 @@ class _Search:
         best = self._standing(fitted, clear, least)
         if best is None:
             return None
+        best, clear = self._placed(found, best, clear)
         found.explained += reference - best.cost
         polished = self.fitter.fit(best.model, best.noise, 4, self.settings.relinearise)
         polished, tighter = self.fitter.settle(polished, best.noise, 2, 60)
-        rest = sorted((c for c in fitted if c is not best and (c in clear or odds(c) >= odds(best))), key=odds)
+        rest = sorted(
+            (c for c in {*fitted, *clear} if c is not best and (c in clear or odds(c) >= odds(best))), key=odds
+        )
         return polished, tighter, [replace(best, model=polished, term=polished.terms[-1]), *rest]
 
     def _leading(
@@ -280,6 +283,19 @@ class _Search:
         if best is None:
             self.say(f"{better.term.candidate.name} explains more, and the model errs there; nothing stands beside it")
         return best
+
+    def _placed(self, found: Diagnosis, best: Contender, clear: list[Contender]) -> tuple[Contender, list[Contender]]:
+        """The best where it fits best: the screen knows the places only as well as the numbers stood."""
+        name = _number(best.term.candidate)
+        like = [item for item in found.screened if _number(item.candidate)[:2] == name[:2]]
+        least = _NEAR * max((item.raw for item in like if item.candidate is best.term.candidate), default=np.inf)
+        places = [item.candidate for item in like if item.candidate is not best.term.candidate and item.raw >= least]
+        if not self.settings.relinearise or not places:
+            return best, clear
+        self.say(f"{best.term.candidate.name} at other places")
+        placed = [*clear, *elsewhere(self.fitter, best, places, True)]
+        better = [one for one in placed if _number(one.term.candidate)[:2] == name[:2] and odds(one) < odds(best)]
+        return min(better, key=odds, default=best), placed
 
     def _since_when(self, fitted: list[Contender]) -> list[Contender]:
         """The best with the time they begin at: a law by time would explain more than a cause that was always there."""
