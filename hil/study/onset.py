@@ -10,9 +10,11 @@ from hil.study.fit import Fitter, Model, Term
 from hil.study.linear import sums
 from hil.study.noise import Frame, Noise
 from hil.study.own_error import variance_of
-from hil.study.prepare import ROW_S
+from hil.study.prepare import ROW_S, Segment
 from hil.study.table import Floats
 
+Moment = tuple[int, float]
+"""A time: which drive, and s in it."""
 _ALPHA = 3e-4
 _COARSE_S, _FINER, _MOST_TIMES = 0.25, (0.05, 0.01), 80
 """Steps of the time, s: what begins at once sets hubs swinging, so that only the neighbourhood of the truth fits."""
@@ -45,27 +47,37 @@ def _later(fitter: Fitter, model: Model, noise: Noise, k: int) -> Model | None:
     if block is None:
         return None
     segments = fitter.rig.case.segments
-    (drive, before), (same, after) = segments[block - 1], segments[block]
-    low, high = before.first, after.last if same == drive else before.last
+    moments = moments_of(segments[block - 1], segments[block])
     value = float(np.clip(b[block:].sum() / q[block:].sum(), *_bounds(model.terms[k])))
-    fitter.rig.keep(fitter.world(model.z, _since(model, k, value, drive, low * ROW_S)))
-    times = np.linspace(low * ROW_S, high * ROW_S, _most(high - low))
-    least = float(chi2.isf(_ALPHA / (len(b) * len(times)), 1)) * variance_of(model.terms[k].candidate)
+    fitter.rig.keep(fitter.world(model.z, _since(model, k, value, moments[0])))
+    least = float(chi2.isf(_ALPHA / (len(b) * len(moments)), 1)) * variance_of(model.terms[k].candidate)
     seen: list[Model] = []
     for finer in (*_FINER, None):
-        tried = [fitter.at(model.z, _since(model, k, value, drive, float(t)), noise) for t in times]
+        tried = [fitter.at(model.z, _since(model, k, value, moment), noise) for moment in moments]
         at = int(np.argmin([one.cost for one in tried]))
         seen.append(tried[at])
         if finer is not None:
-            beside = float(times[1] - times[0])
-            times = np.arange(max(times[at] - beside, 0.0), times[at] + beside, finer)
+            drive, since_s = moments[at]
+            beside = min(abs(t - since_s) for number, t in moments if number == drive and t != since_s)
+            moments = [(drive, float(t)) for t in np.arange(max(since_s - beside, 0.0), since_s + beside, finer)]
     fitted = fitter.fit(min(seen, key=lambda one: one.cost), noise, 3)
     return fitted if model.cost - fitted.cost > least else None
 
 
-def _since(model: Model, k: int, value: float, drive: int, since_s: float) -> tuple[Term, ...]:
+def moments_of(before: tuple[int, Segment], after: tuple[int, Segment]) -> list[Moment]:
+    """Times to try, from the begin of the manoeuvre before to the end of the one after it, in one drive or in two."""
+    (drive, first), (same, last) = before, after
+    spans = [(drive, first.first, last.last)] if same == drive else [(d, s.first, s.last) for d, s in (before, after)]
+    return [
+        (number, float(t))
+        for number, low, high in spans
+        for t in np.linspace(low * ROW_S, high * ROW_S, _most(high - low))
+    ]
+
+
+def _since(model: Model, k: int, value: float, moment: Moment) -> tuple[Term, ...]:
     """The terms of the model, one of them with another value, from a time on."""
-    changed = replace(model.terms[k], value=value, onset=(drive, since_s))
+    changed = replace(model.terms[k], value=value, onset=moment)
     return (*model.terms[:k], changed, *model.terms[k + 1 :])
 
 

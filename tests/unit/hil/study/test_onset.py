@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from hil.study.candidates import candidates, columns
 from hil.study.fit import Term
 from hil.study.noise import Frame
-from hil.study.onset import begin_of, price
+from hil.study.onset import begin_of, moments_of, price
+from hil.study.prepare import Segment
 
 
 def _products(value: float, begin: int, strength: list[float], seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -41,3 +42,14 @@ def test_a_time_costs_what_its_choice_among_many_is_worth():
     (drag,) = [one for one in candidates(columns()) if one.name == "residual_drag@car"]
     assert price(Term(drag, 5.0), frame) == 0.0
     assert price(Term(drag, 5.0, (0, 12.0)), frame) == pytest.approx(2.0 * np.log(720.0))
+
+
+def test_a_beginning_is_looked_for_in_both_manoeuvres_it_may_lie_in():
+    """That before the first one that shows it, and that one: it may show the last second of it alone."""
+    before, after, elsewhere = Segment(0, 800, 0.0, 9.0), Segment(800, 1500, 0.0, 9.0), Segment(0, 600, 0.0, 9.0)
+    same = moments_of((2, before), (2, after))
+    assert {drive for drive, _ in same} == {2}
+    assert (same[0][1], same[-1][1]) == (0.0, 15.0)
+    apart = moments_of((0, before), (1, elsewhere))
+    assert [max(t for drive, t in apart if drive == k) for k in (0, 1)] == [8.0, 6.0]
+    assert [min(t for drive, t in apart if drive == k) for k in (0, 1)] == [0.0, 0.0]
