@@ -310,15 +310,9 @@ class _Search:
         return found
 
     def _unlisted(
-        self,
-        found: Diagnosis,
-        contest: Contest,
-        model: Model,
-        noise: Noise,
-        reference: float,
-        listed: Contender,
+        self, found: Diagnosis, contest: Contest, model: Model, noise: Noise, reference: float, listed: Contender,
         left: LeftOver,
-    ) -> Contender | None:
+    ) -> Contender | None:  # fmt: skip
         """A law in no list that explains more than the best listed cause, beyond noise and the model's own error."""
         if not self.settings.dictionary or any(isinstance(term.candidate, Piece) for term in model.terms):
             return None
