@@ -93,7 +93,7 @@ class Receiver:
 
     def latest(self, message_type: type[M]) -> M | None:
         """Last usable message of a type, however old."""
-        return self.receptions[message_type].message  # type: ignore[return-value]
+        return self.receptions[message_type].message  # type: ignore[return-value]  # each is kept under its own type
 
     def age_ns(self, message_type: type[Message], now_ns: int) -> int | None:
         """Time since the tick of the last usable message; None before the first."""

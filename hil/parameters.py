@@ -62,7 +62,7 @@ def override(value: T, changes: Mapping[str, Any], where: str) -> T:
             new[key] = override(old, change, f"{where}.{key}")
         else:
             new[key] = _check(change, hints[key], f"{where}.{key}")
-    return dataclasses.replace(value, **new)  # type: ignore[type-var]
+    return dataclasses.replace(value, **new)  # type: ignore[type-var]  # any dataclass: mypy has no such type
 
 
 def _read(path: Path | Traversable) -> dict[str, Any]:

@@ -135,6 +135,7 @@ def _run(test: Test, lining: Lining) -> list[tuple[float, float, float, float, f
         if step % _RECORDED_EVERY == 0:
             rows.append((time, bar, speed, torque * (1.0 + lining.ripple * math.sin(angle)), state[3]))
         angle += speed / lining.radius_m * _INNER_STEP_S
+        # mypy infers no type for a default of a lambda, which binds what this turn of the loop has
         state = _heun(lambda x, f=force, v=speed: _derivative(lining, x, f, v), state)  # type: ignore[misc]
     return rows
 

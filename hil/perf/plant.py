@@ -142,7 +142,7 @@ def measure() -> list[Row]:
                "our own RK4", "ns/step", pairs=PAIRS)
     )  # fmt: skip
     for name, method in (("semi-implicit", SEMI_IMPLICIT), ("RK4", RUNGE_KUTTA_4)):
-        rows.append(
+        rows.append(  # mypy infers no type for a default of a lambda, which binds what this turn of the loop has
             paired(f"{name} against the clock", lambda m=method: per_step_ns(m), lambda: STEP_S * 1e9,  # type: ignore[misc]
                    "real time", "ns/step", pairs=PAIRS)
         )  # fmt: skip

@@ -144,7 +144,7 @@ class Chart:
     Raises
     ------
     ValueError
-        Points beside the rows.
+        Points beside the rows, or a line with an interval over them.
     """
 
     title: str
@@ -161,6 +161,11 @@ class Chart:
                 raise ValueError(
                     f"chart {self.title!r}, points {curve.name!r}: expected x from 1 to {len(self.rows)}, one for each "
                     f"row, got {curve.x.tolist()}; number the rows from 1"
+                )
+            if curve.style != "points" and curve.low is not None:
+                raise ValueError(
+                    f"chart {self.title!r}, line {curve.name!r}: expected no interval over named rows, got one; "
+                    "draw it as points"
                 )
 
 

@@ -35,7 +35,8 @@ _CLEARER = 5.0
 _TRIED, _LAWS_TRIED = 10, 2
 """Leaders, and laws in no list, where the vehicle's numbers go far, places of one effect among them."""
 _NEAR = 0.2
-"""Share of what the best explains, by one step or fitted, below which no other is fitted from the car as handed in."""
+"""Share of what the best explains, by one step or fitted, below which no other is fitted from the car as handed in, nor
+the best at another place."""
 _MISLED = 1.0 / 3.0
 """Share of what a cause explains, by which the fit without any must have been worse than it can be, for the search to
 begin again from a better one."""

@@ -9,9 +9,9 @@ from hil.study.own_error import variance_of
 from hil.study.same_number import same_number
 from hil.study.table import Floats
 
-FORM = 0.05
+DEVIATION_BY_FORM = 0.05
 """Standard deviation of a value by the form of its equation, as a share of the value. Of 44 values found where
-equations of another form had made the data, 76 % lay within the interval by noise alone, 87 % within that of noise and
+equations of another form had made the data, 77 % lay within the interval by noise alone, 89 % within that of noise and
 the model's own error, 93 % with this share (docs/decisions/0066)."""
 _DRAWS, _FEW, _MOST_SPREAD = 60, 6, 1.6
 _TWO_SIDED_95 = 1.96
@@ -19,7 +19,7 @@ _TWO_SIDED_95 = 1.96
 
 def half_width(candidate: Candidate, value: float, deviation: float) -> float:
     """Half of a 95 % interval, of a value whose standard deviation by noise is ``deviation``."""
-    return _TWO_SIDED_95 * float(np.sqrt(variance_of(candidate) * deviation**2 + (FORM * value) ** 2))
+    return _TWO_SIDED_95 * float(np.sqrt(variance_of(candidate) * deviation**2 + (DEVIATION_BY_FORM * value) ** 2))
 
 
 def intervals(found: Diagnosis) -> list[tuple[float, float]]:

@@ -9,11 +9,11 @@ from hil.study.table import Floats
 from plant.effects.effect import Effect
 
 FORM, FORM_THERE = 0.2, 0.35
-"""Share of a cause that its equation may get wrong, elsewhere and at its own joints."""
+"""Share of the amplitude of a cause that its equation may get wrong, elsewhere and at its own joints."""
 
 
 class LeftOver:
-    """What the causes of a model may leave for one more: a share of what they ``explain``.
+    """What the causes of a model may leave for one more: a share of what they have ``explained`` of chi-squared.
 
     At their own joints all of it. Elsewhere as far as both act together: if their equations err by a share f in every
     track of every manoeuvre, a signature with energies e there takes at most f^2 (sum sqrt(e P))^2 / sum e off

@@ -53,12 +53,11 @@ def _later(fitter: Fitter, model: Model, noise: Noise, k: int) -> Model | None:
     least = float(chi2.isf(_ALPHA / (len(b) * len(moments)), 1)) * variance_of(model.terms[k].candidate)
     seen: list[Model] = []
     for finer in (*_FINER, None):
-        tried = [fitter.at(model.z, _since(model, k, value, moment), noise) for moment in moments]
-        at = int(np.argmin([one.cost for one in tried]))
-        seen.append(tried[at])
+        tried = ((fitter.at(model.z, _since(model, k, value, moment), noise), moment) for moment in moments)
+        best, (drive, since_s) = min(tried, key=lambda one: one[0].cost)
+        seen.append(best)
         if finer is not None:
-            drive, since_s = moments[at]
-            beside = min(abs(t - since_s) for number, t in moments if number == drive and t != since_s)
+            beside = min((abs(t - since_s) for d, t in moments if d == drive and t != since_s), default=finer)
             moments = [(drive, float(t)) for t in np.arange(max(since_s - beside, 0.0), since_s + beside, finer)]
     fitted = fitter.fit(min(seen, key=lambda one: one.cost), noise, 3)
     return fitted if model.cost - fitted.cost > least else None

@@ -143,6 +143,7 @@ def from_columns(name: str, columns: Mapping[str, tuple[Floats, str]], channel_m
 
 def from_frame(frame: Any, name: str = "dataframe") -> Log:
     """A log from a pandas or polars data frame, or any mapping of columns."""
+    # iterating a polars frame gives its columns, not their names
     return from_columns(name, {str(key): (np.asarray(frame[key], np.float64), "") for key in frame.keys()})  # noqa: SIM118
 
 

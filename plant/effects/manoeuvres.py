@@ -28,7 +28,7 @@ def _direct(pressure: Trace = ((0.0, 0.0),), motor: Trace = ((0.0, 0.0),)) -> Di
 
 def _manoeuvre(speed_mps: float, duration_s: float, direct: DirectDemands, **more: object) -> Manoeuvre:
     base = Manoeuvre(initial_speed_mps=speed_mps, duration_s=duration_s, direct=direct, wait_for_demands=False)
-    return replace(base, **more)  # type: ignore[arg-type]
+    return replace(base, **more)  # type: ignore[arg-type]  # fields by name, each of its own type
 
 
 @dataclass(frozen=True, slots=True)

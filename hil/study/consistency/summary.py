@@ -95,6 +95,7 @@ def _panels(miss: Miss, t: Floats, rows: Floats) -> list[Panel]:
     unit = _UNIT[miss.unit]
     shown = [("measured", miss.measured, "line", ""), ("as handed in", miss.handed_in, "line", "rl")]
     shown.append(("extended", miss.learnt, "line", "fl"))
+    # mypy takes the style for any string
     traces = tuple(Trace(n, t[rows], y[rows], style, group) for n, y, style, group in shown)  # type: ignore[arg-type]
     return [Panel(_title(miss), unit, traces)]
 
@@ -137,7 +138,7 @@ def _windows(answer: Consistency) -> list[Section]:
     stops = next((m for m in answer.misses if m.channel == "speed_in_stops"), None)
     if braking is not None and stops is not None and isinstance(braking.model, Braking):
         charts, model = [], braking.model
-        for first, last in sorted(model.stops, key=lambda s: -float(braking.model.pressure[slice(*s)].max()))[:6]:  # type: ignore[attr-defined]
+        for first, last in sorted(model.stops, key=lambda s: -float(model.pressure[slice(*s)].max()))[:6]:
             rows = np.zeros(len(t), bool)
             rows[first:last] = True
             curves = [

@@ -35,7 +35,7 @@ class Driver:
         self.sent.append(message.arbitration_id)
 
     def fileno(self):
-        raise NotImplementedError
+        raise NotImplementedError  # as python-can does for drivers without a descriptor
 
     def shutdown(self):
         self.closed = True

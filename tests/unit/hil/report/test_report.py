@@ -100,3 +100,9 @@ def test_points_beside_the_named_rows_are_refused() -> None:
         ValueError, match=r"chart 'c', points 'gain': expected x from 1 to 2, .* number the rows from 1"
     ):
         Chart("c", "", "", "", "", (points,), ("a", "b"))
+
+
+def test_a_band_over_named_rows_is_refused() -> None:
+    x = np.array([1.0, 2.0])
+    with pytest.raises(ValueError, match=r"chart 'c', line 'asked': expected no interval .* draw it as points"):
+        Chart("c", "", "", "", "", (Curve("asked", x, x, x, x),), ("a", "b"))

@@ -3,7 +3,7 @@
 import pytest
 
 from hil.study.candidates import candidates, columns
-from hil.study.intervals import FORM, half_width
+from hil.study.intervals import DEVIATION_BY_FORM, half_width
 from hil.study.own_error import variance_of
 
 ALL = candidates(columns())
@@ -18,5 +18,5 @@ def test_the_models_own_error_widens_what_noise_leaves(candidate):
 
 def test_no_data_tell_a_value_better_than_its_equation():
     candidate = ALL[0]
-    assert half_width(candidate, -3.0, 1e-9) == pytest.approx(1.96 * 3.0 * FORM)
+    assert half_width(candidate, -3.0, 1e-9) == pytest.approx(1.96 * 3.0 * DEVIATION_BY_FORM)
     assert half_width(candidate, 3.0, 0.1) > half_width(candidate, 0.0, 0.1)

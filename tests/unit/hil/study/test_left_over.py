@@ -17,15 +17,16 @@ def test_a_signature_that_is_nowhere_overlaps_with_none():
     assert overlap(np.zeros(3), np.ones(3)) == 0.0
 
 
-def test_no_signature_can_take_more_than_the_form_leaves():
-    """The bound holds for any error of the form: a share of the cause in each place, however it varies within."""
+def test_no_error_of_the_form_gives_a_signature_more_and_the_worst_gives_it_all():
+    """An error is a share of the cause in each place, however it varies within."""
     rng = np.random.default_rng(4)
     cause, other = rng.normal(size=(2, 6, 50))
-    share = 0.3
-    errors = rng.normal(size=cause.shape)
-    errors *= share * np.linalg.norm(cause, axis=1, keepdims=True) / np.linalg.norm(errors, axis=1, keepdims=True)
-    errors[:3] = share * np.linalg.norm(cause[:3], axis=1, keepdims=True) * other[:3]
-    errors[:3] /= np.linalg.norm(other[:3], axis=1, keepdims=True)
-    taken = float(np.sum(errors * other)) ** 2 / float(np.sum(other**2))
     energies = [np.sum(values**2, axis=1) for values in (cause, other)]
-    assert taken <= share**2 * energies[0].sum() * overlap(*energies)
+    share, bound = 0.3, 0.3**2 * energies[0].sum() * overlap(*energies)
+
+    def taken(errors):
+        sized = errors * share * (energies[0] / np.sum(errors**2, axis=1))[:, None] ** 0.5
+        return float(np.sum(sized * other)) ** 2 / energies[1].sum()
+
+    assert max(taken(rng.normal(size=cause.shape)) for _ in range(200)) < bound
+    assert taken(other) == pytest.approx(bound)
