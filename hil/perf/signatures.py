@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from hil.study.candidates import Column, candidates, columns
+from hil.study.estimate import first_guess
 from hil.study.linear import track_columns
-from hil.study.noise import Frame, first_guess, tracks_of
+from hil.study.noise import Frame, tracks_of
 from hil.study.prepare import prepare
 from hil.study.read import read_logs
 from hil.study.rig import Rig

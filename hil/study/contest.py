@@ -78,7 +78,7 @@ class Contest:
     def __init__(self, fitter: Fitter, columns: Tracks, model: Model, noise: Noise, relinearise: bool) -> None:
         self._fitter, self._columns, self._model, self._relinearise = fitter, columns, model, relinearise
         self._now = fitter.term_columns(model) if model.terms else None
-        self.noise = self._no_worse(model, fitter.estimated(model, noise, 80), noise)
+        self.noise = self._no_worse(model, fitter.estimated(model, noise), noise)
         self.reference = fitter.cost(model.residual, model.z, self.noise)
         fitter.products(self.noise)  # which all looks need
 
@@ -117,16 +117,16 @@ class Contest:
         if len(terms) > 1:
             known[-len(terms) :] = [term.candidate.parameter.typical**-2 for term in terms]
         first = self._fitter.foreseen(begun, own, self.noise, known)
-        quieter = self._no_worse(first, self._fitter.estimated(first, self.noise, 40), self.noise)
+        quieter = self._no_worse(first, self._fitter.estimated(first, self.noise), self.noise)
         again = self._fitter.foreseen(begun, own, quieter, known)
-        quieter = self._no_worse(again, self._fitter.estimated(again, quieter, 30), quieter)
+        quieter = self._no_worse(again, self._fitter.estimated(again, quieter), quieter)
         return replace(again, cost=self._fitter.cost(again.residual, again.z, quieter)), quieter
 
     def profiled(self, item: Score) -> tuple[Score, Noise]:
         """The candidate with the noise that is left beside it: by one linear step, or at the size of its replay."""
         if item.replayed:
             model = self._fitter.at(self._model.z, (*self._model.terms, Term(item.candidate, item.value)), self.noise)
-            quieter = self._no_worse(model, self._fitter.estimated(model, self.noise, 40), self.noise)
+            quieter = self._no_worse(model, self._fitter.estimated(model, self.noise), self.noise)
             raw = self.reference - self._fitter.cost(model.residual, model.z, quieter)
             return sized(item, item.value, max(raw, item.raw)), quieter
         model, quieter = self.foreseen(*self._of(item))
@@ -143,7 +143,7 @@ class Contest:
             fitted = self._fitter.fit(fitted, noise, 3, self._relinearise)
         else:
             fitted = self._fitter.fit(begun, noise, 3, self._relinearise, own)
-        noise = self._no_worse(fitted, self._fitter.estimated(fitted, noise, 60), noise)
+        noise = self._no_worse(fitted, self._fitter.estimated(fitted, noise), noise)
         fitted = self._fitter.fit(fitted, noise, 1, self._relinearise)
         begun_with = Contender(fitted.terms[-1], fitted, fitted.cost, 0.0, item.information, noise)
         return refitted(begun_with, fitted, noise)

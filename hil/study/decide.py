@@ -20,8 +20,9 @@ from dbc.bench_messages import ManoeuvreState
 from hil.errors import BrakebenchError
 from hil.scenario import Scenario, find_scenario, load_scenario, scenario_names
 from hil.study.candidates import Candidate, Column, candidates, columns
+from hil.study.estimate import first_guess
 from hil.study.linear import project, sums, track_columns
-from hil.study.noise import Frame, Noise, first_guess, tracks_of
+from hil.study.noise import Frame, Noise, tracks_of
 from hil.study.prepare import prepare
 from hil.study.rig import Rig, Stack
 from hil.study.table import CHANNELS, MOTOR_DEMAND, PRESSURE_DEMAND, Floats, Log, make_log

@@ -164,7 +164,7 @@ class _Search:
             return model, noise, around
         self.say("sensitivities anew beside it")
         self.numbers.anew(model.z, model.terms)
-        model, noise = self.fitter.settle(self.fitter.at(model.z, model.terms, noise), noise, 2, 60)
+        model, noise = self.fitter.settle(self.fitter.at(model.z, model.terms, noise), noise, 2)
         return model, noise, model.z
 
     def _effect_columns(self, model: Model) -> Tracks:
@@ -216,7 +216,7 @@ class _Search:
         clear = sorted((c for c in fitted if c.gained >= least and worth(c) > 0.0), key=odds)
         if law is not None:
             found.explained += reference - law.cost
-            polished, tighter = self.fitter.settle(law.model, law.noise, 1, 60)
+            polished, tighter = self.fitter.settle(law.model, law.noise, 1)
             return polished, tighter, [replace(law, model=polished), *clear]
         best = self._standing(fitted, clear, least)
         if best is None:
@@ -224,7 +224,7 @@ class _Search:
         best, clear = self._placed(found, best, clear)
         found.explained += reference - best.cost
         polished = self.fitter.fit(best.model, best.noise, 4, self.settings.relinearise)
-        polished, tighter = self.fitter.settle(polished, best.noise, 2, 60)
+        polished, tighter = self.fitter.settle(polished, best.noise, 2)
         rest = sorted(
             (c for c in {*fitted, *clear} if c is not best and (c in clear or odds(c) >= odds(best))), key=odds
         )

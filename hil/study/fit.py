@@ -6,8 +6,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hil.study.candidates import Candidate
+from hil.study.estimate import estimate, first_guess
 from hil.study.linear import Sums, solve_within, sums, track_columns
-from hil.study.noise import Frame, Noise, estimate, first_guess, tracks_of, whiten
+from hil.study.noise import Frame, Noise, tracks_of, whiten
 from hil.study.nuisances import Nuisance
 from hil.study.rig import Rig, Stack
 from hil.study.table import Floats
@@ -260,16 +261,16 @@ class Fitter:
         }
         return Model(z, terms, residual, self.cost(residual, z, noise), covariance)
 
-    def settle(self, model: Model, noise: Noise, rounds: int, budget: int = 160) -> tuple[Model, Noise]:
+    def settle(self, model: Model, noise: Noise, rounds: int) -> tuple[Model, Noise]:
         """Noise and fit in turn."""
         for _ in range(rounds):
-            noise = self.estimated(model, noise, budget)
+            noise = self.estimated(model, noise)
             model = self.fit(model, noise, 2)
         return model, noise
 
-    def estimated(self, model: Model, noise: Noise, budget: int = 160) -> Noise:
+    def estimated(self, model: Model, noise: Noise) -> Noise:
         """Noise of largest likelihood at the model's residual."""
-        return estimate(model.residual, self.frame, noise, budget) if noise.enabled else noise
+        return estimate(model.residual, self.frame, noise) if noise.enabled else noise
 
     def screen(self, model: Model, columns: Tracks, noise: Noise) -> Sums:
         """Sums with nuisances, the model's effects and all columns."""

@@ -34,7 +34,7 @@ def from_handed_in(
         model = own.at(np.zeros(len(numbers.nuisances)), one.model.terms, noise)
         for _ in range(_ROUNDS):
             model = own.fit(model, noise, 4, follow=True)
-            noise = own.estimated(model, noise, 60)
+            noise = own.estimated(model, noise)
         return min(one, refitted(one, own.fit(model, noise, 2), noise), key=odds)
 
     found, bare = Contest.at_once(again, fitted), []
@@ -47,9 +47,9 @@ def from_handed_in(
         if strain(begun.z) >= STRAINED:
             model, noise = numbers.fitted(begun, one.noise)
         else:
-            model, noise = numbers.fitter.settle(begun, one.noise, 2, 60)
+            model, noise = numbers.fitter.settle(begun, one.noise, 2)
         found[k] = min(one, refitted(one, model, noise), key=odds)
         without = numbers.fitter.fit(numbers.fitter.at(model.z, terms, noise), noise, 6)
-        bare.append(numbers.fitter.settle(without, noise, 2, 60))
+        bare.append(numbers.fitter.settle(without, noise, 2))
     numbers.fitter = fitter
     return found, min(bare, key=lambda fit: fit[0].cost)

@@ -76,7 +76,7 @@ class Numbers:
         """
         cost, around, times = np.inf, model.z, 0
         for _ in range(_TURNS):
-            noise = self.fitter.estimated(model, noise, 60)
+            noise = self.fitter.estimated(model, noise)
             model = self.fitter.fit(model, noise, 4, follow=True)
             settled, cost = cost - model.cost < _SETTLED, model.cost
             stale = float(np.abs(model.z - around).max()) > (_STALE * (1 + 2 * times) if settled else _FAR)

@@ -10,7 +10,7 @@ from hil.study.table import Floats
 
 HUBER = 6.0
 """Innovations beyond so many standard deviations count in proportion, not squared (Huber 1964)."""
-_UNKNOWN = 1e4  # variance of a start that nothing is known of
+UNKNOWN = 1e4  # variance of a start that nothing is known of
 
 
 def _coloured(y: Floats, fresh: Floats, white: Floats, phi: float, colour: float, out: Floats) -> float:
@@ -42,8 +42,9 @@ def _coloured(y: Floats, fresh: Floats, white: Floats, phi: float, colour: float
 
 
 def _moving(
-    y: Floats, fresh: Floats, restart: Floats, white: Floats, share: Floats, step_s: float, colours: Floats, out: Floats
-) -> float:
+    y: Floats, fresh: Floats, restart: Floats, rolling: Floats, white: Floats, share: Floats, step_s: float,
+    colours: Floats, out: Floats,
+) -> float:  # fmt: skip
     # states: error of the speed, force disturbance, slope disturbance, disturbance of the accelerometer, of the wheels
     columns = y.shape[2]
     x = np.zeros((5, columns))
@@ -57,21 +58,22 @@ def _moving(
             cov[:] = 0.0
             for i in range(4):
                 cov[1 + i, 1 + i] = colours[i, 1]
-            cov[0, 0] = _UNKNOWN
+            cov[0, 0] = UNKNOWN
         else:
+            step = step_s * rolling[t]
             for k in range(columns):
-                x[0, k] += step_s * (x[1, k] + x[2, k])
+                x[0, k] += step * (x[1, k] + x[2, k])
                 for i in range(4):
                     x[1 + i, k] *= colours[i, 0]
             for i in range(5):
                 for j in range(5):
                     move[i, j] = cov[i, j]
             for j in range(5):
-                move[0, j] += step_s * (cov[1, j] + cov[2, j])
+                move[0, j] += step * (cov[1, j] + cov[2, j])
                 for i in range(4):
                     move[1 + i, j] *= colours[i, 0]
             for i in range(5):
-                cov[i, 0] = move[i, 0] + step_s * (move[i, 1] + move[i, 2])
+                cov[i, 0] = move[i, 0] + step * (move[i, 1] + move[i, 2])
                 for j in range(4):
                     cov[i, 1 + j] = move[i, 1 + j] * colours[j, 0]
             for i in range(4):
@@ -80,7 +82,7 @@ def _moving(
                 for i in range(5):
                     cov[0, i] = 0.0
                     cov[i, 0] = 0.0
-                cov[0, 0] = _UNKNOWN
+                cov[0, 0] = UNKNOWN
                 for k in range(columns):
                     x[0, k] = 0.0
         for m in range(3):
@@ -88,15 +90,16 @@ def _moving(
                 for k in range(columns):
                     out[t, m, k] = 0.0
                 continue
-            # what is seen: wheels (speed and their own share), acceleration, ground speed
+            # what is seen: wheels (speed and their own share), acceleration (of a car at rest none), ground speed
             first, second = (1, 3) if m == 1 else (0, 4)
-            weight = 1.0 if m == 1 else (share[t] if m == 0 else 0.0)
+            one = rolling[t] if m == 1 else 1.0
+            other = 1.0 if m == 1 else (share[t] if m == 0 else 0.0)
             for i in range(5):
-                h[i] = cov[i, first] + weight * cov[i, second]
-            total = white[t, m] + h[first] + weight * h[second]
+                h[i] = one * cov[i, first] + other * cov[i, second]
+            total = white[t, m] + one * h[first] + other * h[second]
             scale = 1.0 / np.sqrt(total)
             for k in range(columns):
-                innovation = y[t, m, k] - x[first, k] - weight * x[second, k]
+                innovation = y[t, m, k] - one * x[first, k] - other * x[second, k]
                 for i in range(5):
                     x[i, k] += h[i] / total * innovation
                 out[t, m, k] = innovation * scale
@@ -115,4 +118,5 @@ moving = compiled(_moving)
 """The moving car: (samples, 3 tracks, columns) of speed, acceleration, ground speed.
 
 ``colours`` holds rows (factor from sample to sample, variance) of force, slope, accelerometer and wheel disturbance,
-the last one weighted by ``share`` (samples,); ``restart`` forgets the speed's error."""
+the last one weighted by ``share`` (samples,); ``restart`` forgets the speed's error. Force and slope move the car where
+it is ``rolling`` (samples,); one held at rest feels neither."""

@@ -43,7 +43,7 @@ def told(found: Diagnosis, hidden: Mapping[str, Any]) -> Errors | None:
     own = found.fitter
     fitter = Fitter(own.rig, own.frame, base, own.nuisances, own.nuisance_columns)
     model = fitter.fit(fitter.at(found.base.z, (), found.noise), found.noise, 3)
-    model, noise = fitter.settle(model, found.noise, 1, 60)
+    model, noise = fitter.settle(model, found.noise, 1)
     known = replace(found, fitter=fitter, noise=noise, base=model, final=model, contenders=[])
     return {WORDS[gain.channel]: gain.after for gain in gains(known)}
 

@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
-from hil.study.noise import Frame, Noise, Track, estimate, first_guess, whiten
+from hil.study.estimate import estimate, first_guess
+from hil.study.noise import Frame, Noise, Track, whiten
 from hil.study.prepare import prepare
 from hil.study.table import Log, make_log
 
@@ -69,3 +71,33 @@ def test_what_is_far_off_for_a_moment_does_not_make_all_noisier() -> None:
         sizes.append(np.hypot(track.a, track.c) * np.median(scales))
     assert sizes[0] == pytest.approx(NOISE_PA, rel=0.1)
     assert sizes[1] < 2.5 * sizes[0]
+
+
+def test_the_noise_that_made_the_residual_is_found() -> None:
+    """Force, slope and accelerometer of a car that rolls and stands: where each tells, sizes and times come back."""
+    rng, n = np.random.default_rng(7), 60000
+    step = 0.02
+    true = {"force": (0.03, 0.8), "slope": (0.04, 3.0), "accelerometer": (0.01, 3.0)}
+    colour = {}
+    for name, (size, tau_s) in true.items():
+        keep = np.exp(-step / tau_s)
+        colour[name] = lfilter([1.0], [1.0, -keep], size * np.sqrt(1.0 - keep**2) * rng.standard_normal(n))
+    rolling = (np.arange(n) % 3000 < 2500) * 1.0
+    restart = (np.arange(n) % 1500 == 0) * 1.0
+    speed = np.zeros(n)
+    for k in range(1, n):
+        pushed = colour["force"][k - 1] + colour["slope"][k - 1]
+        speed[k] = 0.0 if restart[k] else speed[k - 1] + step * rolling[k - 1] * pushed
+    tracks = {
+        "wheel.mean": (speed + 0.003 * rng.standard_normal(n))[:, None],
+        "ax": (rolling * colour["force"] + colour["accelerometer"] + 0.015 * rng.standard_normal(n))[:, None],
+    }
+    fresh = np.zeros(n)
+    fresh[0] = 1.0
+    present = {"wheel.mean": rolling * (1.0 - restart), "ax": np.ones(n)}
+    frame = Frame(fresh, restart, rolling, 20.0 * rolling, np.zeros(n), step, present, ("wheel.mean", "ax"))
+    found = estimate(tracks, frame, first_guess(tracks, frame))
+    for (size, tau_s), known in zip(found.disturbances, true.values(), strict=False):
+        assert size == pytest.approx(known[0], rel=0.25)
+        assert tau_s == pytest.approx(known[1], rel=0.4)
+    assert found.tracks["ax"].a == pytest.approx(0.015, rel=0.05)

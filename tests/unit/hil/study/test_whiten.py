@@ -37,7 +37,7 @@ def _innovations(y: np.ndarray, force: float) -> np.ndarray:
     fresh, white, out = np.zeros(n), np.tile([1e-4, 4e-4, 0.0], (n, 1)), np.empty_like(y)
     fresh[0] = 1.0
     colours = np.array([[np.exp(-STEP_S), force**2], [0.5, 1e-12], [0.5, 1e-12], [0.5, 1e-12]])
-    moving(y, fresh, np.zeros(n), white, np.ones(n), STEP_S, colours, out)
+    moving(y, fresh, np.zeros(n), np.ones(n), white, np.ones(n), STEP_S, colours, out)
     return out[:, :2, 0]
 
 
@@ -63,7 +63,7 @@ def test_what_all_wheels_tell_wrong_is_no_motion() -> None:
     fresh, white, out = np.zeros(n), np.tile([2.5e-5, 0.0, 1e-4], (n, 1)), np.empty_like(y)
     fresh[0] = 1.0
     colours = np.array([[0.5, 1e-12], [0.5, 1e-12], [0.5, 1e-12], [np.exp(-STEP_S), 0.02**2]])
-    moving(y, fresh, np.zeros(n), white, share, STEP_S, colours, out)
+    moving(y, fresh, np.zeros(n), np.ones(n), white, share, STEP_S, colours, out)
     assert out[10:, [0, 2], 0].std(axis=0) == pytest.approx([1.0, 1.0], abs=0.05)
     assert abs(np.corrcoef(out[11:, 0, 0], out[10:-1, 0, 0])[0, 1]) < 0.05
 
@@ -72,3 +72,19 @@ def test_what_is_not_measured_leaves_nothing() -> None:
     y, out = np.ones((50, 1)), np.ones((50, 1))
     coloured(y, np.zeros(50), np.zeros(50), 0.9, 1.0, out)
     assert not out.any()
+
+
+def test_a_car_held_at_rest_feels_no_gust() -> None:
+    """A constant error of the accelerometer shows at rest by its own noise alone, however large the gusts are."""
+    n = 500
+    y, out = np.zeros((n, 3, 1)), np.empty((n, 3, 1))
+    y[:, 1] = 0.05
+    fresh, white = np.zeros(n), np.tile([1e-4, 4e-4, 0.0], (n, 1))
+    fresh[0] = 1.0
+    colours = np.array([[0.98, 0.5**2], [0.98, 0.5**2], [0.98, 1e-12], [0.5, 1e-12]])
+    shown = []
+    for rolling in (np.ones(n), np.zeros(n)):
+        moving(y, fresh, np.zeros(n), rolling, white, np.ones(n), STEP_S, colours, out)
+        shown.append(float(np.square(out[:, 1]).sum()))
+    assert shown[1] == pytest.approx(n * 0.05**2 / 4e-4, rel=1e-3)
+    assert shown[0] < 0.2 * shown[1]
