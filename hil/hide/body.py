@@ -45,8 +45,9 @@ def wheel_load(x: Vector, i: int, mass: float, car: Car, e: Vector) -> float:
     share = (rear_m if front else car.cog_to_front_axle_m) / car.wheelbase_m
     side = 1.0 - 2.0 * (i % 2)
     height = car.cog_height_m + e[E.cog_height, 0]
-    damper_s = car.pitch_damping / (3.141592654 * car.pitch_frequency_hz)
-    sprung = -(x[S.pitch_rad] + damper_s * x[S.pitch_rate_rad_s]) / (car.dive_rad_s2_m * (1.0 + e[E.pitch_dive, 0]))
+    softer = 1.0 + e[E.pitch_dive, 0]
+    damper_s = softer * car.pitch_damping / (3.141592654 * car.pitch_frequency_hz)
+    sprung = -(x[S.pitch_rad] + damper_s * x[S.pitch_rate_rad_s]) / (car.dive_rad_s2_m * softer)
     along = LINKS * x[S.load_ax_mps2] + (1.0 - LINKS) * sprung
     load = 0.5 * mass * GRAVITY_MPS2 * share
     load += (-0.5 if front else 0.5) * mass * height * along / car.wheelbase_m
@@ -185,11 +186,12 @@ def rates(
     dx[S.yaw_rate_rad_s] = dx[S.yaw_rate_rad_s] / car.yaw_inertia_kg_m2 * moving - (1.0 - moving) * 5.0 * yaw
     dx[S.distance_m] = speed
 
-    dive = car.dive_rad_s2_m * (1.0 + e[E.pitch_dive, 0])
+    softer = 1.0 + e[E.pitch_dive, 0]  # springs; inertia and dampers stay
+    dive = car.dive_rad_s2_m * softer
     w = 6.283185307 * car.pitch_frequency_hz
     dx[S.pitch_rad] = x[S.pitch_rate_rad_s]
     dx[S.pitch_rate_rad_s] = (
-        w * w * (-dive * specific_x - x[S.pitch_rad]) - 2.0 * car.pitch_damping * w * x[S.pitch_rate_rad_s]
+        w * w * (-dive * specific_x - x[S.pitch_rad]) / softer - 2.0 * car.pitch_damping * w * x[S.pitch_rate_rad_s]
     )
     dx[S.load_ax_mps2] = (specific_x - x[S.load_ax_mps2]) / 0.02
     dx[S.load_ay_mps2] = (specific_y - x[S.load_ay_mps2]) / 0.04

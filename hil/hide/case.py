@@ -24,12 +24,14 @@ NUMBERS = {
     "mass_offset": ("mass_kg", False), "rotating_inertia": ("wheel_inertia_kg_m2", False),
     "cog_height": ("cog_height_m", False), "threshold": ("threshold_pressure_pa", False),
     "ehb_dead_time": ("ehb_dead_time_s", False), "motor_tau": ("motor_time_constant_s", False),
-    "rolling_resistance": ("rolling_resistance", True), "pitch_dive": ("dive_rad_s2_m", True),
+    "rolling_resistance": ("rolling_resistance", True),
     "slip_stiffness": ("slip_stiffness", True), "tyre_relaxation": ("relaxation_length_m", True),
     "mu_road": ("tyre_friction", True), "ehb_bandwidth": ("ehb_frequency_hz", True),
     "battery_soc": ("battery_charge_power_w", True),
 }  # fmt: skip
 """Effects that a number of the car is, where they act on all of it: added to it, or a share of the nominal one."""
+SWINGING = ("wheel_inertia_kg_m2", "slip_stiffness", "relaxation_length_m", "ehb_dead_time_s", "motor_time_constant_s")
+"""Numbers whose signature is of wheels that swing on their tyres: another car's is soon out of phase with it."""
 CALIBRATION_ROUNDS, CALIBRATED, REACHED = 8, 0.03, 0.15
 
 
@@ -176,10 +178,17 @@ def _imitations(case: Case) -> Vector:
     """Whitened signatures of all parameters with a tolerance, one standard deviation each, (samples, parameters)."""
     own = logs(replace(case, hidden=()), clean=True)
     columns = []
-    for signature in _signatures(case.manoeuvres, case.variant):
+    for name, signature in zip(TOLERANCE, _signatures(case.manoeuvres, case.variant), strict=True):
         fitted = [_fitted(one, len(mine["t_s"])) for one, mine in zip(signature, own, strict=True)]
+        if name in SWINGING:
+            fitted = difference(_observed(case.drives, _off(case.car, name), case.noise, (), case.seed, True), own)
         columns.append(whitened(fitted, own, case.noise))
     return np.stack(columns, axis=1)
+
+
+def _off(car: Car, name: str) -> Car:
+    """A car with one number off by half its tolerance."""
+    return car._replace(**{name: getattr(car, name) + 0.5 * TOLERANCE[name]})
 
 
 def _fitted(table: Table, rows: int) -> dict[str, Vector]:
@@ -196,9 +205,8 @@ def _signatures(manoeuvres: str, variant: int) -> list[list[dict[str, Vector]]]:
     drives = manoeuvre_set(manoeuvres, variant)
     base = _observed(drives, NOMINAL, noise, (), 0, True)
     found = []
-    for name, tolerance in TOLERANCE.items():
-        car = NOMINAL._replace(**{name: getattr(NOMINAL, name) + 0.5 * tolerance})
-        found.append(difference(_observed(drives, car, noise, (), 0, True), base))
+    for name in TOLERANCE:
+        found.append(difference(_observed(drives, _off(NOMINAL, name), noise, (), 0, True), base))
     return found
 
 
@@ -223,18 +231,18 @@ def scaled_case(case: Case, target: float) -> Case:
         trial = _times(case, factor)
         beside, alone = _snr(trial, base, imitations)
         trial = replace(trial, snr=beside, snr_alone=alone, target_snr=target)
-        error = _off(beside, target)
-        if best.snr is None or error < _off(best.snr, target):
+        error = _from_target(beside, target)
+        if best.snr is None or error < _from_target(best.snr, target):
             best = trial
         if error < CALIBRATED or (factor >= high and beside < target):
             break
         low, high = (factor, high) if beside < target else (low, factor)
         wanted = factor * target / max(beside, 1e-9)
         factor = wanted if low < wanted < high else (high if wanted >= high and low == factor else 0.5 * (low + high))
-    return replace(best, reached=best.snr is not None and _off(best.snr, target) < REACHED)
+    return replace(best, reached=best.snr is not None and _from_target(best.snr, target) < REACHED)
 
 
-def _off(snr: float, target: float) -> float:
+def _from_target(snr: float, target: float) -> float:
     return abs(log(max(snr, 1e-9) / target))
 
 

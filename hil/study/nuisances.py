@@ -16,8 +16,8 @@ HALF_WIDTH_TO_SIGMA = 0.5  # a tolerance is two standard deviations
 _GUESSED = 8.0
 _WIDE, _MOST_FACTOR, _MOST_TIMES = 0.1, 1.7, 5.0
 _FORM = {
-    "motor_time_constant_s": 0.3, "ehb_dead_time_s": 0.3, "wheel_inertia_kg_m2": 0.1, "vehicle_cog_height_m": 0.15,
-    "vehicle_yaw_inertia_kg_m2": 0.1, "vehicle_steering_ratio": 0.05,
+    "motor_time_constant_s": 0.15, "ehb_dead_time_s": 0.15, "wheel_inertia_kg_m2": 0.1, "vehicle_cog_height_m": 0.15,
+    "vehicle_yaw_inertia_kg_m2": 0.1, "vehicle_steering_ratio": 0.02,
 }  # fmt: skip
 _SUSPENSION = {
     "suspension_ride_rate_n_m": 0.3, "suspension_progression_n_m3": 1.0, "suspension_damping_ns_m": 0.3,
@@ -116,9 +116,9 @@ def listed(p: Floats, tolerance: Mapping[str, float], thermal: bool, layout: Lay
     add("tyre_shape", [layout.slice("tyre_lcx").start], [0.1])
     add("tyre_stiffness_load", [layout.slice("tyre_pkx3").start], [0.3])
     add("tyre_friction_load", [layout.slice("tyre_pdx2").start], [0.04])
-    add("tyre_relaxation_load", [layout.slice("tyre_ptx2").start], [3.0])
+    add("tyre_relaxation_load", [layout.slice("tyre_ptx2").start], [1.5])
     add("wheel_brake_windup_time_s", [layout.slice("wheel_brake_windup_time_s").start], [0.006])
-    add("tyre_lsgal", [layout.slice("tyre_lsgal").start], [0.5])
+    add("tyre_lsgal", [layout.slice("tyre_lsgal").start], [0.3])
     add("tyre_lmuy", [layout.slice("tyre_lmuy").start], [0.15])
     lift = layout.slice("vehicle_lift_coefficient")
     for k, axle in enumerate(("front", "rear")):

@@ -54,6 +54,23 @@ def test_pads_rest_where_equation_3_rests():
     assert x[-1, S.mu] == pytest.approx(rest, rel=5e-3)
 
 
+def test_softer_springs_dive_deeper_and_swing_slower():
+    """Springs of 1 / 1.5; inertia and dampers stay: the body's damped frequency goes with sqrt(k / I - (d / 2 I)^2)."""
+    softness = np.zeros((ROWS, 4))
+    softness[E.pitch_dive, 0] = 0.5
+    depth, half_s = [], []
+    for strength in (None, softness):
+        stop = driven("m05_stop_72_cold", strength)
+        held = round(3.0 / STEP_S)
+        depth.append(stop.states[held, S.pitch_rad])
+        standing = stop.states[np.argmax(stop.states[:, S.speed_mps] < 0.01) :, S.pitch_rate_rad_s]
+        turns = np.flatnonzero(np.diff(np.sign(standing)) != 0)
+        half_s.append((turns[1] - turns[0]) * STEP_S)
+    assert depth[1] / depth[0] == pytest.approx(1.5, rel=0.02)
+    ours = (1.0 / 1.5 - NOMINAL.pitch_damping**2) / (1.0 - NOMINAL.pitch_damping**2)
+    assert half_s[1] / half_s[0] == pytest.approx(ours**-0.5, rel=0.03)
+
+
 def test_slope_is_felt_by_the_wheels_and_not_by_the_accelerometer():
     plain, gusts = driven("m02_coast_fast_out"), np.zeros((BY_NAME["m02_coast_fast_out"].ticks, 2))
     gusts[:, 1] = 0.2
