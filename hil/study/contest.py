@@ -13,6 +13,8 @@ from hil.study.noise import Noise
 from hil.study.rig import WORKERS
 from hil.study.screen import Score, rescored, share_of, sized
 
+_ROUNDS, _SETTLED = 4, 1.0
+"""Times that a contender and its noise are fitted in turn, and how little less cost ends it."""
 Item = TypeVar("Item")
 Of = TypeVar("Of")
 
@@ -143,7 +145,11 @@ class Contest:
             fitted = self._fitter.fit(fitted, noise, 3, self._relinearise)
         else:
             fitted = self._fitter.fit(begun, noise, 3, self._relinearise, own)
-        noise = self._no_worse(fitted, self._fitter.estimated(fitted, noise), noise)
-        fitted = self._fitter.fit(fitted, noise, 1, self._relinearise)
+        for _ in range(_ROUNDS):  # what noise took for its own it gives back step by step
+            noise = self._no_worse(fitted, self._fitter.estimated(fitted, noise), noise)
+            before = self._fitter.cost(fitted.residual, fitted.z, noise)
+            fitted = self._fitter.fit(fitted, noise, 2, self._relinearise)
+            if before - fitted.cost < _SETTLED:
+                break
         begun_with = Contender(fitted.terms[-1], fitted, fitted.cost, 0.0, item.information, noise)
         return refitted(begun_with, fitted, noise)

@@ -29,7 +29,6 @@ from hil.study.world import World
 
 Say = Callable[[str], None]
 PLAUSIBLE, LEADERS = 12, 5
-_OF_SCREEN = 1.5
 _CLEARER = 5.0
 """By how much more than the best listed cause a law in no list must explain, log of the odds."""
 _TRIED, _LAWS_TRIED = 10, 2
@@ -197,8 +196,7 @@ class _Search:
         reference = contest.reference
 
         def gained() -> list[Contender]:
-            listed = zip(fitted, top, strict=True)
-            return [self._gained(one, item, reference - left.of(item.candidate)) for one, item in listed]
+            return [self._gained(one, reference - left.of(one.term.candidate)) for one in fitted]
 
         if self.settings.relinearise and (self._bent(model) or max(one.gained for one in gained()) >= least):
             fitted, without = self._fitted_again(model, fitted, top, reference)
@@ -366,12 +364,9 @@ class _Search:
     def _strain(self, z: Floats) -> float:
         return strain(z, self.fitter.farthest)
 
-    def _gained(self, contender: Contender, item: Score, reference: float) -> Contender:
-        """With its gain, shared out over the model's own error and less what a chosen beginning takes.
-
-        More than the screen saw is the noise's doing.
-        """
-        gained = min(reference - contender.cost, _OF_SCREEN * item.raw) / variance_of(item.candidate)
+    def _gained(self, contender: Contender, reference: float) -> Contender:
+        """With its gain, shared out over the model's own error and less what a chosen beginning takes."""
+        gained = (reference - contender.cost) / variance_of(contender.term.candidate)
         gained = gained / self._strain(contender.model.z) - price(contender.term, self.frame)
         return replace(contender, gained=gained)
 

@@ -127,7 +127,8 @@ class Fitter:
     def term_columns(self, model: Model) -> Tracks:
         """Sensitivities to the values of the effects, at the model."""
         world = self.world(model.z, model.terms)
-        steps = [_difference(term) for term in model.terms]
+        known = np.diag(model.covariance) if model.covariance.size else np.zeros(len(model.terms))
+        steps = [_difference(term, float(sd)) for term, sd in zip(model.terms, np.sqrt(known), strict=True)]
         worlds = [term.candidate.applied(world, step) for term, step in zip(model.terms, steps, strict=True)]
         return track_columns(self.rig, self.frame, model.stack or self.rig.run(world), worlds, steps)
 
@@ -282,8 +283,10 @@ class Fitter:
         return sums(model.residual, joined, self.frame, noise, len(self.nuisances))
 
 
-def _difference(term: Term) -> float:
-    """Step of a finite difference: small against what is usual, and inside the bounds."""
+def _difference(term: Term, sd: float) -> float:
+    """Step of a finite difference: what data say to so many standard deviations ``sd`` (0: nobody knows yet), at most a
+    fifth of what is usual, for a threshold is met at one step of a replay or the next; and inside the bounds."""
     parameter = term.candidate.parameter
-    size = max(0.02 * abs(parameter.typical), 0.05 * abs(term.value))
+    usual = abs(parameter.typical)
+    size = max(0.02 * usual, 0.05 * abs(term.value), min(2.0 * sd, 0.2 * usual))
     return -size if term.value + size > parameter.high else size
