@@ -41,6 +41,14 @@ def test_a_road_grade_is_named_and_within_its_interval() -> None:
     assert low < record["hidden"][0]["parameters"]["grade"]["value"] < high
 
 
+@pytest.mark.parametrize("effect", ["thermal_growth", "imu_bias"])
+def test_what_noise_had_taken_for_its_own_is_named(effect: str) -> None:
+    """They were answered ``none``: the search for the noise ended before it gave back what it had taken."""
+    record = run_case(draw("single", SINGLES.index(effect), 6066, 15.0), 6066, 15.0)
+    assert record["hidden"][0]["effect"] == effect
+    assert record["named"][:1] == [effect]
+
+
 def test_without_the_noise_model_nothing_hidden_raises_an_alarm() -> None:
     record = run_case(draw("null", 0, SEED), SEED, None, Settings(noise_model=False))
     assert record["causes"]
