@@ -72,11 +72,13 @@ class Numbers:
     def fitted(self, model: Model, noise: Noise) -> tuple[Model, Noise]:
         """Numbers and noise in turn, with sensitivities taken anew until neither moves.
 
-        What the numbers have not explained yet counts as noise, so the first steps are forgiving.
+        What the numbers have not explained yet counts as noise, so the steps are forgiving; the first are made with the
+        noise at hand, for noise found there would take edges for its own that numbers explain.
         """
         cost, around, times = np.inf, model.z, 0
-        for _ in range(_TURNS):
-            noise = self.fitter.estimated(model, noise)
+        for turn in range(_TURNS):
+            if turn:
+                noise = self.fitter.estimated(model, noise)
             model = self.fitter.fit(model, noise, 4, follow=True)
             settled, cost = cost - model.cost < _SETTLED, model.cost
             stale = float(np.abs(model.z - around).max()) > (_STALE * (1 + 2 * times) if settled else _FAR)
