@@ -179,9 +179,10 @@ def _imitations(case: Case) -> Vector:
     own = logs(replace(case, hidden=()), clean=True)
     columns = []
     for name, signature in zip(TOLERANCE, _signatures(case.manoeuvres, case.variant), strict=True):
-        fitted = [_fitted(one, len(mine["t_s"])) for one, mine in zip(signature, own, strict=True)]
         if name in SWINGING:
             fitted = difference(_observed(case.drives, _off(case.car, name), case.noise, (), case.seed, True), own)
+        else:
+            fitted = [_fitted(one, len(mine["t_s"])) for one, mine in zip(signature, own, strict=True)]
         columns.append(whitened(fitted, own, case.noise))
     return np.stack(columns, axis=1)
 

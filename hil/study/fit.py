@@ -284,8 +284,8 @@ class Fitter:
 
 
 def _difference(term: Term, sd: float) -> float:
-    """Step of a finite difference: what data say to so many standard deviations ``sd`` (0: nobody knows yet), at most a
-    fifth of what is usual, for a threshold is met at one step of a replay or the next; and inside the bounds."""
+    """Step of a finite difference: twice the standard deviation ``sd`` that data leave open (0: nobody knows yet), at
+    most a fifth of what is usual, for a threshold is met at one step of a replay or the next; inside the bounds."""
     parameter = term.candidate.parameter
     usual = abs(parameter.typical)
     size = max(0.02 * usual, 0.05 * abs(term.value), min(2.0 * sd, 0.2 * usual))

@@ -1,4 +1,4 @@
-"""Noise of a case: what frames wait for the bus is noise where a channel is steep."""
+"""Noise of a case: what frames wait for the bus, and the noise of largest likelihood."""
 
 from dataclasses import replace
 
