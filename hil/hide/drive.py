@@ -12,6 +12,7 @@ from hil.hide.body import rates
 from hil.hide.car import NOMINAL, Car
 from hil.hide.compiled import entry, equation
 from hil.hide.manoeuvres import TICK_S, Manoeuvre
+from hil.hide.noise import QUANTUM
 from hil.hide.strengths import OUTPUTS, ROWS, STATES, E, S, Y
 
 Vector = NDArray[np.float64]
@@ -22,15 +23,17 @@ NOMINAL_RADIUS_M, NOMINAL_MASS_KG = NOMINAL.rolling_radius_m, NOMINAL.mass_kg
 FRONT_GAIN_NM_PA, REAR_GAIN_NM_PA = NOMINAL.brake_gain_front_nm_pa, NOMINAL.brake_gain_rear_nm_pa
 STANDSTILL_S = 0.8
 APPLIED_PA = 1.5e5
+PRESSURE_PA, MOTOR_NM = QUANTUM["pressure"], QUANTUM["motor"]
 
 
 @dataclass(frozen=True)
 class Driven:
-    """What happened, every 2.5 ms from the start: states, outputs, and the demands every 10 ms."""
+    """What happened, every 2.5 ms from the start: states, outputs, and the demands every 10 ms, as frames say them."""
 
     manoeuvre: Manoeuvre
     states: Vector
     outputs: Vector
+    pressure_demand_pa: Vector
     motor_demand_nm: Vector
 
     @property
@@ -60,6 +63,8 @@ def start_state(manoeuvre: Manoeuvre, car: Car) -> Vector:
 def drive(manoeuvre: Manoeuvre, car: Car, strength: Vector, onset_s: Vector, law: int, gusts: Vector) -> Driven:
     """Drive to the end of the demands, or until the car has stood for a while.
 
+    Pressure control and motors act on what the frames tell them: demands in whole quanta.
+
     Parameters
     ----------
     strength : the hidden effects, (rows, 4).  onset_s : begin of each row in this log.
@@ -68,12 +73,17 @@ def drive(manoeuvre: Manoeuvre, car: Car, strength: Vector, onset_s: Vector, law
     """
     ticks = manoeuvre.ticks
     states, outputs = np.zeros((ticks * PER_TICK, STATES)), np.zeros((ticks * PER_TICK, OUTPUTS))
-    demand = manoeuvre.motor_nm.copy()
+    pressure_demand, motor_demand = _whole(manoeuvre.pressure_pa, PRESSURE_PA), _whole(manoeuvre.motor_nm, MOTOR_NM)
     rows = _integrate(
-        start_state(manoeuvre, car), car, strength, onset_s, law, manoeuvre.pressure_pa, demand,
+        start_state(manoeuvre, car), car, strength, onset_s, law, pressure_demand, motor_demand,
         manoeuvre.steering_wheel_rad, manoeuvre.hold_mps, gusts, float(manoeuvre.direction), states, outputs,
     )  # fmt: skip
-    return Driven(manoeuvre, states[:rows], outputs[:rows], demand[: rows // PER_TICK])
+    ticks = rows // PER_TICK
+    return Driven(manoeuvre, states[:rows], outputs[:rows], pressure_demand[:ticks], motor_demand[:ticks])
+
+
+def _whole(demand: Vector, quantum: float) -> Vector:
+    return np.asarray(np.round(demand / quantum) * quantum)
 
 
 @equation
@@ -82,7 +92,7 @@ def _held_demand(x: Vector, target_mps: float) -> float:
     push = 0.25 * NOMINAL_RADIUS_M * NOMINAL_MASS_KG * 1.5 * (target_mps - x[S.speed_mps])
     for i in range(4):
         push += 0.25 * (FRONT_GAIN_NM_PA if i < 2 else REAR_GAIN_NM_PA) * x[S.pressure_pa + i]
-    return min(max(push, -HOLD_LIMIT_NM), HOLD_LIMIT_NM)
+    return round(min(max(push, -HOLD_LIMIT_NM), HOLD_LIMIT_NM) / MOTOR_NM) * MOTOR_NM
 
 
 @equation

@@ -147,7 +147,7 @@ def _pressures(log: _Sampling) -> dict[str, Vector]:
     pressure = log.state(S.pressure_pa, log.taken_s["pressure"], 4) + log.noise.pressure_pa * log.white(4)
     pressure += log.drift(4, log.noise.pressure_drift_pa, log.noise.sensor_tau_s)
     pressure = pressure * (1.0 + log.fault("pressure_gain")) + log.fault("pressure_offset")
-    demand = log.whole(log.driven.manoeuvre.pressure_pa[: log.rows], "pressure")
+    demand = log.driven.pressure_demand_pa[: log.rows]
     measured = log.whole(pressure * log.scale("pressure"), "pressure")
     return _named("pressure", "pa", measured) | _named("pressure_demand", "pa", demand)
 
@@ -155,7 +155,7 @@ def _pressures(log: _Sampling) -> dict[str, Vector]:
 def _motors(log: _Sampling) -> dict[str, Vector]:
     torque = log.state(S.motor_nm, log.taken_s["motor"], 4) + log.noise.torque_nm * log.white(4)
     torque += log.drift(4, log.noise.torque_drift_nm, log.noise.sensor_tau_s)
-    demand = log.whole(log.driven.motor_demand_nm[: log.rows], "motor")
+    demand = log.driven.motor_demand_nm[: log.rows]
     measured = log.whole(torque * log.scale("motor"), "motor")
     return _named("motor_torque", "nm", measured) | _named("motor_torque_demand", "nm", demand)
 

@@ -126,13 +126,12 @@ def _unlisted(found: Diagnosis, piece: Piece, listed: list[Contender]) -> dict[s
     terms, covariance = found.final.terms, found.final.covariance
     own = [k for k, term in enumerate(terms) if isinstance(term.candidate, Piece)]
     pieces = [term.candidate for term in terms if isinstance(term.candidate, Piece)]
+    error = variance_of_law(piece.law.name, piece.place)
     return {
         "effect": UNLISTED, "title": piece.effect.title, "joint": piece.law.joint, "wheel": piece.place,
         "parameters": {}, "probability": probabilities(listed)[0], "onset": None, "onset_s": None,
         "variables": [piece.variable], "adds": piece.law.adds,
-        "curve": shown(
-            pieces, [terms[k].value for k in own], variance_of_law(piece.law.name) * covariance[np.ix_(own, own)]
-        ),
+        "curve": shown(pieces, [terms[k].value for k in own], error * covariance[np.ix_(own, own)]),
     }  # fmt: skip
 
 

@@ -23,8 +23,17 @@ PLACES: Mapping[Scope, Mapping[str, tuple[int, ...]]] = {
     Scope.NODE: {node: (k,) for k, node in enumerate(NODES)},
 }  # fmt: skip
 """Members of a scope that move together, by the name of the place."""
+_KINDS = {
+    "front": "axle", "rear": "axle", "left": "side", "right": "side",
+    "fl": "wheel", "fr": "wheel", "rl": "wheel", "rr": "wheel",
+}  # fmt: skip
 USUAL = 1.5
 """Standard deviation before any data, in sizes met on real cars."""
+
+
+def kind_of(place: str) -> str:
+    """Axle, side or wheel; the car, and each node, is a kind by itself."""
+    return _KINDS.get(place, place)
 
 
 @dataclass(frozen=True, eq=False)

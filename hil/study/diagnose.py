@@ -337,7 +337,7 @@ class _Search:
         least = least_gain(found.looks + len(LAWS), self.settings.alpha) * inflation(found.screened)
         signature = {name: columns @ best.values[:, None] for name, columns in race.columns(best).items()}
         left_there = left.of_signature(best.curve.pieces[0].effect, signature)
-        least = least * variance_of_law(best.curve.law.name) + left_there
+        least = least * variance_of_law(best.curve.law.name, best.curve.place) + left_there
 
         def ahead() -> bool:
             gained = min(listed.cost, reference) - law.cost

@@ -1,12 +1,13 @@
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from hil.hide.car import NOMINAL, TOLERANCE, true_car
 from hil.hide.catalogue import LISTED, UNLISTED
-from hil.hide.drive import STEP_S, Driven, drive, energy_balance
-from hil.hide.manoeuvres import SETS, manoeuvre_set
+from hil.hide.drive import STEP_S, drive, energy_balance
+from hil.hide.manoeuvres import SETS, TICK_S, manoeuvre_set
 from hil.hide.strengths import ROWS, E, S, Y
 
 BY_NAME = {manoeuvre.name: manoeuvre for manoeuvre in manoeuvre_set("full")}
@@ -30,7 +31,7 @@ def test_a_missing_loss_would_show_in_the_balance():
     whole = driven("m05_stop_72_cold")
     outputs = whole.outputs.copy()
     outputs[:, Y.rolling_w] = 0.0
-    broken = Driven(whole.manoeuvre, whole.states, outputs, whole.motor_demand_nm)
+    broken = replace(whole, outputs=outputs)
     assert abs(energy_balance(broken, NOMINAL)) > 1e-3
 
 
@@ -45,6 +46,27 @@ def test_deceleration_is_force_over_mass():
     expected = torque / NOMINAL.rolling_radius_m / mass + losses
     found = (stop.states[k - 20, S.speed_mps] - stop.states[k + 20, S.speed_mps]) / (40 * STEP_S)
     assert found == pytest.approx(expected, rel=0.02)
+
+
+def test_actuators_follow_what_the_frames_say():
+    """A driver's demand between two quanta: pressure control and motors get the quantum, and settle there."""
+    hold, pulses = BY_NAME["m10_hold_pressure"], BY_NAME["m03_motor_20"]
+    none = np.zeros((ROWS, 4)), np.zeros(ROWS), 0
+    off = replace(hold, pressure_pa=hold.pressure_pa + 4e3 * (hold.pressure_pa > 0.0))
+    braked = drive(off, NOMINAL, *none, np.zeros((hold.ticks, 2)))
+    last = np.flatnonzero(braked.pressure_demand_pa[:, 0] == braked.pressure_demand_pa.max())[-1]
+    assert off.pressure_pa[last, 0] - braked.pressure_demand_pa[last, 0] == pytest.approx(4e3)
+    at = round((last * TICK_S + NOMINAL.ehb_dead_time_s) / STEP_S)
+    assert braked.states[at, S.pressure_pa] == pytest.approx(braked.pressure_demand_pa[last, 0], abs=500.0)
+
+    shifted = replace(pulses, motor_nm=pulses.motor_nm + 0.2 * (pulses.motor_nm != 0.0))
+    driven_by = drive(shifted, NOMINAL, *none, np.zeros((pulses.ticks, 2)))
+    steps = driven_by.motor_demand_nm / 0.5
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
+    most = int(np.abs(driven_by.motor_demand_nm[:, 0]).argmax())
+    last = most + int((driven_by.motor_demand_nm[most:, 0] == driven_by.motor_demand_nm[most, 0]).argmin()) - 1
+    felt = driven_by.states[round(last * TICK_S / STEP_S), S.motor_nm]
+    assert felt == pytest.approx(driven_by.motor_demand_nm[last, 0], abs=0.05)
 
 
 def test_pads_rest_where_equation_3_rests():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hil.study.basis import LAWS
-from hil.study.candidates import candidates, columns
+from hil.study.candidates import PLACES, candidates, columns, kind_of
 from hil.study.linear import project, solve
 from hil.study.own_error import UNLISTED, variance_of
 from hil.study.screen import inflation, leaders, score, threshold
@@ -53,13 +53,19 @@ def test_a_gain_is_shared_out_over_the_models_own_error() -> None:
     assert found.gain == pytest.approx(found.raw / variance_of(candidate))
 
 
-def test_every_entry_of_the_models_own_error_is_a_candidates_number_or_a_law() -> None:
-    numbers = {(c.effect.name, c.parameter.name) for c in CANDIDATES.values()}
-    numbers |= {(UNLISTED, law.name) for law in LAWS}
+def test_every_entry_of_the_models_own_error_is_a_candidates_number_or_a_law_at_a_kind_of_place() -> None:
+    kinds = {(c.effect.name, c.parameter.name, kind_of(c.place)) for c in CANDIDATES.values()}
+    kinds |= {(UNLISTED, law.name, kind_of(place)) for law in LAWS for place in PLACES[law.scope]}
     source = resources.files("hil.study") / "own_error.toml"
     table = tomllib.loads(source.read_text(encoding="utf-8"))["ratio"]
-    assert {(effect, name) for effect, ratios in table.items() for name in ratios} <= numbers
-    assert all(ratio >= 1.0 for ratios in table.values() for ratio in ratios.values())
+    entries = {
+        (effect, name, kind): ratio
+        for effect, numbers in table.items()
+        for name, ratios in numbers.items()
+        for kind, ratio in ratios.items()
+    }
+    assert set(entries) <= kinds
+    assert all(ratio >= 1.0 for ratio in entries.values())
 
 
 def test_both_the_best_explanation_and_the_clearest_are_fitted() -> None:

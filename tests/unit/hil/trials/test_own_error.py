@@ -1,4 +1,4 @@
-"""The model's own error as a table: what is measured counts, few cases are drawn to the usual, never below 1."""
+"""The model's own error as a table: what is measured counts, few looks are drawn to the usual, never below 1."""
 
 import tomllib
 
@@ -9,16 +9,24 @@ from hil.trials.own_error import as_toml, ratios
 
 
 def test_many_cases_tell_the_ratio_and_none_tell_the_usual() -> None:
-    table = ratios({("mass_offset", "mass_kg"): [16.0] * 1000, ("headwind", "wind_mps"): []})
-    assert table["mass_offset"]["mass_kg"] == pytest.approx(4.0, abs=0.02)
-    assert table["headwind"]["wind_mps"] == USUAL
+    table = ratios({("mass_offset", "mass_kg", "car"): [16.0] * 1000, ("headwind", "wind_mps", "car"): []})
+    assert table["mass_offset"]["mass_kg"]["car"] == pytest.approx(4.0, abs=0.02)
+    assert table["headwind"]["wind_mps"]["car"] == USUAL
+
+
+def test_what_the_form_does_to_all_wheels_alike_is_not_laid_on_one() -> None:
+    table = ratios({("pad_mu_gain", "gain", "car"): [9.0] * 1000, ("pad_mu_gain", "gain", "wheel"): [1.0] * 1000})
+    assert table["pad_mu_gain"]["gain"]["car"] == pytest.approx(3.0, abs=0.02)
+    assert table["pad_mu_gain"]["gain"]["wheel"] == 1.0
 
 
 def test_a_number_that_shows_less_than_noise_has_ratio_one() -> None:
-    assert ratios({("cogging", "amplitude_nm"): [0.1] * 1000}) == {"cogging": {"amplitude_nm": 1.0}}
+    found = ratios({("cogging", "amplitude_nm", "axle"): [0.1] * 1000})
+    assert found == {"cogging": {"amplitude_nm": {"axle": 1.0}}}
 
 
 def test_the_file_reads_back_and_says_how_it_was_made() -> None:
-    text = as_toml({"imu_gain": {"gain": 2.5, "cross": 1.0}}, 12, 777)
-    assert tomllib.loads(text) == {"ratio": {"imu_gain": {"gain": 2.5, "cross": 1.0}}}
-    assert "--own-error FILE --count 12 --seed 777" in text
+    table = {"imu_gain": {"gain": {"imu": 2.5}, "cross": {"imu": 1.0}}, "unlisted": {"drag(time)": {"car": 1.2}}}
+    text = as_toml(table, 30, 777)
+    assert tomllib.loads(text) == {"ratio": table}
+    assert "--own-error FILE --count 30 --seed 777" in text
