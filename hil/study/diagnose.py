@@ -22,7 +22,7 @@ from hil.study.prepare import Case
 from hil.study.race import LawRace, best_of_each, least_gain, with_law
 from hil.study.rig import Rig
 from hil.study.same_number import restated
-from hil.study.screen import Score, inflation, leaders, not_testable, scores, threshold
+from hil.study.screen import Score, beside_best, inflation, leaders, not_testable, scores, threshold
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
 from hil.study.world import World
@@ -119,7 +119,9 @@ class _Search:
         found.screened = self._scores(found.sums, found.base, found.first_noise)
         found.untestable = sorted({*not_testable(found.screened), *self.rig.vehicle.untold})
         found.looks = _independent(found.screened)
-        found.least_gain = threshold(found.looks, self.settings.alpha) * inflation(found.screened)
+        held = self.fitter.at_their_end(found.base.z)
+        found.inflation = inflation(beside_best(found.screened, found.sums, found.base.z, held))
+        found.least_gain = threshold(found.looks, self.settings.alpha) * found.inflation
 
     def _again(self, found: Diagnosis, model: Model, noise: Noise) -> tuple[Model, Noise]:
         """From numbers with which the causes of a model, or none, explain more than those the search went on from."""
@@ -334,7 +336,7 @@ class _Search:
         law = min(seen, key=odds)
         best = entries[law.term.candidate.name]
         self.say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
-        least = least_gain(found.looks + len(LAWS), self.settings.alpha) * inflation(found.screened)
+        least = least_gain(found.looks + len(LAWS), self.settings.alpha) * found.inflation
         signature = {name: columns @ best.values[:, None] for name, columns in race.columns(best).items()}
         left_there = left.of_signature(best.curve.pieces[0].effect, signature)
         least = least * variance_of_law(best.curve.law.name, best.curve.place) + left_there

@@ -58,6 +58,7 @@ class Diagnosis:
     untestable: list[str] = field(default_factory=list)
     sums: Sums | None = None
     looks: int = 0
+    inflation: float = 1.0
     least_gain: float = 0.0
     explained: float = 0.0
     remarks: list[str] = field(default_factory=list)

@@ -7,8 +7,9 @@ import numpy as np
 from scipy.stats import chi2
 
 from hil.study.candidates import USUAL, Candidate
-from hil.study.linear import Projected
+from hil.study.linear import Projected, Sums, project
 from hil.study.own_error import variance_of
+from hil.study.table import Floats
 
 SEEN = 3.0
 _MEDIAN_CHI2 = 0.455
@@ -94,6 +95,16 @@ def inflation(found: Sequence[Score]) -> float:
     """
     shown = [item.gain for item in found if item.reach > SEEN]
     return float(np.clip(np.median(shown) / _MEDIAN_CHI2, 1.0, _MOST_INFLATION)) if shown else 1.0
+
+
+def beside_best(found: Sequence[Score], sums: Sums, z: Floats, held: Sequence[int]) -> list[Score]:
+    """What all candidates explain beside the best of them, whose members take what they can.
+
+    A cause shows through whatever resembles it, and is no sign of a wrong model.
+    """
+    best = max(found, key=lambda item: item.raw)
+    left = project(sums.total(), sums.nuisances, best.candidate.columns, z, held)
+    return scores([item.candidate for item in found], left, 0, [0.0] * len(found))
 
 
 def leaders(found: Sequence[Score], count: int) -> list[Score]:

@@ -8,9 +8,9 @@ import pytest
 
 from hil.study.basis import LAWS
 from hil.study.candidates import PLACES, candidates, columns, kind_of
-from hil.study.linear import project, solve
+from hil.study.linear import Sums, project, solve
 from hil.study.own_error import UNLISTED, variance_of
-from hil.study.screen import inflation, leaders, score, threshold
+from hil.study.screen import beside_best, inflation, leaders, score, scores, threshold
 
 CANDIDATES = {c.name: c for c in candidates(columns())}
 
@@ -44,6 +44,25 @@ def test_the_models_own_error_raises_what_is_asked() -> None:
     assert inflation(quiet) == 1.0
     assert inflation([]) == 1.0
     assert inflation(loud) > 1.0
+
+
+def test_a_cause_that_shows_through_others_is_no_error_of_the_model() -> None:
+    """Signatures that all resemble one: the cause inflates what every one explains, and nothing beside it."""
+    listed = [c for c in CANDIDATES.values() if c.columns == (min(c.columns),) and c.parameter.low < 0.0]
+    rng = np.random.default_rng(5)
+    shared = rng.standard_normal(3000)
+    count = 1 + max(c.columns[0] for c in listed)
+    tau = np.ones(count)
+    for candidate in listed:
+        tau[candidate.columns[0]] = candidate.spread
+    signatures = (0.8 * shared[:, None] + 0.6 * rng.standard_normal((3000, count))) / tau
+    cause = listed[0]
+    hidden = 0.3 * cause.spread * signatures[:, cause.columns[0]]
+    joined = np.column_stack((rng.standard_normal(3000) + hidden, signatures))
+    total = Sums((joined.T @ joined)[None], 0, 3000, 0.0)
+    found = scores(listed, project(total.total(), 0), 0, [0.0] * len(listed))
+    assert inflation(found) > 3.0
+    assert inflation(beside_best(found, total, np.zeros(0), ())) == pytest.approx(1.0, abs=0.5)
 
 
 def test_a_gain_is_shared_out_over_the_models_own_error() -> None:
