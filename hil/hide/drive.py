@@ -63,7 +63,8 @@ def start_state(manoeuvre: Manoeuvre, car: Car) -> Vector:
 def drive(manoeuvre: Manoeuvre, car: Car, strength: Vector, onset_s: Vector, law: int, gusts: Vector) -> Driven:
     """Drive to the end of the demands, or until the car has stood for a while.
 
-    Pressure control and motors act on what the frames tell them: demands in whole quanta.
+    Pressure control and motors act on what the frames tell them: a manoeuvre's demands in whole quanta. What holds a
+    speed is told as it is: rounded, it would jump by a quantum with every small change of the car.
 
     Parameters
     ----------
@@ -92,7 +93,7 @@ def _held_demand(x: Vector, target_mps: float) -> float:
     push = 0.25 * NOMINAL_RADIUS_M * NOMINAL_MASS_KG * 1.5 * (target_mps - x[S.speed_mps])
     for i in range(4):
         push += 0.25 * (FRONT_GAIN_NM_PA if i < 2 else REAR_GAIN_NM_PA) * x[S.pressure_pa + i]
-    return round(min(max(push, -HOLD_LIMIT_NM), HOLD_LIMIT_NM) / MOTOR_NM) * MOTOR_NM
+    return min(max(push, -HOLD_LIMIT_NM), HOLD_LIMIT_NM)
 
 
 @equation

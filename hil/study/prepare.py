@@ -25,7 +25,7 @@ SETTLE_S = 1.0
 SHORTEST_S, LONGEST_S, TURNING_S = 8.0, 25.0, 3.0
 STRAIGHT_RAD = 0.02  # of the steering wheel
 _RELEASED_PA, _RELEASED_NM = 1e5, 20.0
-_CONTRADICTED = 0.8
+_CONTRADICTED, _REGULAR = 0.8, 0.98
 _TRACK = {
     "wheel": WHEEL_SPEED, "pressure": PRESSURE, "motor": MOTOR_TORQUE,
     "ax": ("ax_mps2",), "ay": ("ay_mps2",), "yaw": ("yaw_rate_rad_s",), "gps": ("speed_mps",),
@@ -211,7 +211,7 @@ def _costs(there: set[str]) -> list[str]:
 
 
 def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float) -> Drive:
-    begin, end = float(log.t_s[0]), float(log.t_s[-1])
+    begin, end = _begin_s(log.t_s), float(log.t_s[-1])
     rows = int((end - begin) / ROW_S) // stride * stride
     grid = begin + ROW_S * np.arange(rows)
 
@@ -294,6 +294,22 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float) -> Dri
         averaged(brakes[:, None], stride)[:, 0],
         wait_s=_wait_s(log.t_s),
     )
+
+
+def _begin_s(t_s: Floats) -> float:
+    """Stamp of the first row had its frame waited as long as most do: what is demanded acts by the cycle.
+
+    Of the first stamp itself every demand of the log would be early or late by what that one frame waited.
+    """
+    if len(t_s) < 3:
+        return float(t_s[0])
+    between = np.diff(t_s)
+    cycles = np.concatenate(([0.0], np.cumsum(np.round(between / np.median(between)))))
+    period = float(np.polyfit(cycles, t_s, 1)[0])
+    late = t_s - t_s[0] - period * cycles
+    usual = float(np.median(late))
+    regular = np.mean(np.abs(late - usual) < 0.5 * ROW_S) > _REGULAR
+    return float(t_s[0]) + (usual if regular else 0.0)
 
 
 def _wait_s(t_s: Floats) -> float:
