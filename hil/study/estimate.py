@@ -16,6 +16,9 @@ _SHORTEST_S, _LONGEST_S, _LONGEST_MOVING_S = 0.02, 2.0, 30.0  # what is slower i
 _USUAL = np.array([0.05, 0.03, 0.03, 0.005, 1.0, 3.0, 2.0, 1.0])
 _SPREAD = np.array([1.5, 1.5, 1.5, 1.5, 0.7, 0.7, 0.7, 0.7])
 """Disturbances that roads, drivers and sensors usually make (sizes, then times), and the spread of their logarithms."""
+_COLOURS, _TIMES_S = (0.1, 0.3, 1.0, 3.0), (0.1, 0.5, 2.0)
+"""Offered to begin a search: colour as a share of the white noise, and its time. From too much of it the way down leads
+past what is there to none at all, where nothing points back."""
 _PRIOR_SAMPLES, _SCALES = 60.0, (0.4, 8.0)
 _DIFFERENCE, _SETTLED, _FAR = 1e-3, 1e-8, 16.0
 """Of the search, in logarithms: step of a difference, share of the cost that ends it, and how far it goes."""
@@ -86,7 +89,8 @@ def _of_side(name: str, values: Floats, frame: Frame, noise: Noise) -> Noise:
         return np.asarray(-coloured_each(scaled[:, 0], frame.fresh, known, white, keep, colour))
 
     a = max(_differences(values[:, 0], known), floor)
-    starts = [np.log([one.a, one.c, one.tau_s, max(one.b, 0.3 * one.a)]) for one in (at, Track(a, 0.0, 3.0 * a, 0.5))]
+    offered = [at, *(Track(a, 0.0, share * a, tau_s) for share in _COLOURS for tau_s in _TIMES_S)]
+    starts = [np.log([one.a, one.c, one.tau_s, max(one.b, 0.3 * one.a)]) for one in offered]
     low = np.array([np.log(floor), -_FAR, np.log(_SHORTEST_S), -_FAR])
     high = np.array([_FAR, _FAR, np.log(_LONGEST_S), _FAR])
     count = 4 if by_speed else 3

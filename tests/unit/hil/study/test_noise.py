@@ -101,3 +101,19 @@ def test_the_noise_that_made_the_residual_is_found() -> None:
         assert size == pytest.approx(known[0], rel=0.25)
         assert tau_s == pytest.approx(known[1], rel=0.4)
     assert found.tracks["ax"].a == pytest.approx(0.015, rel=0.05)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_little_colour_is_not_lost_in_much_white_noise(seed: int) -> None:
+    """A search that begins with too much of it must not end with none: slow causes would explain what it leaves."""
+    rng, n, step = np.random.default_rng(seed), 9000, 0.02
+    white, size, tau_s = 1200.0, 360.0, 1.0
+    keep = np.exp(-step / tau_s)
+    colour = lfilter([1.0], [1.0, -keep], size * np.sqrt(1.0 - keep**2) * rng.standard_normal(n))
+    name = "pressure.left-right front"
+    tracks = {name: (colour + white * rng.standard_normal(n))[:, None]}
+    fresh, zeros = (np.arange(n) % 500 == 0) * 1.0, np.zeros(n)
+    frame = Frame(fresh, zeros, np.ones(n), np.full(n, 20.0), zeros, step, {name: np.ones(n)}, (name,))
+    track = estimate(tracks, frame, first_guess(tracks, frame)).tracks[name]
+    assert track.a == pytest.approx(white, rel=0.05)
+    assert track.c == pytest.approx(size, rel=0.4)
