@@ -12,7 +12,7 @@ from hil.hide.body import rates
 from hil.hide.car import NOMINAL, Car
 from hil.hide.compiled import entry, equation
 from hil.hide.manoeuvres import TICK_S, Manoeuvre
-from hil.hide.noise import QUANTUM
+from hil.hide.noise import whole
 from hil.hide.strengths import OUTPUTS, ROWS, STATES, E, S, Y
 
 Vector = NDArray[np.float64]
@@ -23,7 +23,6 @@ NOMINAL_RADIUS_M, NOMINAL_MASS_KG = NOMINAL.rolling_radius_m, NOMINAL.mass_kg
 FRONT_GAIN_NM_PA, REAR_GAIN_NM_PA = NOMINAL.brake_gain_front_nm_pa, NOMINAL.brake_gain_rear_nm_pa
 STANDSTILL_S = 0.8
 APPLIED_PA = 1.5e5
-PRESSURE_PA, MOTOR_NM = QUANTUM["pressure"], QUANTUM["motor"]
 
 
 @dataclass(frozen=True)
@@ -74,17 +73,13 @@ def drive(manoeuvre: Manoeuvre, car: Car, strength: Vector, onset_s: Vector, law
     """
     ticks = manoeuvre.ticks
     states, outputs = np.zeros((ticks * PER_TICK, STATES)), np.zeros((ticks * PER_TICK, OUTPUTS))
-    pressure_demand, motor_demand = _whole(manoeuvre.pressure_pa, PRESSURE_PA), _whole(manoeuvre.motor_nm, MOTOR_NM)
+    pressure_demand, motor_demand = whole(manoeuvre.pressure_pa, "pressure"), whole(manoeuvre.motor_nm, "motor")
     rows = _integrate(
         start_state(manoeuvre, car), car, strength, onset_s, law, pressure_demand, motor_demand,
         manoeuvre.steering_wheel_rad, manoeuvre.hold_mps, gusts, float(manoeuvre.direction), states, outputs,
     )  # fmt: skip
-    ticks = rows // PER_TICK
-    return Driven(manoeuvre, states[:rows], outputs[:rows], pressure_demand[:ticks], motor_demand[:ticks])
-
-
-def _whole(demand: Vector, quantum: float) -> Vector:
-    return np.asarray(np.round(demand / quantum) * quantum)
+    driven = rows // PER_TICK
+    return Driven(manoeuvre, states[:rows], outputs[:rows], pressure_demand[:driven], motor_demand[:driven])
 
 
 @equation

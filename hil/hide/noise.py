@@ -69,6 +69,11 @@ QUANTUM = {
 """Last bit of each channel on the bus, SI."""
 
 
+def whole(values: Vector, channel: str) -> Vector:
+    """Values as a frame says them."""
+    return np.asarray(np.round(values / QUANTUM[channel]) * QUANTUM[channel])
+
+
 def draw_noise(level: str, rng: np.random.Generator) -> Noise:
     """Draw the noise of one case."""
     size = LEVELS[level]

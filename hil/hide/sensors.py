@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from hil.hide.car import NOMINAL
 from hil.hide.drive import STEP_S, Driven
 from hil.hide.manoeuvres import TICK_S
-from hil.hide.noise import QUANTUM, Noise, coloured
+from hil.hide.noise import Noise, coloured, whole
 from hil.hide.strengths import S
 
 Vector = NDArray[np.float64]
@@ -83,7 +83,7 @@ class _Sampling:
 
     def whole(self, values: Vector, channel: str) -> Vector:
         """Quantised; not in a clean log."""
-        return values if self.clean else np.round(values / QUANTUM[channel]) * QUANTUM[channel]
+        return values if self.clean else whole(values, channel)
 
     def lost(self, node: str) -> NDArray[np.bool_]:
         """Rows whose frame is lost."""

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from hil.study.between import at_places
+from hil.study.stamps import begin_s, wait_s
 from hil.study.table import (
     MOTOR_DEMAND,
     MOTOR_TORQUE,
@@ -25,7 +26,7 @@ SETTLE_S = 1.0
 SHORTEST_S, LONGEST_S, TURNING_S = 8.0, 25.0, 3.0
 STRAIGHT_RAD = 0.02  # of the steering wheel
 _RELEASED_PA, _RELEASED_NM = 1e5, 20.0
-_CONTRADICTED, _REGULAR = 0.8, 0.98
+_CONTRADICTED = 0.8
 _TRACK = {
     "wheel": WHEEL_SPEED, "pressure": PRESSURE, "motor": MOTOR_TORQUE,
     "ax": ("ax_mps2",), "ay": ("ay_mps2",), "yaw": ("yaw_rate_rad_s",), "gps": ("speed_mps",),
@@ -211,7 +212,7 @@ def _costs(there: set[str]) -> list[str]:
 
 
 def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float) -> Drive:
-    begin, end = _begin_s(log.t_s), float(log.t_s[-1])
+    begin, end = begin_s(log.t_s), float(log.t_s[-1])
     rows = int((end - begin) / ROW_S) // stride * stride
     grid = begin + ROW_S * np.arange(rows)
 
@@ -292,37 +293,8 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float) -> Dri
         resting * 1.0,
         slow,
         averaged(brakes[:, None], stride)[:, 0],
-        wait_s=_wait_s(log.t_s),
+        wait_s=wait_s(log.t_s),
     )
-
-
-def _begin_s(t_s: Floats) -> float:
-    """Stamp of the first row had its frame waited as long as most do: what is demanded acts by the cycle.
-
-    Of the first stamp itself every demand of the log would be early or late by what that one frame waited.
-    """
-    if len(t_s) < 3:
-        return float(t_s[0])
-    between = np.diff(t_s)
-    cycles = np.concatenate(([0.0], np.cumsum(np.round(between / np.median(between)))))
-    period = float(np.polyfit(cycles, t_s, 1)[0])
-    late = t_s - t_s[0] - period * cycles
-    usual = float(np.median(late))
-    regular = np.mean(np.abs(late - usual) < 0.5 * ROW_S) > _REGULAR
-    return float(t_s[0]) + (usual if regular else 0.0)
-
-
-def _wait_s(t_s: Floats) -> float:
-    """How irregular the stamps of frames are, s: what one waits for the bus less what the one before did.
-
-    All nodes wait alike and by themselves, so this is also how much later than its stamp a value of another node was
-    taken, now and then. Gaps are no waiting.
-    """
-    between = np.diff(t_s)
-    if not len(between):
-        return 0.0
-    apart = between - np.median(between)
-    return float(np.sqrt(np.mean(apart[np.abs(apart) < 0.5 * np.median(between)] ** 2)))
 
 
 def _sampled(

@@ -48,7 +48,7 @@ def test_the_models_own_error_raises_what_is_asked() -> None:
 
 def test_a_cause_that_shows_through_others_is_no_error_of_the_model() -> None:
     """Signatures that all resemble one: the cause inflates what every one explains, and nothing beside it."""
-    listed = [c for c in CANDIDATES.values() if c.columns == (min(c.columns),) and c.parameter.low < 0.0]
+    listed = [c for c in CANDIDATES.values() if len(c.columns) == 1 and c.parameter.low < 0.0]
     rng = np.random.default_rng(5)
     shared = rng.standard_normal(3000)
     count = 1 + max(c.columns[0] for c in listed)
