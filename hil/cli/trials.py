@@ -98,6 +98,9 @@ def _keep(path: Path, seed: int, scored: dict[str, Any]) -> None:
 def _lines(family: str, entry: dict[str, Any]) -> list[str]:
     """The table of a family as text."""
     lines = [f"{family}: {entry['n']} cases"]
+    if len(entry["sources"]) > 1:
+        several = ", ".join(f"{state} {count}" for state, count in entry["sources"].items())
+        lines.append(f"  of several states of the program: {several}")
     for name, m in entry["metrics"].items():
         if m["value"] is None:
             lines.append(f"  {name:<28}     -  no case tells")

@@ -15,6 +15,7 @@ from hil.study.diagnosis import Settings
 from hil.study.explain import explain
 from hil.study.table import UnusableError
 from hil.trials import oracle
+from hil.trials.sources import state
 
 SIZES = (15.0, 8.0, 5.0, 3.0)
 """Signal-to-noise ratios of the family of single causes, in the order they are run."""
@@ -81,7 +82,7 @@ def run_case(case: Case, seed: int, size: float | None, settings: Settings | Non
         answered, said = _explained(case, Path(folder), settings)
         truth = read_answer(Path(folder) / "logs")
     record = {
-        "family": case.family, "index": case.index, "seed": seed, "size": size,
+        "family": case.family, "index": case.index, "seed": seed, "size": size, "sources": state(),
         "snr": truth["snr"], "reached": truth["reached"], "noise": case.noise_level,
         "hidden": truth["causes"], **said,
     }  # fmt: skip

@@ -1,5 +1,6 @@
 """Scores of blind trials, family by family, against the pass marks."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -15,12 +16,14 @@ Records = Sequence[Record]
 
 
 def table_of(family: str, records: Records) -> dict[str, Any]:
-    """``n`` and ``metrics`` {name: {value, low, high, pass_mark, met}} of a family.
+    """``n``, ``sources`` and ``metrics`` {name: {value, low, high, pass_mark, met}} of a family.
 
+    ``sources`` are the states of the program that the cases were run with, {digest: number of cases}.
     ``value`` is None where no case tells; ``met`` None where nothing is asked. ``single`` has ``detection_limits``
     {effect: signal-to-noise ratio, None where never found} beside.
     """
-    entry: dict[str, Any] = {"n": len(records), "metrics": _SCORED[family](records)}
+    states = Counter(record["sources"] for record in records)
+    entry: dict[str, Any] = {"n": len(records), "sources": dict(states), "metrics": _SCORED[family](records)}
     if family == "single":
         entry["detection_limits"] = detection_limits(records)
     return entry

@@ -1,9 +1,7 @@
 """Twelve single causes and twelve times nothing, drawn anew whenever the plant or the study changes."""
 
-import hashlib
 import os
 from collections.abc import Iterator
-from importlib import resources
 from itertools import islice
 
 import numpy as np
@@ -12,6 +10,7 @@ import pytest
 from hil.hide.case import Case
 from hil.hide.cases import SEPARABLE, draw
 from hil.trials.run import run_case
+from hil.trials.sources import STUDIED, digest
 
 COUNT, MOST_MISSES, MOST_ALARMS = 12, 2, 1
 SNR = 15.0
@@ -22,12 +21,7 @@ def drawn_seed() -> int:
     """From the sources; ``BRAKEBENCH_DRAWN_SEED`` repeats another one."""
     if "BRAKEBENCH_DRAWN_SEED" in os.environ:
         return int(os.environ["BRAKEBENCH_DRAWN_SEED"])
-    digest = hashlib.sha256()
-    for package in ("plant", "plant.effects", "plant.effects.sensing", "hil.study"):
-        for file in sorted(resources.files(package).iterdir(), key=lambda item: item.name):
-            if file.name.endswith((".py", ".toml")):
-                digest.update(file.read_bytes())
-    return int.from_bytes(digest.digest()[:3], "big")
+    return int.from_bytes(digest(STUDIED)[:3], "big")
 
 
 @pytest.fixture

@@ -16,20 +16,22 @@ def run(*words):
     return args.run(args)
 
 
-def keep(folder, *families, count=2):
+def keep(folder, *families, count=2, state="abc"):
     """Cases on file, every cause found at 15 and 8."""
     records = {}
     for family in families:
         for drawn, index, size in plan(family, count):
             named = ["road_grade"] if (size or 0.0) >= 8.0 else []
             records[drawn, index, size] = {
-                "family": drawn, "index": index, "size": size, "seed": 1, "reached": True, "noise": "low",
+                "family": drawn, "index": index, "size": size, "seed": 1, "sources": state,
+                "reached": True, "noise": "low",
                 "hidden": [{"effect": "road_grade", "wheel": "car", "parameters": {"grade": {"value": 0.01}}}],
                 "verdict": "named" if named else "none", "named": named, "rivals": [], "not_testable": [], "gain": {},
                 "causes": [{"effect": e, "parameters": {}, "wheel": "car", "probability": 0.9} for e in named],
             }  # fmt: skip
     lines = "".join(json.dumps(record) + "\n" for record in records.values())
-    (folder / "cases.jsonl").write_text(lines, encoding="utf-8")
+    with (folder / "cases.jsonl").open("a", encoding="utf-8") as file:
+        file.write(lines)
 
 
 def test_json_stands_alone_and_files_are_written(tmp_path, capsys):
@@ -62,6 +64,17 @@ def test_the_text_says_what_was_asked_and_what_was_missed(tmp_path, capsys):
     assert "named from 8                 road_grade" in text
     run("--family", "gain", "--count", 2, "--out", tmp_path)
     assert "no case tells" in capsys.readouterr().out
+
+
+def test_cases_of_several_states_of_the_program_are_told(tmp_path, capsys):
+    keep(tmp_path, "null", count=2)
+    keep(tmp_path, "twin", count=1, state="def")
+    assert run("--family", "null", "--count", 2, "--out", tmp_path) == 0
+    assert "several states" not in capsys.readouterr().out
+    changed = (tmp_path / "cases.jsonl").read_text().replace('"abc"', '"def"', 1)
+    (tmp_path / "cases.jsonl").write_text(changed)
+    assert run("--family", "null", "--count", 2, "--out", tmp_path) == 0
+    assert "of several states of the program: def 1, abc 1" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("count", ["0", "-3", "many"])

@@ -22,7 +22,8 @@ def _cause(effect: str, joint: str = "", chance: float = 0.9, onset_s: float | N
 def _record(hidden: str | list[str], named: list[str], **more: Any) -> dict[str, Any]:
     effects, number = [hidden] if isinstance(hidden, str) else hidden, {"gain": {"value": 0.1}}
     record = {
-        "family": "single", "index": 0, "size": 15.0, "reached": True, "noise": "medium", "named": named,
+        "family": "single", "index": 0, "size": 15.0, "sources": "abc",
+        "reached": True, "noise": "medium", "named": named,
         "rivals": [], "not_testable": [], "gain": {}, "verdict": "named" if named else "none",
         "hidden": [
             {"effect": e, "wheel": "car", "joint": "friction.mu", "onset_s": None, "parameters": dict(number)}
