@@ -9,21 +9,38 @@ from hil.trials.calibration import calibration
 from hil.trials.detection import detection_limits
 from hil.trials.gain import gain, gain_of_oracle
 from hil.trials.metrics import Metrics, Record, median, share
+from hil.trials.misses import misses
 from hil.trials.parameters import parameters
-from hil.trials.reading import claims, hidden_names, in_set, is_found, is_top, names_listed_elsewhere, right_joint
+from hil.trials.reading import (
+    answers,
+    called_not_testable,
+    claims,
+    decided,
+    hidden_names,
+    in_set,
+    is_exact,
+    is_found,
+    is_top,
+    names_listed_elsewhere,
+    right_joint,
+    right_law,
+)  # fmt: skip
 
 Records = Sequence[Record]
 
 
 def table_of(family: str, records: Records) -> dict[str, Any]:
-    """``n``, ``sources`` and ``metrics`` {name: {value, low, high, pass_mark, met}} of a family.
+    """``n``, ``sources``, ``metrics`` {name: {value, low, high, pass_mark, met}} and ``missed`` of a family.
 
     ``sources`` are the states of the program that the cases were run with, {digest: number of cases}.
     ``value`` is None where no case tells; ``met`` None where nothing is asked. ``single`` has ``detection_limits``
     {effect: signal-to-noise ratio, None where never found} beside.
     """
     states = Counter(record["sources"] for record in records)
-    entry: dict[str, Any] = {"n": len(records), "sources": dict(states), "metrics": _SCORED[family](records)}
+    entry: dict[str, Any] = {
+        "n": len(records), "sources": dict(states), "metrics": _SCORED[family](records),
+        "missed": misses(family, records),
+    }  # fmt: skip
     if family == "single":
         entry["detection_limits"] = detection_limits(records)
     return entry
@@ -35,15 +52,10 @@ def _reached(records: Records) -> Records:
 
 
 def _null(records: Records) -> Metrics:
-    found = {"false_alarm": share(records, _answers, 0.01, at_most=True)}
+    found = {"false_alarm": share(records, answers, 0.01, at_most=True)}
     for level in sorted({record["noise"] for record in records}):
-        found[f"false_alarm_{level}_noise"] = share([r for r in records if r["noise"] == level], _answers)
+        found[f"false_alarm_{level}_noise"] = share([r for r in records if r["noise"] == level], answers)
     return found
-
-
-def _answers(record: Record) -> bool:
-    """Whether anything at all is called wrong."""
-    return bool(record["causes"])
 
 
 def _single(records: Records) -> Metrics:
@@ -51,7 +63,7 @@ def _single(records: Records) -> Metrics:
     for size in sorted({record["size"] for record in records}):
         of = _reached([record for record in records if record["size"] == size])
         sure = size >= 8.0
-        found[f"detected_snr{size:g}"] = share(of, _answers, 0.95 if sure else None)
+        found[f"detected_snr{size:g}"] = share(of, answers, 0.95 if sure else None)
         found[f"top1_snr{size:g}"] = share(of, is_top, {8.0: 0.9, 15.0: 0.97}.get(size))
         found[f"in_set_snr{size:g}"] = share(of, in_set, 0.99 if sure else None)
     return found
@@ -63,7 +75,7 @@ def _onset(records: Records) -> Metrics:
     right = [record for record in of if is_top(record)]
     told = [r for r in right if r["causes"][0].get("onset_s") is not None]
     return {
-        "detected": share(of, _answers), "top1": share(of, is_top), "in_set": share(of, in_set),
+        "detected": share(of, answers), "top1": share(of, is_top), "in_set": share(of, in_set),
         "onset_told": share(right, lambda r: r["causes"][0].get("onset_s") is not None),
         "onset_error_s": median([abs(r["causes"][0]["onset_s"] - r["hidden"][0]["onset_s"]) for r in told]),
     }  # fmt: skip
@@ -71,7 +83,7 @@ def _onset(records: Records) -> Metrics:
 
 def _two(records: Records) -> Metrics:
     return {
-        "exact_set": share(records, lambda r: set(r["named"]) == hidden_names(r), 0.85),
+        "exact_set": share(records, is_exact, 0.85),
         "both_found": share(records, lambda r: hidden_names(r) <= set(r["named"]), 0.95),
         "extra_term": share(records, lambda r: bool(set(r["named"]) - hidden_names(r)), 0.05, at_most=True),
     }
@@ -80,7 +92,7 @@ def _two(records: Records) -> Metrics:
 def _three(records: Records) -> Metrics:
     return {
         "all_found": share(records, lambda r: hidden_names(r) <= set(r["named"]), 0.75),
-        "exact_set": share(records, lambda r: set(r["named"]) == hidden_names(r)),
+        "exact_set": share(records, is_exact),
         "extra_term": share(records, lambda r: bool(set(r["named"]) - hidden_names(r))),
     }
 
@@ -88,7 +100,7 @@ def _three(records: Records) -> Metrics:
 def _unlisted(records: Records) -> Metrics:
     of = _reached(records)
     return {
-        "unlisted_or_right_joint": share(of, lambda r: r["verdict"] == "unlisted" or right_joint(r), 0.85),
+        "unlisted_or_right_joint": share(of, right_law, 0.85),
         "right_joint": share(of, right_joint),
         "wrong_listed_name": share(of, names_listed_elsewhere, 0.05, at_most=True),
         "gain_of_oracle": gain_of_oracle(of, 0.8),
@@ -98,15 +110,9 @@ def _unlisted(records: Records) -> Metrics:
 def _confounded(records: Records) -> Metrics:
     return {
         "single_cause_claimed": share(records, claims, 0.02, at_most=True),
-        "follow_up_decides": share(records, _decided, 0.9),
+        "follow_up_decides": share(records, decided, 0.9),
         "in_set": share(records, in_set),
     }
-
-
-def _decided(record: Record) -> bool:
-    """Whether the manoeuvres that decide, by themselves, give one cause and the right one."""
-    then = record["follow_up"]
-    return claims(then) and then["named"] == [record["hidden"][0]["effect"]]
 
 
 def _twin(records: Records) -> Metrics:
@@ -126,11 +132,7 @@ def _other_side(record: Record) -> bool:
 
 
 def _not_testable(records: Records) -> Metrics:
-    def right(record: Record) -> bool:
-        effect = record["hidden"][0]["effect"]
-        return effect in record["not_testable"] and effect not in record["named"]
-
-    return {"called_not_testable": share(records, right, 0.95), "hidden_named": share(records, is_found)}
+    return {"called_not_testable": share(records, called_not_testable, 0.95), "hidden_named": share(records, is_found)}
 
 
 _SCORED: dict[str, Callable[[Records], Metrics]] = {

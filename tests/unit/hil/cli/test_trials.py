@@ -18,6 +18,7 @@ def run(*words):
 
 def keep(folder, *families, count=2, state="abc"):
     """Cases on file, every cause found at 15 and 8."""
+    grade = {"effect": "road_grade", "wheel": "car", "parameters": {"grade": {"value": 0.01, "unit": ""}}}
     records = {}
     for family in families:
         for drawn, index, size in plan(family, count):
@@ -25,7 +26,7 @@ def keep(folder, *families, count=2, state="abc"):
             records[drawn, index, size] = {
                 "family": drawn, "index": index, "size": size, "seed": 1, "sources": state,
                 "reached": True, "noise": "low",
-                "hidden": [{"effect": "road_grade", "wheel": "car", "parameters": {"grade": {"value": 0.01}}}],
+                "hidden": [grade],
                 "verdict": "named" if named else "none", "named": named, "rivals": [], "not_testable": [], "gain": {},
                 "causes": [{"effect": e, "parameters": {}, "wheel": "car", "probability": 0.9} for e in named],
             }  # fmt: skip
@@ -62,6 +63,7 @@ def test_the_text_says_what_was_asked_and_what_was_missed(tmp_path, capsys):
     text = capsys.readouterr().out
     assert "top1_snr15                   1.000  [0.342, 1.000]  asked 0.97  met" in text
     assert "named from 8                 road_grade" in text
+    assert "missed" not in text
     run("--family", "gain", "--count", 2, "--out", tmp_path)
     assert "no case tells" in capsys.readouterr().out
 
@@ -75,6 +77,15 @@ def test_cases_of_several_states_of_the_program_are_told(tmp_path, capsys):
     (tmp_path / "cases.jsonl").write_text(changed)
     assert run("--family", "null", "--count", 2, "--out", tmp_path) == 0
     assert "of several states of the program: def 1, abc 1" in capsys.readouterr().out
+
+
+def test_a_missed_case_is_told_with_its_number(tmp_path, capsys):
+    keep(tmp_path, "null", count=2)
+    alarm = '"causes": [{"effect": "headwind", "wheel": "car", "parameters": {}}]'
+    raised = (tmp_path / "cases.jsonl").read_text().replace('"causes": []', alarm, 1)
+    (tmp_path / "cases.jsonl").write_text(raised)
+    run("--family", "null", "--count", 2, "--out", tmp_path)
+    assert "  missed 0: road_grade@car 0.01; told headwind@car" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("count", ["0", "-3", "many"])

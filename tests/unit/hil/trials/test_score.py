@@ -12,7 +12,7 @@ CHANNELS = ("ax_mps2", "wheel_speed")
 
 
 def _cause(effect: str, joint: str = "", chance: float = 0.9, onset_s: float | None = None) -> dict[str, Any]:
-    numbers = {"gain": {"value": 0.11, "ci95": [0.09, 0.12]}}
+    numbers = {"gain": {"value": 0.11, "unit": "", "ci95": [0.09, 0.12]}}
     return {
         "effect": effect, "joint": joint, "wheel": "car", "parameters": numbers, "probability": chance,
         "onset_s": onset_s,
@@ -20,7 +20,7 @@ def _cause(effect: str, joint: str = "", chance: float = 0.9, onset_s: float | N
 
 
 def _record(hidden: str | list[str], named: list[str], **more: Any) -> dict[str, Any]:
-    effects, number = [hidden] if isinstance(hidden, str) else hidden, {"gain": {"value": 0.1}}
+    effects, number = [hidden] if isinstance(hidden, str) else hidden, {"gain": {"value": 0.1, "unit": ""}}
     record = {
         "family": "single", "index": 0, "size": 15.0, "sources": "abc",
         "reached": True, "noise": "medium", "named": named,
@@ -150,7 +150,8 @@ def test_a_law_in_no_list_is_called_so_or_put_at_the_right_joint() -> None:
 
 def test_a_confounded_cause_must_not_be_claimed_and_is_decided_afterwards() -> None:
     def record(verdict: str, then: str, named: list[str]) -> dict[str, Any]:
-        follow_up = {"verdict": then, "named": named}
+        told = [_cause(effect) for effect in named]
+        follow_up = {"verdict": then, "named": named, "causes": told, "rivals": []}
         return _record("mass_offset", ["mass_offset"], verdict=verdict, follow_up=follow_up)
 
     records = [
