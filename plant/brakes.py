@@ -18,7 +18,8 @@ Vector = NDArray[np.float64]
 @equation
 def per_axle(i: int, p: Vector, name: int) -> float:
     """Parameter of the wheel's axle; ``name`` is where the pair (front, rear) begins."""
-    return p[name] if i < 2 else p[name + 1]
+    front, rear = p[name], p[name + 1]  # both read, and one taken: four wheels at once need no look-up
+    return front if i < 2 else rear
 
 
 @equation

@@ -21,6 +21,8 @@ EFFECTS = os.environ.get("BRAKEBENCH_EFFECTS", "1") != "0"
 _nb: Any = numba  # whose options are declared in part
 INTERPRETED = bool(_nb.config.DISABLE_JIT)
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+_BORROWED = _OPTIONS | {"_nrt": False}
+"""For what allocates nothing: vectors are the caller's, and nobody counts references to them."""
 
 
 class Equation:
@@ -31,7 +33,7 @@ class Equation:
 
     def __init__(self, function: Callable[..., Any], **how: Any) -> None:
         self.py_func = function
-        self._how = _OPTIONS | how
+        self._how = _BORROWED | how
         self._lean = _nb.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **self._how)(function)
         self._numba_type_ = self._lean._numba_type_  # what the compiler takes this object for
 

@@ -142,8 +142,8 @@ def contacts(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, cos_grade:
             stiffness_x, side, p,
         )  # fmt: skip
         carried = load / loaded
-        given = u[U.longitudinal_force_n + i]
-        force = given if cut[C.force + i] > 0.5 else at_wheel(force * carried, y, J.tyre_force, i)
+        given, made = u[U.longitudinal_force_n + i], at_wheel(force * carried, y, J.tyre_force, i)
+        force = given if cut[C.force + i] > 0.5 else made
         y[Y.longitudinal_force_n + i] = force
         y[Y.lateral_force_n + i] = at_wheel(cross * carried, y, J.tyre_side_force, i)
 

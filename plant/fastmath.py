@@ -51,8 +51,8 @@ def _sin(x: float) -> float:
 def _exp(x: float) -> float:
     """Exponential; relative error below 1e-14 for |x| up to 1, below 2e-9 for |x| up to 5."""
     s = 0.0625 * x
-    part = 1.0 + s * (1.0 / 5.0 + s * (1.0 / 30.0 + s * (1.0 / 210.0 + s / 1680.0)))
-    power = 1.0 + s * (1.0 + s * (0.5 + s * (1.0 / 6.0 + s * part / 24.0)))
+    part = 1.0 + s * (1.0 / 5.0 + s * (1.0 / 30.0 + s * (1.0 / 210.0 + s * (1.0 / 1680.0))))
+    power = 1.0 + s * (1.0 + s * (0.5 + s * (1.0 / 6.0 + s * part * (1.0 / 24.0))))
     power *= power
     power *= power
     power *= power

@@ -1,6 +1,6 @@
 """Fixed steps of the model: semi-implicit for everyday use, Runge-Kutta for reference, exponential for long steps."""
 
-from math import cos, exp, sin
+from math import cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,7 @@ from plant.compiled import equation, section
 from plant.contact import rolling_radius
 from plant.effects.apply import extra_states_move
 from plant.equations import derivative
+from plant.fastmath import exp
 from plant.vectors import BASE_RATES, OUTPUT, RATES, STATE, X, Y
 
 Vector = NDArray[np.float64]
@@ -18,7 +19,8 @@ SEMI_IMPLICIT = 0
 RUNGE_KUTTA_4 = 1
 EXPONENTIAL_4 = 2
 _SMALL = 1e-3
-WORK_SHAPE = (4, max(STATE.size, OUTPUT.size))
+_GONE = 30.0  # of what decays no more than exp(-30) is left
+WORK_SHAPE = (5, max(STATE.size, OUTPUT.size))
 
 
 @section
@@ -65,35 +67,34 @@ def exponential_step(
     Jacobian, written for the change over the step. Where nothing decays it is `runge_kutta_step`, whose arguments it
     has.
     """
-    trial, total, stage, half = work[0], work[1], work[2], work[3]
+    trial, total, stage, half, mean = work[0], work[1], work[2], work[3], work[4]
     last = N_ALL if extra_states_move(p) else N
     derivative(x, u, cut, switch, p, road, y)
     for i in range(last):
-        half[i] = exp(-0.5 * step_s * y[Y.decay_1_s + i])
-        trial[i] = x[i] + 0.5 * step_s * _mean_decay(0.5 * step_s * y[Y.decay_1_s + i], half[i]) * y[Y.rate + i]
+        z = 0.5 * step_s * y[Y.decay_1_s + i]
+        half[i] = exp(-min(z, _GONE))
+        mean[i] = 0.5 * step_s * _mean_decay(z, half[i])
+        trial[i] = x[i] + mean[i] * y[Y.rate + i]
     derivative(trial, u, cut, switch, p, road, stage)
     for i in range(last):
-        decay = y[Y.decay_1_s + i]
-        total[i] = stage[Y.rate + i] + decay * (trial[i] - x[i])
-        trial[i] = x[i] + 0.5 * step_s * _mean_decay(0.5 * step_s * decay, half[i]) * total[i]
+        total[i] = stage[Y.rate + i] + y[Y.decay_1_s + i] * (trial[i] - x[i])
+        trial[i] = x[i] + mean[i] * total[i]
     derivative(trial, u, cut, switch, p, road, stage)
     for i in range(last):
-        decay = y[Y.decay_1_s + i]
-        mean = 0.5 * step_s * _mean_decay(0.5 * step_s * decay, half[i])
-        again = stage[Y.rate + i] + decay * (trial[i] - x[i])
+        again = stage[Y.rate + i] + y[Y.decay_1_s + i] * (trial[i] - x[i])
         total[i] += again
-        trial[i] = x[i] + half[i] * mean * y[Y.rate + i] + mean * (2.0 * again - y[Y.rate + i])
+        trial[i] = x[i] + half[i] * mean[i] * y[Y.rate + i] + mean[i] * (2.0 * again - y[Y.rate + i])
     derivative(trial, u, cut, switch, p, road, stage)
     for i in range(last):
-        decay = y[Y.decay_1_s + i]
-        end = stage[Y.rate + i] + decay * (trial[i] - x[i])
-        z = step_s * decay
-        if z < _SMALL:
-            one, two, three = 1.0 - z * (0.5 - z / 6.0), 0.5 - z * (1.0 / 6.0 - z / 24.0), 1.0 / 6.0 - z / 24.0
-        else:
-            one = (1.0 - half[i] * half[i]) / z
-            two = (1.0 - one) / z
-            three = (0.5 - two) / z
+        end = stage[Y.rate + i] + y[Y.decay_1_s + i] * (trial[i] - x[i])
+        z = step_s * y[Y.decay_1_s + i]
+        divisor = max(z, _SMALL)
+        one = (1.0 - half[i] * half[i]) / divisor
+        two = (1.0 - one) / divisor
+        three = (0.5 - two) / divisor
+        one = one if z > _SMALL else 1.0 - z * (0.5 - z / 6.0)
+        two = two if z > _SMALL else 0.5 - z * (1.0 / 6.0 - z / 24.0)
+        three = three if z > _SMALL else 1.0 / 6.0 - z / 24.0
         first = one - 3.0 * two + 4.0 * three
         x[i] += step_s * (first * y[Y.rate + i] + 2.0 * (two - 2.0 * three) * total[i] + (4.0 * three - two) * end)
 
@@ -101,7 +102,8 @@ def exponential_step(
 @equation
 def _mean_decay(z: float, decayed: float) -> float:
     """Mean of exp(-z s) over s from 0 to 1; ``decayed`` is exp(-z)."""
-    return (1.0 - decayed) / z if z > _SMALL else 1.0 - z * (0.5 - z / 6.0)
+    mean = (1.0 - decayed) / max(z, _SMALL)
+    return mean if z > _SMALL else 1.0 - z * (0.5 - z / 6.0)
 
 
 @section

@@ -84,7 +84,8 @@ def delay_demand(x: Vector, u: Vector, dead_time_s: float, step_s: float, at_onc
         delayed[U.pressure_demand_pa + i] = 0.0
     for _ in range(at_once):
         newest = newest + 1 if newest + 1 < DELAY_SLOTS else 0
-        late, later = (newest - whole) % DELAY_SLOTS, (newest - whole - 1) % DELAY_SLOTS
+        late = newest - whole if newest >= whole else newest - whole + DELAY_SLOTS
+        later = late - 1 if late > 0 else DELAY_SLOTS - 1
         for i in range(4):
             line = X.delayed_demand_pa + i * DELAY_SLOTS
             x[line + newest] = u[U.pressure_demand_pa + i]

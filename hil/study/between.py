@@ -7,16 +7,16 @@ from hil.study.table import Floats
 
 
 @compiled
-def between(values: Floats, at: Floats, out: Floats) -> None:
-    """Columns of ``values`` (samples, columns) at fractional numbers of samples ``at`` (rows, columns), into ``out``.
+def between(values: Floats, late: Floats, out: Floats) -> None:
+    """Columns of ``values`` (samples, columns) so many samples ``late`` (rows, columns), into ``out``.
 
     Through the two samples on each side (Keys 1981, IEEE Trans. ASSP 29, 1153, a = -1/2): a wheel that swings on its
     tyre passes four samples of 10 ms a period, of which straight lines lose up to a third.
     """
     last = values.shape[0] - 1
-    for t in range(at.shape[0]):
+    for t in range(out.shape[0]):
         for k in range(values.shape[1]):
-            place = min(max(at[t, k], 0.0), float(last))
+            place = min(max(t - late[t, k], 0.0), float(last))
             i = min(int(place), max(last - 1, 0))
             s = place - i
             b, c = values[i, k], values[min(i + 1, last), k]
@@ -27,12 +27,12 @@ def between(values: Floats, at: Floats, out: Floats) -> None:
 
 
 @compiled
-def straight_between(values: Floats, at: Floats, out: Floats) -> None:
+def straight_between(values: Floats, late: Floats, out: Floats) -> None:
     """As `between`, on straight lines."""
     last = values.shape[0] - 1
-    for t in range(at.shape[0]):
+    for t in range(out.shape[0]):
         for k in range(values.shape[1]):
-            place = min(max(at[t, k], 0.0), float(last))
+            place = min(max(t - late[t, k], 0.0), float(last))
             i = int(place)
             out[t, k] = values[i, k] + (place - i) * (values[min(i + 1, last), k] - values[i, k])
 
@@ -40,5 +40,6 @@ def straight_between(values: Floats, at: Floats, out: Floats) -> None:
 def at_places(values: Floats, at: Floats) -> Floats:
     """One column (samples,) at fractional numbers of samples, (rows,)."""
     out = np.empty((len(at), 1))
-    between(np.ascontiguousarray(values, np.float64)[:, None], np.asarray(at, np.float64)[:, None], out)
+    late = np.arange(len(at)) - np.asarray(at, np.float64)
+    between(np.ascontiguousarray(values, np.float64)[:, None], late[:, None], out)
     return out[:, 0]

@@ -221,8 +221,8 @@ class Fitter:
         """Whitened sensitivities of the nuisances, and their products."""
         if self._white_for is noise:
             return self._white, self._products
-        white, _ = whiten({k: v.astype(np.float64) for k, v in self.nuisance_columns.items()}, self.frame, noise)
-        joined = np.concatenate([white[name] for name in self.frame.names]).astype(np.float32)
+        white, _ = whiten(self.nuisance_columns, self.frame, noise)
+        joined = np.concatenate([white[name] for name in self.frame.names])
         return joined, np.asarray(joined.T @ joined, np.float64)
 
     def _total(self, model: Model, own: Tracks, noise: Noise) -> Floats:

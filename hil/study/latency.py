@@ -17,8 +17,7 @@ def later(values: Floats, rows: float | Floats, straight: bool = False) -> Float
     ``straight`` lines between rows for what has corners, as a motor at its rate limit; else `hil.study.between`.
     """
     out = np.empty(values.shape)
-    at = np.arange(len(values), dtype=np.float64)[:, None] - np.broadcast_to(rows, values.shape)
-    (straight_between if straight else between)(values, at, out)
+    (straight_between if straight else between)(values, np.broadcast_to(rows, values.shape), out)
     return out
 
 

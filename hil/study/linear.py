@@ -58,7 +58,7 @@ def sums(residual: dict[str, Floats], columns: dict[str, Floats], frame: Frame, 
     for name, values in white_residual.items():
         whitened[name][:, 0] = _limited(values[:, 0])
     for begin in range(0, count, _CHUNK):
-        chunk = {name: values[:, begin : begin + _CHUNK].astype(np.float64) for name, values in columns.items()}
+        chunk = {name: values[:, begin : begin + _CHUNK] for name, values in columns.items()}
         for name, values in whiten(chunk, frame, noise)[0].items():
             whitened[name][:, 1 + begin : 1 + begin + values.shape[1]] = values
     matrix = np.zeros((manoeuvres, count + 1, count + 1))

@@ -144,7 +144,7 @@ def tracks_of(stack: Stack, frame: Frame, radius_m: float) -> dict[str, Floats]:
 
 
 def whiten(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> tuple[dict[str, Floats], float]:
-    """Innovations by track, (samples, columns), and the log-likelihood of the first column."""
+    """Innovations by track, (samples, columns), in the precision given, and the log-likelihood of the first column."""
     out: dict[str, Floats] = {}
     total = 0.0
     columns = next(iter(tracks.values())).shape[1]
@@ -183,12 +183,13 @@ def kept(tau_s: float, step_s: float) -> float:
 
 def _long(tracks: Mapping[str, Floats], frame: Frame, noise: Noise, columns: int) -> tuple[float, dict[str, Floats]]:
     samples = len(frame.fresh)
-    y, white = np.zeros((samples, 3, columns)), np.zeros((samples, 3))
+    kind = next(iter(tracks.values())).dtype
+    y, white = np.zeros((samples, 3, columns), kind), np.zeros((samples, 3))
     scale = scale_of("long", frame, noise)
     likelihood = 0.0
     for m, name in enumerate(LONG):
         if name in tracks:
-            y[:, m] = tracks[name] / scale[:, None]
+            np.divide(tracks[name], scale.astype(kind)[:, None], out=y[:, m])
             likelihood -= float(np.log(scale) @ frame.present[name])
             white[:, m] = white_variance(name, noise.tracks[name], frame)
     on = 1.0 if noise.enabled else 0.0
@@ -208,7 +209,8 @@ def _side(name: str, values: Floats, frame: Frame, noise: Noise) -> tuple[float,
 def evened(name: str, values: Floats, frame: Frame, noise: Noise) -> tuple[Floats, float]:
     """Values of a track over the scale of their manoeuvre, and what that adds to the log-likelihood."""
     scale = scale_of(name, frame, noise)
-    return np.ascontiguousarray(values / scale[:, None]), -float(np.log(scale) @ frame.present[name])
+    even = np.ascontiguousarray(values / scale.astype(values.dtype)[:, None])
+    return even, -float(np.log(scale) @ frame.present[name])
 
 
 def _filtered(name: str, track: Track, scaled: Floats, frame: Frame, enabled: bool, out: Floats) -> float:

@@ -15,7 +15,7 @@ from hil.study.prepare import ROW_S, SLOW_MPS, Case, Drive, Segment, averaged
 from hil.study.sensing import inverted, sensed, wheel_speed_before
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
-from hil.study.world import World, apart
+from hil.study.world import World, apart, told_alike
 from plant.effects.plugin import NO_PLUGINS
 from plant.effects.states import EXTRA_STATES
 from plant.effects.theta import THETA
@@ -72,11 +72,21 @@ def _radius_m(world: World) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class _Kept:
-    """A world's replay of a drive: what was noted, and the states at the start and after each segment."""
+class _Replay:
+    """A world's replay of a drive: its inputs, what was noted, the states at the start and after each segment."""
 
+    inputs: Floats
     table: Floats
     states: tuple[Floats, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """A world, its replay of each drive, and what its sensors told of them."""
+
+    world: World
+    replays: list[_Replay]
+    told: list[Stack]
 
 
 def _powers(speed_mps: Floats, characteristic_mps: float) -> tuple[Floats, Floats]:
@@ -144,7 +154,7 @@ class Rig:
         ]
         self._given = [drive.inputs for drive in case.drives]
         self._pace = [_at_once(drive) for drive in case.drives]
-        self._kept: tuple[World, list[_Kept]] | None = None
+        self._kept: _Kept | None = None
         self.runs = 0
 
     def quieted(self, world: World) -> "Rig":
@@ -234,7 +244,9 @@ class Rig:
     def keep(self, world: World) -> None:
         """Keep the motion of this world: others are simulated only where they can differ from it."""
         self._kept = None
-        self._kept = world, [_Kept(*self._replayed(drive, world, self._columns)) for drive in self.case.drives]
+        replays = [self._replayed(drive, world, self._columns) for drive in self.case.drives]
+        told = [self._told(d, world, one.table) for d, one in zip(self.case.drives, replays, strict=True)]
+        self._kept = _Kept(world, replays, told)
 
     def run_all(self, worlds: Sequence[World]) -> Iterator[Stack]:
         """Of many worlds, in order, over threads."""
@@ -275,7 +287,22 @@ class Rig:
         return max(told, 0.0) * float(np.median(_radius_m(world)))
 
     def _drive(self, drive: Drive, world: World) -> Stack:
-        stack = sensed(self._raw(drive, world), world.theta_in(drive), ROW_S)
+        """Simulated channels of one drive; from what was kept where the worlds cannot differ."""
+        kept = self._kept
+        if kept is None:
+            return self._told(drive, world, self._replayed(drive, world, self._columns).table)
+        needed, alike = apart(world, kept.world, drive), told_alike(world, kept.world)
+        differs = [bool(needed & going_on) for going_on in self._going_on[drive.number]]
+        if alike and not any(differs):
+            return kept.told[drive.number]
+        replay = kept.replays[drive.number]
+        if any(differs):
+            replay = self._replayed(drive, world, self._columns, replay, differs, alike)
+        return self._told(drive, world, replay.table)
+
+    def _told(self, drive: Drive, world: World, table: Floats) -> Stack:
+        """Channels as sensors, frames and the tables of logs give what was noted."""
+        stack = sensed(self._split(table), world.theta_in(drive), ROW_S)
         for group, values in stack.items():
             late = world.late_s[_NODE[group]] if group in _NODE else 0.0
             if late:
@@ -306,10 +333,13 @@ class Rig:
     def states(self, world: World, names: Sequence[str]) -> Floats:
         """States and outputs by name (`plant.model.column_indices`) over all drives, (rows, names)."""
         columns = column_indices(list(names))
-        return np.concatenate([self._replayed(drive, world, columns)[0] for drive in self.case.drives])
+        return np.concatenate([self._replayed(drive, world, columns).table for drive in self.case.drives])
 
     def _raw(self, drive: Drive, world: World) -> Stack:
-        table = self._noted(drive, world)
+        """What a world does in one drive, before any sensor."""
+        return self._split(self._replayed(drive, world, self._columns).table)
+
+    def _split(self, table: Floats) -> Stack:
         stack: Stack = {}
         at = 0
         for group in self._groups:
@@ -318,24 +348,20 @@ class Rig:
             at += width
         return stack
 
-    def _noted(self, drive: Drive, world: World) -> Floats:
-        """Raw channels of one drive; from what was kept where the worlds cannot differ."""
-        if self._kept is None:
-            return self._replayed(drive, world, self._columns)[0]
-        needed, kept = apart(world, self._kept[0], drive), self._kept[1][drive.number]
-        differs = [bool(needed & going_on) for going_on in self._going_on[drive.number]]
-        return self._replayed(drive, world, self._columns, kept, differs)[0] if any(differs) else kept.table
-
     def _replayed(
-        self, drive: Drive, world: World, columns: NDArray[np.int64], kept: _Kept | None = None,
-        differs: Sequence[bool] = (),
-    ) -> tuple[Floats, tuple[Floats, ...]]:  # fmt: skip
-        """One drive: what ``columns`` ask for at every row, and the states at the start and after each segment.
+        self, drive: Drive, world: World, columns: NDArray[np.int64], kept: _Replay | None = None,
+        differs: Sequence[bool] = (), alike: bool = False,
+    ) -> _Replay:  # fmt: skip
+        """One drive, noting what ``columns`` ask for at every row.
 
-        Segments that do not differ are taken from ``kept``; what moves slowly goes on from where it was.
+        Segments that do not differ are taken from ``kept``; what moves slowly goes on from where it was. Inputs are
+        those of ``kept`` where sensors and frames are ``alike``.
         """
         theta = world.theta_in(drive)
-        inputs = in_time(inverted(drive.inputs, theta, ROW_S), world.late_s)
+        if kept is not None and alike:
+            inputs = kept.inputs
+        else:
+            inputs = in_time(inverted(drive.inputs, theta, ROW_S), world.late_s)
         x = self._start(drive, world, inputs[0])
         table = np.empty((len(inputs), len(columns)))
         cut, switch, y, pace = self.case.cut, healthy(), OUTPUT.zeros(), self._pace[drive.number]
@@ -355,7 +381,7 @@ class Rig:
                 columns, table[rows], y, theta, world.terms, NO_PLUGINS,
             )  # fmt: skip
             states.append(x.copy())
-        return table, tuple(states)
+        return _Replay(inputs, table, tuple(states))
 
     @staticmethod
     def _restart(x: Floats, speed_mps: float) -> None:

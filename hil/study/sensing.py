@@ -23,6 +23,14 @@ WATCHING = np.concatenate(
     ]
 )
 """Places in theta of sensing effects that leave the replay's inputs alone."""
+SENSORS = np.concatenate(
+    [
+        np.arange(THETA.size)[THETA.slice(effect.name, name)]
+        for effect in SENSING
+        for name in (*(parameter.name for parameter in effect.parameters), "onset_s", "until_s")
+    ]
+)
+"""Places in theta of all that says what sensors and clocks do."""
 _WHEEL_SCALE = THETA.slice("wrong_scale", "factor").start + NODES.index("wheel")
 
 

@@ -9,6 +9,7 @@ from hil.study import acting
 from hil.study.acting import Acting
 from hil.study.nuisances import Nuisance, factor_of
 from hil.study.prepare import Drive
+from hil.study.sensing import SENSORS
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
 from plant.effects.bank import NO_TERMS
@@ -116,3 +117,10 @@ def apart(one: World, other: World, drive: Drive) -> Acting:
         if late != also:
             found |= of
     return found
+
+
+def told_alike(one: World, other: World) -> bool:
+    """Whether sensors, clocks and frames of two worlds are alike: the same motion is told in the same way."""
+    same = one.late_s == other.late_s and one.onsets == other.onsets
+    same = same and (one.tooth_share, one.window_rows2) == (other.tooth_share, other.window_rows2)
+    return same and bool((one.theta[SENSORS] == other.theta[SENSORS]).all())

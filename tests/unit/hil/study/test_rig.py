@@ -54,7 +54,7 @@ def test_a_motor_at_its_limit_does_not_answer_an_error_of_the_speed(rig):
 
 @pytest.mark.parametrize(("effect", "number", "value"), [
     ("pad_mu_gain", "gain", 0.1), ("iwm_gain", "gain", 0.1), ("ehb_dead_time", "time_s", 0.01),
-    ("road_grade", "grade", 0.01), ("imu_bias", "ax_mps2", 0.1),
+    ("road_grade", "grade", 0.01), ("imu_bias", "ax_mps2", 0.1), ("pressure_offset", "offset_pa", 1e4),
 ])  # fmt: skip
 def test_a_kept_world_changes_no_result(rig, effect, number, value):
     level = nominal(rig.vehicle)
@@ -65,6 +65,21 @@ def test_a_kept_world_changes_no_result(rig, effect, number, value):
     for group, values in fresh.items():
         apart = np.abs(kept[group] - values).max()
         assert apart <= 2e-3 * max(np.abs(values - rig.run(level)[group]).max(), 1e-9), group
+
+
+@pytest.mark.parametrize("change", [
+    {"late_s": (0.004, 0.0, 0.0, 0.0, 0.0)}, {"late_s": (0.0, 0.004, 0.0, 0.0, 0.0)},
+    {"late_s": (0.0, 0.0, 0.0, 0.004, 0.0)}, {"window_rows2": 4.0}, {"tooth_share": 0.2},
+])  # fmt: skip
+def test_what_a_kept_world_was_told_is_not_told_of_other_frames_or_teeth(rig, change):
+    level = nominal(rig.vehicle)
+    changed = replace(level, **change)
+    fresh = Rig(rig.case, rig.vehicle).run(changed)
+    rig.keep(level)
+    kept = rig.run(changed)
+    assert any(np.abs(values - rig.run(level)[group]).max() > 1e-6 for group, values in fresh.items())
+    for group, values in fresh.items():
+        assert np.array_equal(kept[group], values), group
 
 
 def test_a_sensor_that_tells_too_much_does_not_press_the_pads_at_the_start():
