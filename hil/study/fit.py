@@ -159,7 +159,7 @@ class Fitter:
     def _step(self, model: Model, own: Tracks, noise: Noise) -> Model | None:
         total = self._total(model, own, noise)
         for hold, damping in _ATTEMPTS if self._limits else _ATTEMPTS[1:]:
-            z, terms, covariance, foretold = self._moved(model, total, hold, damping)
+            z, terms, covariance, foretold = self.moved(model, total, hold, damping)
             if foretold < _WORTH:
                 break
             moved = self.at(z, terms, noise)
@@ -167,11 +167,14 @@ class Fitter:
                 return replace(moved, covariance=covariance)
         return replace(model, covariance=covariance) if model.terms and not model.covariance.size else None
 
-    def _moved(
+    def moved(
         self, model: Model, total: Floats, hold: bool = False, damping: float = 0.0
     ) -> tuple[Floats, tuple[Term, ...], Floats, float]:
         """Nuisances and effects after a step, no farther than each may go, covariance of the effects, and what the step
-        takes off the cost if the model is linear; limits stay where they are if told to ``hold``."""
+        takes off the cost if the model is linear; limits stay where they are if told to ``hold``.
+
+        ``total`` are products of [residual, nuisances, columns of the effects].
+        """
         count, values = len(self.nuisances), np.array(model.values())
         ends = [(term.candidate.parameter.low, term.candidate.parameter.high) for term in model.terms]
         least, most = np.array(ends).reshape(-1, 2).T
@@ -254,7 +257,7 @@ class Fitter:
         if known is not None:
             at = 1 + count + np.arange(len(known))
             total[at, at] += known
-        z, terms, covariance, _ = self._moved(model, total)
+        z, terms, covariance, _ = self.moved(model, total)
         moved = np.array([new.value - old.value for new, old in zip(terms, model.terms, strict=True)])
         residual = {
             name: values - (self.nuisance_columns[name] @ (z - model.z) + own[name] @ moved)[:, None]

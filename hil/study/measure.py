@@ -1,15 +1,15 @@
 """What the extension gains on manoeuvres that its fit never saw, beside doing nothing and the best wrong cause."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from hil.study.contest import Contender
 from hil.study.diagnosis import Diagnosis
-from hil.study.fit import Model, Tracks
-from hil.study.linear import solve, sums
-from hil.study.noise import Frame
+from hil.study.fit import Fitter, Model, Tracks
+from hil.study.linear import sums
+from hil.study.noise import Frame, Noise
 from hil.study.table import Floats
 
 FOLDS = 4
@@ -37,34 +37,28 @@ def best_wrong(found: Diagnosis) -> Contender | None:
     return next((c for c in found.contenders[0] if c.term.candidate.effect.name != right), None)
 
 
-def folds(found: Diagnosis) -> list[Floats]:
+def folds(frame: Frame) -> list[Floats]:
     """Weights of the manoeuvres each fold trains on; neighbours in time go to different folds."""
-    count = int(np.max(found.fitter.frame.blocks)) + 1
+    count = int(np.max(frame.blocks)) + 1
     parts = min(FOLDS, count)
     return [np.array([0.0 if k % parts == fold else 1.0 for k in range(count)]) for fold in range(parts)]
 
 
-def held_out(found: Diagnosis, model: Model) -> Tracks:
-    """Residual of every manoeuvre from a fit on the others."""
-    fitter, frame = found.fitter, found.fitter.frame
-    trained = folds(found)
+def held_out(fitter: Fitter, noise: Noise, model: Model) -> Tracks:
+    """Residual of every manoeuvre from a fit on the others, in which no number goes farther than it may."""
+    frame = fitter.frame
+    trained = folds(frame)
     if len(trained) < 2:
         return model.residual
     columns = dict(fitter.nuisance_columns)
     if model.terms:
         own = fitter.term_columns(model)
         columns = {name: np.hstack([values, own[name]]) for name, values in columns.items()}
-    count = len(fitter.nuisances)
-    of = sums(model.residual, columns, frame, found.noise, count)
+    of = sums(model.residual, columns, frame, noise, len(fitter.nuisances))
     out = {name: np.zeros_like(values) for name, values in model.residual.items()}
     blocks = np.asarray(frame.blocks, np.int64)
     for weights in trained:
-        change, _ = solve(of.total(weights), count, range(len(model.terms)), model.z)
-        z = np.clip(model.z + np.clip(change[:count], -1.5, 1.5), -8.0, 8.0)
-        terms = tuple(
-            replace(t, value=float(np.clip(t.value + step, t.candidate.parameter.low, t.candidate.parameter.high)))
-            for t, step in zip(model.terms, change[count:], strict=True)
-        )
+        z, terms, *_ = fitter.moved(model, of.total(weights))
         residual = fitter.residual(z, terms)
         test = weights[blocks] < 0.5
         for name, values in residual.items():
@@ -74,11 +68,11 @@ def held_out(found: Diagnosis, model: Model) -> Tracks:
 
 def gains(found: Diagnosis) -> list[Gain]:
     """Gain of every track."""
-    frame = found.fitter.frame
+    fitter, noise, frame = found.fitter, found.noise, found.fitter.frame
     wrong = best_wrong(found)
-    after = held_out(found, found.final) if found.final.terms else None
-    tuned = held_out(found, found.base)
-    other = held_out(found, wrong.model) if wrong is not None else None
+    after = held_out(fitter, noise, found.final) if found.final.terms else None
+    tuned = held_out(fitter, noise, found.base)
+    other = held_out(fitter, noise, wrong.model) if wrong is not None else None
     listed = []
     for name in frame.names:
         before = _by_manoeuvre(found.nominal.residual[name], frame, name)
