@@ -26,6 +26,13 @@ def test_a_time_to_begin_at_makes_no_cause_of_noise() -> None:
     assert run_case(draw("null", 3, 9001), 9001, None)["causes"] == []
 
 
+@pytest.mark.parametrize(("index", "seed"), [(0, 68), (1, 778)])
+def test_what_was_an_alarm_once_is_none_now(index: int, seed: int) -> None:
+    """A zero of one pressure sensor, where the search had lost a little colour in much noise; a clock that drifts, where
+    the car acted on demands that no frame had told."""
+    assert run_case(draw("null", index, seed), seed, None)["causes"] == []
+
+
 @pytest.mark.parametrize("effect", ["pad_temp_fade", "mu_nv_dynamics", "mu_warmup"])
 def test_a_single_cause_is_named(effect: str) -> None:
     record = run_case(draw("single", SINGLES.index(effect), SEED, 15.0), SEED, 15.0)
@@ -47,6 +54,12 @@ def test_what_noise_had_taken_for_its_own_is_named(effect: str) -> None:
     record = run_case(draw("single", SINGLES.index(effect), 6066, 15.0), 6066, 15.0)
     assert record["hidden"][0]["effect"] == effect
     assert record["named"][:1] == [effect]
+
+
+@pytest.mark.xfail(strict=True, reason="tied, and a drag of the axle is told first")
+def test_rolling_resistance_of_an_axle_is_told_before_what_acts_alike() -> None:
+    record = run_case(draw("single", SINGLES.index("rolling_resistance"), 68, 15.0), 68, 15.0)
+    assert record["named"][:1] == ["rolling_resistance"]
 
 
 def test_without_the_noise_model_nothing_hidden_raises_an_alarm() -> None:
