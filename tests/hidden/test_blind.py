@@ -28,8 +28,8 @@ def test_a_time_to_begin_at_makes_no_cause_of_noise() -> None:
 
 @pytest.mark.parametrize(("index", "seed"), [(0, 68), (1, 778)])
 def test_what_was_an_alarm_once_is_none_now(index: int, seed: int) -> None:
-    """A zero of one pressure sensor, where the search had lost a little colour in much noise; a clock that drifts, where
-    the car acted on demands that no frame had told."""
+    """A zero of one pressure sensor, where a little colour was lost in much noise; a clock that drifts, where the car
+    acted on demands that no frame had told."""
     assert run_case(draw("null", index, seed), seed, None)["causes"] == []
 
 
