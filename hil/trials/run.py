@@ -78,11 +78,12 @@ def run_case(case: Case, seed: int, size: float | None, settings: Settings | Non
     Where ``oracle`` is given, it is the held-out error of a model that knows what is hidden (`hil.trials.oracle`).
     A confounded case has ``follow_up``: what is said of the manoeuvres that decide, by themselves.
     """
+    sources = state()  # of what runs now: a case takes minutes, and files may change
     with TemporaryDirectory() as folder:
         answered, said = _explained(case, Path(folder), settings)
         truth = read_answer(Path(folder) / "logs")
     record = {
-        "family": case.family, "index": case.index, "seed": seed, "size": size, "sources": state(),
+        "family": case.family, "index": case.index, "seed": seed, "size": size, "sources": sources,
         "snr": truth["snr"], "reached": truth["reached"], "noise": case.noise_level,
         "hidden": truth["causes"], **said,
     }  # fmt: skip

@@ -24,7 +24,7 @@ from hil.trials.reading import (
     names_listed_elsewhere,
     right_joint,
     right_law,
-)  # fmt: skip
+)
 
 Records = Sequence[Record]
 

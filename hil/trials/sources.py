@@ -1,9 +1,10 @@
 """Which plant, study and hidden car a trial was run with: digests of their sources."""
 
 import hashlib
+from functools import cache
 from importlib import resources
 
-STUDIED = ("plant", "plant.effects", "plant.effects.sensing", "hil.study")
+STUDIED = ("plant", "plant.parameters", "plant.effects", "plant.effects.sensing", "hil.study")
 """What an answer depends on."""
 HIDDEN = ("hil.hide",)
 """What a case depends on."""
@@ -19,6 +20,7 @@ def digest(packages: tuple[str, ...]) -> bytes:
     return found.digest()
 
 
+@cache
 def state() -> str:
-    """Twelve hexadecimal digits that differ when cases or answers may."""
+    """Twelve hexadecimal digits that differ when cases or answers may; as first asked for, whatever is edited since."""
     return digest(STUDIED + HIDDEN).hex()[:12]
