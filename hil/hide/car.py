@@ -117,6 +117,8 @@ TOLERANCE: dict[str, float] = {
     "ehb_dead_time_s": 0.002,
     "motor_time_constant_s": 0.001,
     "battery_charge_power_w": 3000.0,
+    "lift_front": 0.03,
+    "lift_rear": 0.03,
 }
 """Half-width of what the true value may be: two standard deviations, never exceeded."""
 

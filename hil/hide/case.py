@@ -13,8 +13,8 @@ from hil.hide.car import NOMINAL, TOLERANCE, Car, true_car
 from hil.hide.catalogue import find
 from hil.hide.drive import drive
 from hil.hide.manoeuvres import SETS, TICK_S, Manoeuvre, manoeuvre_set
-from hil.hide.noise import LEVELS, Noise, draw_noise, gusts
-from hil.hide.sensors import SensorFault, observe
+from hil.hide.noise import LEVELS, USUALLY_LATE_S, Noise, draw_noise, gusts
+from hil.hide.sensors import NODES, SensorFault, observe
 from hil.hide.snr import difference, signal_to_noise, whitened
 from hil.hide.strengths import ROWS, E
 
@@ -165,20 +165,26 @@ def as_number(case: Case) -> float:
     No signal stands out more, however it looks: off by so much, the number imitates it exactly, at that cost in its
     tolerance. Signatures of one standard deviation do not tell: wheels that swing on their tyres are soon out of phase.
     """
-    if len(case.hidden) != 1 or case.hidden[0].onset_s is not None or case.hidden[0].wheel != "car":
+    if len(case.hidden) != 1 or case.hidden[0].onset_s is not None:
         return float("inf")
-    name, of_nominal = NUMBERS.get(case.hidden[0].effect, ("", False))
-    if not name:
+    (one,) = case.hidden
+    if one.effect == "timestamp_offset":
+        return float(abs(one.magnitude) / USUALLY_LATE_S)
+    name, of_nominal = NUMBERS.get(one.effect, ("", False))
+    if not name or one.wheel != "car":
         return float("inf")
-    off = case.hidden[0].magnitude * (getattr(NOMINAL, name) if of_nominal else 1.0)
+    off = one.magnitude * (getattr(NOMINAL, name) if of_nominal else 1.0)
     return float(abs(off) / (0.5 * TOLERANCE[name]))
 
 
 def _imitations(case: Case) -> Vector:
-    """Whitened signatures of all parameters with a tolerance, one standard deviation each, (samples, parameters)."""
+    """Whitened signatures of all that nobody knows better, one standard deviation each, (samples, parameters).
+
+    Parameters with a tolerance, and how late the nodes send.
+    """
     own = logs(replace(case, hidden=()), clean=True)
     columns = []
-    for name, signature in zip(TOLERANCE, _signatures(case.manoeuvres, case.variant), strict=True):
+    for name, signature in _signatures(case.manoeuvres, case.variant).items():
         if name in SWINGING:
             fitted = difference(_observed(case.drives, _off(case.car, name), case.noise, (), case.seed, True), own)
         else:
@@ -198,16 +204,19 @@ def _fitted(table: Table, rows: int) -> dict[str, Vector]:
 
 
 @lru_cache(maxsize=4)
-def _signatures(manoeuvres: str, variant: int) -> list[list[dict[str, Vector]]]:
-    """What half a tolerance of each parameter changes in the clean logs of the nominal car."""
+def _signatures(manoeuvres: str, variant: int) -> dict[str, list[dict[str, Vector]]]:
+    """What half a tolerance of each parameter, and a node's usual latency, change in the nominal car's clean logs."""
     noise = replace(
         draw_noise("medium", np.random.default_rng(0)), gust_mps2=0.0, latency_s=(0.0, 0.0, 0.0, 0.0), queue_s=0.0
     )
     drives = manoeuvre_set(manoeuvres, variant)
     base = _observed(drives, NOMINAL, noise, (), 0, True)
-    found = []
+    found = {}
     for name in TOLERANCE:
-        found.append(difference(_observed(drives, _off(NOMINAL, name), noise, (), 0, True), base))
+        found[name] = difference(_observed(drives, _off(NOMINAL, name), noise, (), 0, True), base)
+    for node, late_s in zip(NODES[1:], USUALLY_LATE_S * np.eye(len(NODES))[1:], strict=True):
+        late = replace(noise, latency_s=tuple(late_s.tolist()))
+        found[f"late_{node}"] = difference(_observed(drives, NOMINAL, late, (), 0, True), base)
     return found
 
 

@@ -24,13 +24,13 @@ _SCALES = {
     "relaxation_length_m": ("tyre_lsgkp", 0.373),
 }  # fmt: skip
 _TOLD = (
-    "mass_kg", "wheelbase_m", "cog_to_front_axle_m", "cog_height_m", "track_m", "yaw_inertia_kg_m2", "drag_coefficient",
-    "frontal_area_m2", "air_density_kg_m3", "rolling_resistance", "steering_ratio", "rolling_radius_m",
-    "wheel_inertia_kg_m2", "brake_gain_front_nm_pa", "brake_gain_rear_nm_pa", "threshold_pressure_pa", "pad_a_1_ks",
-    "pad_b_1_j", "pad_c_1_s", "pad_epsilon_w", "ambient_k", "ehb_frequency_hz", "ehb_damping", "ehb_dead_time_s",
-    "ehb_build_rate_pa_s", "ehb_release_rate_pa_s", "ehb_max_pressure_pa", "motor_time_constant_s",
-    "motor_rate_limit_nm_s", "motor_peak_torque_nm", "motor_peak_power_w", "motor_fade_start_mps",
-    "motor_fade_end_mps", "battery_charge_power_w", "imu_cutoff_hz",
+    "mass_kg", "wheelbase_m", "cog_to_front_axle_m", "cog_height_m", "track_m", "yaw_inertia_kg_m2",
+    "drag_coefficient", "lift_front", "lift_rear", "frontal_area_m2", "air_density_kg_m3", "rolling_resistance",
+    "steering_ratio", "rolling_radius_m", "wheel_inertia_kg_m2", "brake_gain_front_nm_pa", "brake_gain_rear_nm_pa",
+    "threshold_pressure_pa", "pad_a_1_ks", "pad_b_1_j", "pad_c_1_s", "pad_epsilon_w", "ambient_k", "ehb_frequency_hz",
+    "ehb_damping", "ehb_dead_time_s", "ehb_build_rate_pa_s", "ehb_release_rate_pa_s", "ehb_max_pressure_pa",
+    "motor_time_constant_s", "motor_rate_limit_nm_s", "motor_peak_torque_nm", "motor_peak_power_w",
+    "motor_fade_start_mps", "motor_fade_end_mps", "battery_charge_power_w", "imu_cutoff_hz",
 )  # fmt: skip
 
 

@@ -68,6 +68,11 @@ QUANTUM = {
 }
 """Last bit of each channel on the bus, SI."""
 
+LATEST_S = 0.0008
+"""Most that the frames of a node are sent later or earlier than the wheel node's."""
+USUALLY_LATE_S = LATEST_S / 3.0**0.5
+"""Standard deviation of that; all latencies are as likely."""
+
 
 def whole(values: Vector, channel: str) -> Vector:
     """Values as a frame says them."""
@@ -82,7 +87,7 @@ def draw_noise(level: str, rng: np.random.Generator) -> Noise:
         return value * size * float(rng.uniform(0.8, 1.25))
 
     def late() -> float:
-        return float(rng.uniform(-0.0008, 0.0008))
+        return float(rng.uniform(-LATEST_S, LATEST_S))
 
     return Noise(
         level=level, gust_mps2=around(0.02), slope_mps2=around(0.02), drift_mps2=around(0.008),

@@ -10,6 +10,7 @@ import numpy as np
 from hil.study.candidates import Candidate
 from hil.study.fit import Fitter, Model, Term, Tracks
 from hil.study.noise import Noise
+from hil.study.onset import begins
 from hil.study.rig import WORKERS
 from hil.study.screen import Score, rescored, share_of, sized
 
@@ -80,6 +81,7 @@ class Contest:
     def __init__(self, fitter: Fitter, columns: Tracks, model: Model, noise: Noise, relinearise: bool) -> None:
         self._fitter, self._columns, self._model, self._relinearise = fitter, columns, model, relinearise
         self._now = fitter.term_columns(model) if model.terms else None
+        self._begins = begins(fitter.rig.case)
         self.noise = self._no_worse(model, fitter.estimated(model, noise), noise)
         self.reference = fitter.cost(model.residual, model.z, self.noise)
         fitter.products(self.noise)  # which all looks need
@@ -103,10 +105,13 @@ class Contest:
         return begun, {name: np.hstack([self._now[name], values]) for name, values in columns.items()}
 
     def _of(self, item: Score) -> tuple[list[Term], Tracks]:
-        """A candidate as a term, and its sensitivities."""
+        """A candidate as a term, and its sensitivities; where it begins later, nothing before."""
         at = list(item.candidate.columns)
         own = {name: values[:, at].sum(axis=1, keepdims=True) for name, values in self._columns.items()}
-        return [Term(item.candidate, 0.0)], own
+        if item.since is not None:
+            there = (np.asarray(self._fitter.frame.blocks) >= self._begins.index(item.since))[:, None]
+            own = {name: np.where(there, values, 0.0) for name, values in own.items()}
+        return [Term(item.candidate, 0.0, item.since)], own
 
     def foreseen(self, terms: Sequence[Term], columns: Tracks) -> tuple[Model, Noise]:
         """The model with more terms by one linear step, and the noise that is left beside them.

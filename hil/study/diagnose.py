@@ -16,13 +16,14 @@ from hil.study.left_over import FORM, LeftOver
 from hil.study.linear import Sums, project, track_columns
 from hil.study.noise import Frame, Noise
 from hil.study.numbers import STRAINED, Numbers, strain
-from hil.study.onset import price, with_onsets
+from hil.study.onset import begins, price, with_onsets
 from hil.study.own_error import variance_of, variance_of_law
 from hil.study.prepare import Case
 from hil.study.race import LawRace, best_of_each, least_gain, with_law
 from hil.study.rig import Rig
 from hil.study.same_number import restated
 from hil.study.screen import Score, beside_best, inflation, leaders, not_testable, scores, threshold
+from hil.study.since import with_beginnings
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
 from hil.study.world import World
@@ -262,9 +263,13 @@ class _Search:
 
     def _plausible(self, found: Diagnosis, model: Model, noise: Noise, bent: bool) -> list[Score]:
         """Candidates that explain most by one step and are not in the model yet."""
-        listed = found.screened
+        listed, sums = found.screened, found.sums
         if model.terms:
-            listed = self._scores(self.fitter.screen(model, self.effect_columns, noise), model, noise)
+            sums = self.fitter.screen(model, self.effect_columns, noise)
+            listed = self._scores(sums, model, noise)
+        assert sums is not None  # screened before any cause is looked for
+        held, starts = self.fitter.at_their_end(model.z), begins(self.rig.case)
+        listed = with_beginnings(listed, sums, len(model.terms), model.z, held, starts, price(starts[-1], self.frame))
         used = {_number(term.candidate) for term in model.terms}
         listed = [item for item in listed if _number(item.candidate) not in used]
         plausible = leaders(listed, PLAUSIBLE)
@@ -369,7 +374,7 @@ class _Search:
     def _gained(self, contender: Contender, reference: float) -> Contender:
         """With its gain, shared out over the model's own error and less what a chosen beginning takes."""
         gained = (reference - contender.cost) / variance_of(contender.term.candidate)
-        gained = gained / self._strain(contender.model.z) - price(contender.term, self.frame)
+        gained = gained / self._strain(contender.model.z) - price(contender.term.onset, self.frame)
         return replace(contender, gained=gained)
 
     def _backward(self, found: Diagnosis) -> None:

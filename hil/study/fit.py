@@ -17,8 +17,6 @@ from hil.study.world import World
 
 Tracks = dict[str, Floats]
 _LARGEST_STEP = 8.0
-_NEVER_LESS = ("held", "window")
-"""Kinds of numbers that begin at their least."""
 _ATTEMPTS = ((False, 0.0), (True, 0.0), (True, 0.1), (True, 1.0), (True, 10.0))
 """Ways to make a step, in turn until one improves: whether limits stay where they are, and the damping."""
 _LIMITS = (

@@ -95,7 +95,50 @@ def project(
 
     Nuisances that are ``held`` take no part.
     """
-    taken = [1 + k for k in range(nuisances)] + [1 + nuisances + k for k in free]
+    a, right = _taking(total, nuisances, free, z, held)
+    solved = np.linalg.solve(a, right) if len(a) else np.zeros((0, total.shape[1]))
+    left = total - right.T @ solved
+    keep = 1 + nuisances
+    prior = float(z @ z) if z is not None else 0.0
+    return Projected(np.asarray(left[0, keep:]), np.asarray(left[keep:, keep:]), float(left[0, 0]) + prior)
+
+
+def project_later(
+    found: Sums, columns: Sequence[Sequence[int]], free: Sequence[int], z: Floats, held: Sequence[int]
+) -> tuple[Floats, Floats]:
+    """As `project`, for signatures that are nothing before the begin of each manoeuvre.
+
+    Parameters
+    ----------
+    columns : which columns are one signature together, for each of them.
+
+    Returns
+    -------
+    Products with the residual, and with itself, (manoeuvres, signatures).
+    """
+    a, right = _taking(found.total(), found.nuisances, free, z, held)
+    taken, keep = _taken(found.nuisances, free), 1 + found.nuisances
+    later = np.cumsum(found.matrix[::-1], axis=0)[::-1]
+    along = np.linalg.solve(a, right[:, 0])
+    b, q = np.empty((2, len(later), len(columns)))
+    for k, own in enumerate(columns):
+        at = [keep + column for column in own]
+        cross = later[:, taken][:, :, at].sum(axis=2)
+        cross[:, list(held)] = 0.0
+        b[:, k] = later[:, 0, at].sum(axis=1) - cross @ along
+        q[:, k] = later[:, at][:, :, at].sum(axis=(1, 2)) - np.sum(cross * np.linalg.solve(a, cross.T).T, axis=1)
+    return b, q
+
+
+def _taken(nuisances: int, free: Sequence[int]) -> list[int]:
+    return [1 + k for k in range(nuisances)] + [1 + nuisances + k for k in free]
+
+
+def _taking(
+    total: Floats, nuisances: int, free: Sequence[int], z: Floats | None, held: Sequence[int]
+) -> tuple[Floats, Floats]:
+    """Information of what takes its part, what is known before included, and its products with all there is."""
+    taken = _taken(nuisances, free)
     a = total[np.ix_(taken, taken)].copy()
     right = total[taken].copy()
     a[range(nuisances), range(nuisances)] += 1.0
@@ -104,11 +147,7 @@ def project(
     a[list(held), list(held)] += _HELD
     right[list(held)] = 0.0
     a[range(len(a)), range(len(a))] += 1e-9 * (1.0 + np.diag(a))
-    solved = np.linalg.solve(a, right) if taken else np.zeros((0, total.shape[1]))
-    left = total - right.T @ solved
-    keep = 1 + nuisances
-    prior = float(z @ z) if z is not None else 0.0
-    return Projected(np.asarray(left[0, keep:]), np.asarray(left[keep:, keep:]), float(left[0, 0]) + prior)
+    return a, right
 
 
 def solve(total: Floats, nuisances: int, free: Sequence[int], z: Floats) -> tuple[Floats, Floats]:
@@ -151,7 +190,7 @@ def solve_within(
 
 def _normal(total: Floats, nuisances: int, free: Sequence[int], z: Floats) -> tuple[Floats, Floats]:
     """Normal equations: information with what is known before, and the pull."""
-    taken = [1 + k for k in range(nuisances)] + [1 + nuisances + k for k in free]
+    taken = _taken(nuisances, free)
     a = total[np.ix_(taken, taken)].copy()
     right = total[taken, 0].copy()
     a[range(nuisances), range(nuisances)] += 1.0

@@ -10,7 +10,7 @@ from hil.study.fit import Fitter, Model, Term
 from hil.study.linear import sums
 from hil.study.noise import Frame, Noise
 from hil.study.own_error import variance_of
-from hil.study.prepare import ROW_S, Segment
+from hil.study.prepare import ROW_S, Case, Segment
 from hil.study.table import Floats
 
 Moment = tuple[int, float]
@@ -18,7 +18,7 @@ Moment = tuple[int, float]
 _ALPHA = 3e-4
 _COARSE_S, _FINER, _MOST_TIMES = 0.25, (0.05, 0.01), 80
 """Steps of the time, s: what begins at once sets hubs swinging, so that only the neighbourhood of the truth fits."""
-_LEAST_BEFORE = 3.0
+LEAST_BEFORE = 3.0
 """Standard deviations that the cause would have shown before it begins, had it been there."""
 
 
@@ -27,18 +27,28 @@ def with_onsets(fitter: Fitter, model: Model, noise: Noise) -> Model:
 
     A time that may be chosen is one more way to fit what the model gets wrong, and is asked for more than that.
     """
+    starts = begins(fitter.rig.case)
     for k, term in enumerate(model.terms):
-        if term.onset is None and not isinstance(term.candidate, Piece):
+        if isinstance(term.candidate, Piece):
+            continue
+        if term.onset is None:
             later = _later(fitter, model, noise, k)
             model = model if later is None else later
+        elif term.onset in starts:
+            model = min(model, _within(fitter, model, noise, k, starts.index(term.onset), term.value), key=_cost)
     return model
 
 
-def price(term: Term, frame: Frame) -> float:
+def price(onset: Moment | None, frame: Frame) -> float:
     """What of a gain goes to the choice of a time to begin at: twice the log of how many were offered."""
-    if term.onset is None:
+    if onset is None:
         return 0.0
     return 2.0 * float(np.log(len(frame.fresh) * frame.sample_s / _COARSE_S))
+
+
+def begins(case: Case) -> list[Moment]:
+    """When each manoeuvre begins."""
+    return [(drive, segment.first * ROW_S) for drive, segment in case.segments]
 
 
 def _later(fitter: Fitter, model: Model, noise: Noise, k: int) -> Model | None:
@@ -46,21 +56,30 @@ def _later(fitter: Fitter, model: Model, noise: Noise, k: int) -> Model | None:
     block = begin_of(b, q)
     if block is None:
         return None
+    value = float(np.clip(b[block:].sum() / q[block:].sum(), *_bounds(model.terms[k])))
+    least = float(chi2.isf(_ALPHA / (len(b) * _MOST_TIMES), 1)) * variance_of(model.terms[k].candidate)
+    fitted = _within(fitter, model, noise, k, block, value)
+    return fitted if model.cost - fitted.cost > least else None
+
+
+def _within(fitter: Fitter, model: Model, noise: Noise, k: int, block: int, value: float) -> Model:
+    """The model with a cause that begins in a manoeuvre or the one before it."""
     segments = fitter.rig.case.segments
     moments = moments_of(segments[block - 1], segments[block])
-    value = float(np.clip(b[block:].sum() / q[block:].sum(), *_bounds(model.terms[k])))
     fitter.rig.keep(fitter.world(model.z, _since(model, k, value, moments[0])))
-    least = float(chi2.isf(_ALPHA / (len(b) * len(moments)), 1)) * variance_of(model.terms[k].candidate)
     seen: list[Model] = []
     for finer in (*_FINER, None):
         tried = ((fitter.at(model.z, _since(model, k, value, moment), noise), moment) for moment in moments)
-        best, (drive, since_s) = min(tried, key=lambda one: one[0].cost)
+        best, (drive, since_s) = min(tried, key=lambda one: _cost(one[0]))
         seen.append(best)
         if finer is not None:
             beside = min((abs(t - since_s) for d, t in moments if d == drive and t != since_s), default=finer)
             moments = [(drive, float(t)) for t in np.arange(max(since_s - beside, 0.0), since_s + beside, finer)]
-    fitted = fitter.fit(min(seen, key=lambda one: one.cost), noise, 3)
-    return fitted if model.cost - fitted.cost > least else None
+    return fitter.fit(min(seen, key=_cost), noise, 3)
+
+
+def _cost(model: Model) -> float:
+    return model.cost
 
 
 def moments_of(before: tuple[int, Segment], after: tuple[int, Segment]) -> list[Moment]:
@@ -107,7 +126,7 @@ def begin_of(b: Floats, q: Floats) -> int | None:
         return None
     value = after_b[block] / after_q[block]
     before = float(q[:block].sum())
-    if abs(value) * np.sqrt(before) < _LEAST_BEFORE:
+    if abs(value) * np.sqrt(before) < LEAST_BEFORE:
         return None
     gained = explained[block] - explained[0]
     return block if gained > float(chi2.isf(_ALPHA / len(b), 1)) else None

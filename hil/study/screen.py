@@ -22,7 +22,8 @@ class Score:
     how many standard deviations its largest allowed value would make (``reach``) and its usual one (``usual``).
 
     ``raw`` is the gain before it is shared out over the model's own error (`hil.study.own_error`); ``replayed`` where
-    it is that of a replay at this value (`hil.study.behind`).
+    it is that of a replay at this value (`hil.study.behind`). ``since`` is when it begins, as drive and s in it, None
+    where it is always there; ``price`` what the choice of that takes off its gain.
     """
 
     candidate: Candidate
@@ -34,6 +35,8 @@ class Score:
     information: float
     raw: float = 0.0
     replayed: bool = False
+    since: tuple[int, float] | None = None
+    price: float = 0.0
 
 
 def scores(candidates: Sequence[Candidate], projected: Projected, offset: int, now: Sequence[float]) -> list[Score]:
@@ -72,8 +75,8 @@ def share_of(candidate: Candidate, information: float, value: float) -> float:
 
 def rescored(item: Score, value: float, raw: float, information: float) -> Score:
     """A candidate looked at again: with another value, gain and information."""
-    evidence = 0.5 * raw + share_of(item.candidate, information, value)
-    gain = raw / variance_of(item.candidate)
+    evidence = 0.5 * (raw - item.price) + share_of(item.candidate, information, value)
+    gain = raw / variance_of(item.candidate) - item.price
     return replace(item, value=value, gain=gain, evidence=evidence, information=information, raw=raw)
 
 

@@ -19,6 +19,8 @@ _OF_THE_ROAD = (("road_grade", "grade"), ("headwind", "wind_mps"))
 LATE = ("imu", "pressure", "motor", "demand", "steering")
 """Nodes whose frames may come later than the wheel speeds'; demands, and the steering wheel, may act later than they
 are logged."""
+DISC_TOLD_K, DISC_GUESSED_K = 5.0, 15.0
+"""Standard deviations of the discs' temperature at the start: as a thermocouple tells it, and as we guess."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +75,17 @@ class World:
         return replace(self, p=p, disc_offset_k=disc, late_s=tuple(late), tooth_share=tooth, window_rows2=window)
 
 
-def start_nuisances() -> list[Nuisance]:
-    """What the logs, not the vehicle, leave open: temperature of the discs, latency of the nodes."""
+def start_nuisances(disc_told: bool) -> list[Nuisance]:
+    """What the logs, not the vehicle, leave open: temperature of the discs, latency of the nodes.
+
+    ``disc_told``: all logs tell the discs' temperature at the start.
+    """
     found = [
         Nuisance(f"late_{node}", (k,), (2e-3,), "held" if node == "demand" else "late") for k, node in enumerate(LATE)
     ]
     return [
-        Nuisance("disc_temperature_k", (0,), (15.0,), "disc"), Nuisance("tooth_lag", (0,), (0.5,), "tooth"),
+        Nuisance("disc_temperature_k", (0,), (DISC_TOLD_K if disc_told else DISC_GUESSED_K,), "disc"),
+        Nuisance("tooth_lag", (0,), (0.5,), "tooth"),
         Nuisance("tooth_window", (0,), (1.0,), "window"), *found,
     ]  # fmt: skip
 

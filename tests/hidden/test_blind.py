@@ -56,6 +56,14 @@ def test_what_noise_had_taken_for_its_own_is_named(effect: str) -> None:
     assert record["named"][:1] == [effect]
 
 
+@pytest.mark.parametrize(("index", "effect"), [(0, "water"), (2, "clock_drift")])
+def test_a_cause_that_begins_in_the_middle_is_named(index: int, effect: str) -> None:
+    """They were answered by a law in no list, and ``none``: the race took them for what was always there."""
+    record = run_case(draw("onset", index, 68), 68, None)
+    assert record["hidden"][0]["effect"] == effect
+    assert record["named"] == [effect]
+
+
 @pytest.mark.xfail(strict=True, reason="tied, and a drag of the axle is told first")
 def test_rolling_resistance_of_an_axle_is_told_before_what_acts_alike() -> None:
     record = run_case(draw("single", SINGLES.index("rolling_resistance"), 68, 15.0), 68, 15.0)

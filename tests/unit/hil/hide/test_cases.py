@@ -14,6 +14,7 @@ from hil.hide.catalogue import HIDEABLE, LISTED, TWINS, find
 from hil.hide.drive import drive
 from hil.hide.files import sealed_folder, vehicle_toml
 from hil.hide.manoeuvres import SETS
+from hil.hide.noise import USUALLY_LATE_S
 from hil.hide.strengths import ROWS, E
 
 GAIN = Hidden("pad_mu_gain", "front", -0.1)
@@ -81,6 +82,7 @@ def test_the_car_as_told_has_a_tolerance_for_every_number():
     for key in [key for key in told if not key.endswith("_tolerance")]:
         assert f"{key}_tolerance" in told
     assert told["mass_kg"] == 1463.0
+    assert (told["lift_rear"], told["lift_rear_tolerance"]) == (0.08, 0.03)
     assert told["tyre_lkx_tolerance"] == pytest.approx(0.0987, abs=1e-3)
 
 
@@ -112,6 +114,15 @@ def test_what_tolerances_imitate_counts_less():
     beside, alone = expected_snr(mass)
     assert beside < 2.5
     assert alone > 2.0 * beside
+
+
+def test_how_late_a_node_sends_is_a_tolerance_too():
+    """A lag of the pressure's sensor is a latency as long as it is short."""
+    late = make_case((Hidden("timestamp_offset", "imu", 0.001),), 5, "low", "stops")
+    assert expected_snr(late)[0] <= 0.001 / USUALLY_LATE_S < 2.2 < expected_snr(late)[1]
+    lag = make_case((Hidden("pressure_location", "car", 0.001),), 5, "low", "stops")
+    beside, alone = expected_snr(lag)
+    assert beside < 3.0 < alone
 
 
 def test_families_draw_the_same_again():

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from hil.study.linear import project, solve, solve_within
+from hil.study.linear import Sums, project, project_later, solve, solve_within
 
 NUISANCES, COLUMNS = 3, 2
 
@@ -36,6 +36,20 @@ def test_nuisances_take_their_part_by_least_squares_with_their_prior(seed):
     moved = np.linalg.solve(a, total[own, 0] - z)
     expected = total[1 + NUISANCES :, 0] - total[1 + NUISANCES :, own] @ moved
     assert found.b == pytest.approx(expected, rel=1e-6, abs=1e-6)
+
+
+@given(seed=st.integers(0, 10_000), begin=st.integers(0, 3))
+def test_a_signature_from_a_manoeuvre_on_is_one_that_is_nothing_before(seed, begin):
+    rng, z = np.random.default_rng(seed), np.array([0.4, 3.0, -0.2])
+    manoeuvres = rng.standard_normal((4, 50, 1 + NUISANCES + COLUMNS))
+    matrix = np.stack([rows.T @ rows for rows in manoeuvres])
+    b, q = project_later(Sums(matrix, NUISANCES, 200, 0.0), [[0], [1], [0, 1]], (), z, [1])
+    cut = manoeuvres.copy()
+    cut[:begin, :, 1 + NUISANCES :] = 0.0
+    joined = cut.reshape(200, -1)
+    expected = project(joined.T @ joined, NUISANCES, z=z, held=[1])
+    assert b[begin] == pytest.approx([*expected.b, expected.b.sum()], rel=1e-6, abs=1e-6)
+    assert q[begin] == pytest.approx([*np.diag(expected.q), expected.q.sum()], rel=1e-6, abs=1e-6)
 
 
 @given(seed=st.integers(0, 10_000))

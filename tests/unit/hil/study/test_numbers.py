@@ -1,5 +1,7 @@
 """The vehicle's numbers: how strained a model is, and a fit that no single number blocks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pulses import log_of_pulses
@@ -9,7 +11,7 @@ from hil.study.numbers import Numbers, strain
 from hil.study.prepare import prepare
 from hil.study.rig import Rig
 from hil.study.vehicle import paper_car
-from hil.study.world import nominal
+from hil.study.world import DISC_GUESSED_K, DISC_TOLD_K, nominal
 
 NOISE_PA = 2e3
 
@@ -26,6 +28,15 @@ def test_a_strained_number_at_its_end_wants_to_go_on():
     assert strain(z) == pytest.approx(3.0)
     assert strain(z, np.full(4, 3.0)) == pytest.approx((4 * 9.0 + 3.0) / 4)
     assert strain(z / 3.0, np.full(4, 1.0)) == 1.0  # little strained
+
+
+@pytest.mark.parametrize(("told_k", "deviation_k"), [(350.0, DISC_TOLD_K), (None, DISC_GUESSED_K)])
+def test_discs_whose_temperature_is_told_are_known_better(told_k, deviation_k):
+    vehicle = paper_car()
+    case = prepare([replace(log_of_pulses(), disc_temperature_k=told_k)], 0.308)
+    numbers = Numbers(Rig(case, vehicle), Frame.of(case), vehicle, nominal(vehicle), True)
+    (disc,) = (one for one in numbers.nuisances if one.name == "disc_temperature_k")
+    assert disc.step == (deviation_k,)
 
 
 @pytest.mark.slow

@@ -43,6 +43,16 @@ def test_a_tolerance_is_two_standard_deviations() -> None:
     assert step == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.1 * area, rel=1e-3)
 
 
+def test_a_stated_tolerance_is_kept_to_unless_no_equation_is_as_good() -> None:
+    told = {**SIX, "cog_height_m": 0.5, "cog_height_m_tolerance": 0.03}
+    step = {n.name: n.step[0] for n in load_vehicle(told).nuisances}
+    assert step["vehicle_cog_height_m"] == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.03)
+    step = {n.name: n.step[0] for n in load_vehicle({**told, "cog_height_m_tolerance": 0.001}).nuisances}
+    assert step["vehicle_cog_height_m"] == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.04 * 0.5)
+    step = {n.name: n.step[0] for n in load_vehicle(SIX).nuisances}
+    assert step["vehicle_cog_height_m"] > 0.03
+
+
 def test_the_shipped_car_keeps_its_own_numbers() -> None:
     car = paper_car()
     assert car.parameters.vehicle.mass_kg == 1463.0
