@@ -3,10 +3,12 @@
 The families at full size are ``brakebench trials``; here are fixed cases and the control that must fail.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from hil.hide.case import Hidden, make_case
 from hil.hide.cases import SEPARABLE, draw
 from hil.study.diagnosis import Settings
 from hil.trials.run import run_case
@@ -68,6 +70,20 @@ def test_a_cause_that_begins_in_the_middle_is_named(index: int, effect: str) -> 
 def test_rolling_resistance_of_an_axle_is_told_before_what_acts_alike() -> None:
     record = run_case(draw("single", SINGLES.index("rolling_resistance"), 68, 15.0), 68, 15.0)
     assert record["named"][:1] == ["rolling_resistance"]
+
+
+def _told_of_a_pair(settings: Settings | None = None) -> list[str]:
+    """What is named for tyres that are slow to build up force on a car that is heavier than told."""
+    hidden = (Hidden("tyre_relaxation", "car", 1.8), Hidden("mass_offset", "car", 150.0))
+    return sorted(run_case(replace(make_case(hidden, SEED, "low"), family="two"), SEED, None, settings)["named"])
+
+
+def test_a_pair_that_bends_sensitivities_is_named() -> None:
+    assert _told_of_a_pair() == ["mass_offset", "tyre_relaxation"]
+
+
+def test_without_new_sensitivities_a_pair_takes_wrong_names() -> None:
+    assert _told_of_a_pair(Settings(relinearise=False)) != ["mass_offset", "tyre_relaxation"]
 
 
 def test_without_the_noise_model_nothing_hidden_raises_an_alarm() -> None:
