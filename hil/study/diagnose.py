@@ -269,7 +269,7 @@ class _Search:
             listed = self._scores(sums, model, noise)
         assert sums is not None  # screened before any cause is looked for
         held, starts = self.fitter.at_their_end(model.z), begins(self.rig.case)
-        listed = with_beginnings(listed, sums, len(model.terms), model.z, held, starts, price(starts[-1], self.frame))
+        listed = with_beginnings(listed, sums, len(model.terms), model.z, held, starts, price(self.frame))
         used = {_number(term.candidate) for term in model.terms}
         listed = [item for item in listed if _number(item.candidate) not in used]
         plausible = leaders(listed, PLAUSIBLE)
@@ -374,7 +374,8 @@ class _Search:
     def _gained(self, contender: Contender, reference: float) -> Contender:
         """With its gain, shared out over the model's own error and less what a chosen beginning takes."""
         gained = (reference - contender.cost) / variance_of(contender.term.candidate)
-        gained = gained / self._strain(contender.model.z) - price(contender.term.onset, self.frame)
+        chosen = 0.0 if contender.term.onset is None else price(self.frame)
+        gained = gained / self._strain(contender.model.z) - chosen
         return replace(contender, gained=gained)
 
     def _backward(self, found: Diagnosis) -> None:

@@ -35,14 +35,13 @@ def with_onsets(fitter: Fitter, model: Model, noise: Noise) -> Model:
             later = _later(fitter, model, noise, k)
             model = model if later is None else later
         elif term.onset in starts:
-            model = min(model, _within(fitter, model, noise, k, starts.index(term.onset), term.value), key=_cost)
+            moments = _about(fitter, starts.index(term.onset))
+            model = min(model, _begun(fitter, model, noise, k, moments, term.value), key=_cost)
     return model
 
 
-def price(onset: Moment | None, frame: Frame) -> float:
+def price(frame: Frame) -> float:
     """What of a gain goes to the choice of a time to begin at: twice the log of how many were offered."""
-    if onset is None:
-        return 0.0
     return 2.0 * float(np.log(len(frame.fresh) * frame.sample_s / _COARSE_S))
 
 
@@ -57,15 +56,20 @@ def _later(fitter: Fitter, model: Model, noise: Noise, k: int) -> Model | None:
     if block is None:
         return None
     value = float(np.clip(b[block:].sum() / q[block:].sum(), *_bounds(model.terms[k])))
-    least = float(chi2.isf(_ALPHA / (len(b) * _MOST_TIMES), 1)) * variance_of(model.terms[k].candidate)
-    fitted = _within(fitter, model, noise, k, block, value)
+    moments = _about(fitter, block)
+    least = float(chi2.isf(_ALPHA / (len(b) * len(moments)), 1)) * variance_of(model.terms[k].candidate)
+    fitted = _begun(fitter, model, noise, k, moments, value)
     return fitted if model.cost - fitted.cost > least else None
 
 
-def _within(fitter: Fitter, model: Model, noise: Noise, k: int, block: int, value: float) -> Model:
-    """The model with a cause that begins in a manoeuvre or the one before it."""
+def _about(fitter: Fitter, block: int) -> list[Moment]:
+    """Times to try for what is seen from a manoeuvre on."""
     segments = fitter.rig.case.segments
-    moments = moments_of(segments[block - 1], segments[block])
+    return moments_of(segments[block - 1], segments[block])
+
+
+def _begun(fitter: Fitter, model: Model, noise: Noise, k: int, moments: list[Moment], value: float) -> Model:
+    """The model with a cause that begins at the best of these times, or near it."""
     fitter.rig.keep(fitter.world(model.z, _since(model, k, value, moments[0])))
     seen: list[Model] = []
     for finer in (*_FINER, None):

@@ -37,8 +37,7 @@ def test_manoeuvres_that_do_not_show_it_prove_no_beginning():
 def test_a_time_costs_what_its_choice_among_many_is_worth():
     samples = np.zeros(9000)
     frame = Frame(samples, samples, samples, samples, samples, 0.02, {}, ())
-    assert price(None, frame) == 0.0
-    assert price((0, 12.0), frame) == pytest.approx(2.0 * np.log(720.0))
+    assert price(frame) == pytest.approx(2.0 * np.log(720.0))
 
 
 def test_a_beginning_is_looked_for_in_both_manoeuvres_it_may_lie_in():

@@ -43,7 +43,7 @@ def test_a_tolerance_is_two_standard_deviations() -> None:
     assert step == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.1 * area, rel=1e-3)
 
 
-def test_a_stated_tolerance_is_kept_to_unless_no_equation_is_as_good() -> None:
+def test_a_stated_tolerance_is_kept_to_as_far_as_an_equation_is_that_good() -> None:
     told = {**SIX, "cog_height_m": 0.5, "cog_height_m_tolerance": 0.03}
     step = {n.name: n.step[0] for n in load_vehicle(told).nuisances}
     assert step["vehicle_cog_height_m"] == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.03)
