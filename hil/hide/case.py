@@ -150,7 +150,7 @@ def _observed(
 def expected_snr(case: Case) -> tuple[float, float]:
     """SNR of what is hidden: beside imitations by tolerances, and alone. Both runs of the pair have the same gusts."""
     base = logs(replace(case, hidden=()), clean=True)
-    return _snr(case, base, _imitations(case))
+    return _snr(case, base, unknowns(case))
 
 
 def _snr(case: Case, base: Sequence[Table], imitations: Vector) -> tuple[float, float]:
@@ -177,8 +177,8 @@ def as_number(case: Case) -> float:
     return float(abs(off) / (0.5 * TOLERANCE[name]))
 
 
-def _imitations(case: Case) -> Vector:
-    """Whitened signatures of all that nobody knows better, one standard deviation each, (samples, parameters).
+def unknowns(case: Case) -> Vector:
+    """Whitened signatures of all that nobody knows better, one standard deviation each, (samples, unknowns).
 
     Parameters with a tolerance, and how late the nodes send.
     """
@@ -234,7 +234,7 @@ def scaled_case(case: Case, target: float) -> Case:
     if not case.hidden or not all(find(one.effect).scales for one in case.hidden):
         return replace(case, target_snr=target, reached=not case.hidden)
     base = logs(replace(case, hidden=()), clean=True)
-    imitations = _imitations(case)
+    imitations = unknowns(case)
     low, high, factor = 0.0, _largest_factor(case), min(1.0, _largest_factor(case))
     best = case
     for _ in range(CALIBRATION_ROUNDS):

@@ -24,8 +24,9 @@ from hil.study.estimate import first_guess
 from hil.study.linear import project, sums, track_columns
 from hil.study.noise import Frame, Noise, tracks_of
 from hil.study.prepare import prepare
-from hil.study.rig import Rig, Stack
+from hil.study.rig import Rig
 from hil.study.table import CHANNELS, MOTOR_DEMAND, PRESSURE_DEMAND, Floats, Log, make_log
+from hil.study.telling import Stack
 from hil.study.tied import APART, remaining, summed
 from hil.study.vehicle import Vehicle, paper_car
 from hil.study.world import World, nominal

@@ -6,30 +6,27 @@ from dataclasses import replace
 import numpy as np
 
 from hil.study.basis import LAWS, Piece
-from hil.study.behind import replayed, silent
-from hil.study.candidates import Candidate, Column, candidates, columns
 from hil.study.contest import Contender, Contest, elsewhere, odds, refitted, worth
 from hil.study.diagnosis import TIED, Diagnosis, Settings, causes_in
-from hil.study.fit import Fitter, Model, Tracks
+from hil.study.field import Field, number_of
+from hil.study.fit import Fitter, Model
 from hil.study.handed_in import Refitted, from_handed_in
 from hil.study.left_over import FORM, LeftOver
-from hil.study.linear import Sums, project, track_columns
 from hil.study.noise import Frame, Noise
 from hil.study.numbers import STRAINED, Numbers, strain
-from hil.study.onset import begins, price, with_onsets
+from hil.study.onset import price, with_onsets
 from hil.study.own_error import variance_of, variance_of_law
 from hil.study.prepare import Case
 from hil.study.race import LawRace, best_of_each, least_gain, with_law
 from hil.study.rig import Rig
 from hil.study.same_number import restated
-from hil.study.screen import Score, beside_best, inflation, leaders, not_testable, scores, threshold
-from hil.study.since import with_beginnings
+from hil.study.screen import Score, beside_best, inflation, leaders, not_testable, threshold
 from hil.study.table import Floats
 from hil.study.vehicle import Vehicle
 from hil.study.world import World
 
 Say = Callable[[str], None]
-PLAUSIBLE, LEADERS = 12, 5
+LEADERS = 5
 _CLEARER = 5.0
 """By how much more than the best listed cause a law in no list must explain, log of the odds."""
 _TRIED, _LAWS_TRIED = 10, 2
@@ -68,9 +65,7 @@ class _Search:
         self.rig = Rig(case, vehicle).quieted(base)
         self.frame = Frame.of(self.rig.case)
         self.numbers = Numbers(self.rig, self.frame, vehicle, base, settings.relinearise)
-        self.columns: list[Column] = columns(vehicle.untold)
-        self.candidates: list[Candidate] = candidates(self.columns)
-        self.effect_columns: Tracks = {}
+        self.field = Field(self.rig, self.frame, vehicle.untold)
         self.race: LawRace | None = None
         self.began_again = False
 
@@ -114,15 +109,20 @@ class _Search:
 
     def _screened(self, found: Diagnosis) -> None:
         """What each candidate explains where the numbers alone explain all they can, and so what is asked of one."""
-        self.say(f"sensitivities of {len(self.candidates)} candidates")
-        self.effect_columns, self.race = self._effect_columns(found.base), None
-        found.sums = self.fitter.screen(found.base, self.effect_columns, found.first_noise)
-        found.screened = self._scores(found.sums, found.base, found.first_noise)
+        self.say(f"sensitivities of {len(self.field.candidates)} candidates")
+        self._shown_at(found.base)
+        found.sums = self.fitter.screen(found.base, self.field.tracks, found.first_noise)
+        found.screened = self.field.scores(self.fitter, found.sums, found.base, found.first_noise)
         found.untestable = sorted({*not_testable(found.screened), *self.rig.vehicle.untold})
         found.looks = _independent(found.screened)
         held = self.fitter.at_their_end(found.base.z)
         found.inflation = inflation(beside_best(found.screened, found.sums, found.base.z, held))
         found.least_gain = threshold(found.looks, self.settings.alpha) * found.inflation
+
+    def _shown_at(self, model: Model) -> None:
+        """What candidates, and laws in no list, show is that at this model."""
+        self.field.taken_at(self.fitter, model)
+        self.race = None
 
     def _again(self, found: Diagnosis, model: Model, noise: Noise) -> tuple[Model, Noise]:
         """From numbers with which the causes of a model, or none, explain more than those the search went on from."""
@@ -130,7 +130,7 @@ class _Search:
         self.numbers.anew(model.z, model.terms)
         model, noise = self.numbers.fitted(self.fitter.at(model.z, model.terms, noise), noise)
         if model.terms:
-            self.effect_columns, self.race = self._effect_columns(model), None
+            self._shown_at(model)
         else:
             found.fitter, found.noise, found.first_noise = self.fitter, noise, noise
             found.base = found.final = model
@@ -169,29 +169,9 @@ class _Search:
         model, noise = self.fitter.settle(self.fitter.at(model.z, model.terms, noise), noise, 2)
         return model, noise, model.z
 
-    def _effect_columns(self, model: Model) -> Tracks:
-        world = self.fitter.world(model.z, model.terms)
-        base = model.stack
-        self.rig.keep(world)
-        worlds = [column.stepped(world) for column in self.columns]
-        return track_columns(self.rig, self.frame, base, worlds, [column.step for column in self.columns])
-
-    def _scores(self, sums: Sums, model: Model, noise: Noise) -> list[Score]:
-        accepted = len(model.terms)
-        held = self.fitter.at_their_end(model.z)
-        projected = project(sums.total(), sums.nuisances, range(accepted), model.z, held)
-        in_use = {id(term.candidate): term.value for term in model.terms}
-        now = [in_use.get(id(candidate), 0.0) for candidate in self.candidates]
-        found = scores(self.candidates, projected, accepted, now)
-        self.rig.keep(self.fitter.world(model.z, model.terms))
-        hidden = [item for item in found if silent(item)]
-        shown = Contest.at_once(lambda item: replayed(self.fitter, model, noise, item), hidden)
-        met = dict(zip(map(id, hidden), shown, strict=True))
-        return [met.get(id(item), item) for item in found]
-
     def _next(self, found: Diagnosis, model: Model, noise: Noise) -> Accepted | None:
         """The next cause, if one is beyond doubt; no contender where the numbers explain more without a further one."""
-        left = LeftOver(found.explained, self.fitter, model, noise, self.effect_columns)
+        left = LeftOver(found.explained, self.fitter, model, noise, self.field.tracks)
         least, leading = found.least_gain, self._leading(found, model, noise, left)
         if leading is None:
             return None
@@ -236,11 +216,11 @@ class _Search:
     ) -> tuple[Contest, list[Score], list[Contender]] | None:
         """The race for the next cause, its leaders and their fits; None where none can be beyond doubt."""
         bent, least = self._bent(model), found.least_gain
-        plausible = self._plausible(found, model, noise, bent)
+        plausible = self.field.plausible(self.fitter, found, model, noise, bent)
         if _most(plausible, left) < _HOPELESS * least:
             return None
         self.say(f"noise beside {len(plausible)} candidates")
-        contest = Contest(self.fitter, self.effect_columns, model, noise, self.settings.relinearise)
+        contest = Contest(self.fitter, self.field.tracks, model, noise, self.settings.relinearise)
         seen = contest.at_once(contest.profiled, plausible)
         beside = {id(item): quieter for item, quieter in seen}
         looked = [item for item, _ in seen]
@@ -261,22 +241,6 @@ class _Search:
         better = dict(zip(map(id, near), refound, strict=True))
         return [better.get(id(c), c) for c in fitted], without
 
-    def _plausible(self, found: Diagnosis, model: Model, noise: Noise, bent: bool) -> list[Score]:
-        """Candidates that explain most by one step and are not in the model yet."""
-        listed, sums = found.screened, found.sums
-        if model.terms:
-            sums = self.fitter.screen(model, self.effect_columns, noise)
-            listed = self._scores(sums, model, noise)
-        assert sums is not None  # screened before any cause is looked for
-        held, starts = self.fitter.at_their_end(model.z), begins(self.rig.case)
-        listed = with_beginnings(listed, sums, len(model.terms), model.z, held, starts, price(self.frame))
-        used = {_number(term.candidate) for term in model.terms}
-        listed = [item for item in listed if _number(item.candidate) not in used]
-        plausible = leaders(listed, PLAUSIBLE)
-        if bent:  # and which place is first is bent too
-            plausible = list(dict.fromkeys([*sorted(listed, key=lambda s: -s.evidence)[:PLAUSIBLE], *plausible]))
-        return plausible
-
     def _standing(self, fitted: list[Contender], clear: list[Contender], least: float) -> Contender | None:
         """The best that is beyond doubt, beside one that explains more and is not, too."""
         if not clear:
@@ -292,15 +256,15 @@ class _Search:
 
     def _placed(self, found: Diagnosis, best: Contender, clear: list[Contender]) -> tuple[Contender, list[Contender]]:
         """The best where it fits best: the screen knows the places only as well as the numbers stood."""
-        name = _number(best.term.candidate)
-        like = [item for item in found.screened if _number(item.candidate)[:2] == name[:2]]
+        name = number_of(best.term.candidate)
+        like = [item for item in found.screened if number_of(item.candidate)[:2] == name[:2]]
         least = _NEAR * max((item.raw for item in like if item.candidate is best.term.candidate), default=np.inf)
         places = [item.candidate for item in like if item.candidate is not best.term.candidate and item.raw >= least]
         if not self.settings.relinearise or not places:
             return best, clear
         self.say(f"{best.term.candidate.name} at other places")
         placed = [*clear, *elsewhere(self.fitter, best, places, True)]
-        better = [one for one in placed if _number(one.term.candidate)[:2] == name[:2] and odds(one) < odds(best)]
+        better = [one for one in placed if number_of(one.term.candidate)[:2] == name[:2] and odds(one) < odds(best)]
         return min(better, key=odds, default=best), placed
 
     def _since_when(self, fitted: list[Contender]) -> list[Contender]:
@@ -394,11 +358,6 @@ class _Search:
                 model = without
                 del found.contenders[k]
         found.final = model
-
-
-def _number(candidate: Candidate) -> tuple[str, str, str]:
-    """What tells a candidate from others."""
-    return candidate.effect.name, candidate.parameter.name, candidate.place
 
 
 def _most(listed: Sequence[Score], left: LeftOver) -> float:

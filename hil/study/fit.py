@@ -10,8 +10,9 @@ from hil.study.estimate import estimate, first_guess
 from hil.study.linear import Sums, solve_within, sums, track_columns
 from hil.study.noise import Frame, Noise, tracks_of, whiten
 from hil.study.nuisances import Nuisance
-from hil.study.rig import Rig, Stack
+from hil.study.rig import Rig
 from hil.study.table import Floats
+from hil.study.telling import Stack
 from hil.study.whiten import HUBER
 from hil.study.world import World
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.study.noise import Frame, Noise, tracks_of, whiten
-from hil.study.rig import Rig, Stack
+from hil.study.rig import Rig
 from hil.study.table import Floats
+from hil.study.telling import Stack
 from hil.study.whiten import HUBER
 from hil.study.world import World
 

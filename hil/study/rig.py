@@ -10,10 +10,11 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import savgol_filter
 
 from hil.study import acting
-from hil.study.latency import in_time, later
+from hil.study.latency import in_time
 from hil.study.prepare import ROW_S, SLOW_MPS, Case, Drive, Segment, averaged
-from hil.study.sensing import inverted, sensed, wheel_speed_before
+from hil.study.sensing import inverted, wheel_speed_before
 from hil.study.table import Floats
+from hil.study.telling import SOURCE, Stack, Telling, powers
 from hil.study.vehicle import Vehicle
 from hil.study.world import World, apart, told_alike
 from plant.effects.plugin import NO_PLUGINS
@@ -33,16 +34,6 @@ _QUICK_PA, _FOLLOWS_ROWS = 2e4, 20
 _OF_NOISE = 4.0
 _HARD_MPS2, _CREEPS_MPS = 5.0, 3.0
 DISC_K = 350.0
-_SUFFIX = ("fl", "fr", "rl", "rr")
-_SOURCE = {
-    "wheel": [f"state.wheel_speed_rad_s_{wheel}" for wheel in _SUFFIX],
-    "pressure": [f"state.pressure_pa_{wheel}" for wheel in _SUFFIX],
-    "motor": [f"state.motor_torque_nm_{wheel}" for wheel in _SUFFIX],
-    "ax": ["state.imu_longitudinal_mps2"],
-    "ay": ["state.imu_lateral_mps2"],
-    "yaw": ["state.imu_yaw_rate_rad_s"],
-    "gps": ["state.speed_mps"],
-}
 _SLOW = np.concatenate(
     [
         np.arange(STATE.size)[STATE.slice(name)]
@@ -53,15 +44,10 @@ _SLOW = np.concatenate(
     ]
 )  # fmt: skip
 """States that a segment hands on to a later one, beside the motion."""
-Stack = dict[str, Floats]
-"""Channels by group, (samples of all drives, channels)."""
-_NODE = {"ax": 0, "ay": 0, "yaw": 0, "pressure": 1, "motor": 2}
 _INPUTS = (("pressure", "pressure_pa"), ("motor", "motor_torque_nm"))
 _SMOOTH = 21  # rows of 10 ms
-_USUAL_RADIUS_M = 0.3
 _FADING_MPS, _LEAST_NM = 0.3, 1.0
 _GRADE, _TURNS_MPS2, _CHARACTERISTIC_MPS = 0.01, 0.3, (8.0, 200.0)
-_TOOTH_ROWS = 2.0
 
 
 def _radius_m(world: World) -> Floats:
@@ -87,25 +73,6 @@ class _Kept:
     world: World
     replays: list[_Replay]
     told: list[Stack]
-
-
-def _powers(speed_mps: Floats, characteristic_mps: float) -> tuple[Floats, Floats]:
-    """Powers of the speed that lateral acceleration and yaw rate go with at a given steering angle.
-
-    Of the linear single-track model, a_y = v^2 delta / (l (1 + v^2 / v_ch^2)) (Mitschke and Wallentowitz 2014,
-    Dynamik der Kraftfahrzeuge, sec. 27).
-    """
-    squared = (speed_mps / characteristic_mps) ** 2
-    return 2.0 / (1.0 + squared), (1.0 - squared) / (1.0 + squared)
-
-
-def _mean_over(values: Floats, window_rows2: float) -> Floats:
-    """Means over a window about each row, by their second derivative; ``window_rows2`` is its width, squared."""
-    if not window_rows2:
-        return values
-    mean = values.copy()
-    mean[1:-1] += window_rows2 / 24.0 * (values[2:] - 2.0 * values[1:-1] + values[:-2])
-    return mean
 
 
 def _at_once(drive: Drive) -> NDArray[np.int64]:
@@ -143,9 +110,10 @@ class Rig:
     """
 
     def __init__(self, case: Case, vehicle: Vehicle, characteristic_mps: float = np.inf) -> None:
-        self.case, self.vehicle, self._characteristic_mps = case, vehicle, characteristic_mps
+        self.case, self.vehicle = case, vehicle
+        self.telling = Telling(case.groups, vehicle.parameters, characteristic_mps)
         self._groups = case.groups
-        names = [name for group in case.groups for name in _SOURCE[group]]
+        names = [name for group in case.groups for name in SOURCE[group]]
         self._columns = column_indices(names)
         self._road = road_table(DRY)
         self._going_on = [
@@ -191,7 +159,7 @@ class Rig:
         """Torque of the simulated motors in the middle of each row, beyond the straight line to the next, (rows, 4)."""
         halves = np.repeat(drive.inputs, 2, axis=0)
         halves[1:-1:2, U.steering_wheel_rad :] += 0.5 * np.diff(drive.inputs[:, U.steering_wheel_rad :], axis=0)
-        columns = column_indices(_SOURCE["motor"])
+        columns = column_indices(SOURCE["motor"])
         table = np.empty((len(halves), len(columns)))
         simulate(
             self._start(drive, world, halves[0]), halves, self.case.cut, healthy(), world.p, self._road, ROW_S / 2, 1,
@@ -227,7 +195,7 @@ class Rig:
         share = faster / a["wheel"].mean(axis=1)[turning]
 
         def off(log_speed: float) -> float:
-            return float(np.sum(((b["ay"] - a["ay"])[turning, 0] - ay * share * _powers(v, np.exp(log_speed))[0]) ** 2))
+            return float(np.sum(((b["ay"] - a["ay"])[turning, 0] - ay * share * powers(v, np.exp(log_speed))[0]) ** 2))
 
         return float(np.exp(minimize_scalar(off, bounds=np.log(_CHARACTERISTIC_MPS), method="bounded").x))
 
@@ -245,7 +213,7 @@ class Rig:
         """Keep the motion of this world: others are simulated only where they can differ from it."""
         self._kept = None
         replays = [self._replayed(drive, world, self._columns) for drive in self.case.drives]
-        told = [self._told(d, world, one.table) for d, one in zip(self.case.drives, replays, strict=True)]
+        told = [self.telling.told(d, world, one.table) for d, one in zip(self.case.drives, replays, strict=True)]
         self._kept = _Kept(world, replays, told)
 
     def run_all(self, worlds: Sequence[World]) -> Iterator[Stack]:
@@ -290,7 +258,7 @@ class Rig:
         """Simulated channels of one drive; from what was kept where the worlds cannot differ."""
         kept = self._kept
         if kept is None:
-            return self._told(drive, world, self._replayed(drive, world, self._columns).table)
+            return self.telling.told(drive, world, self._replayed(drive, world, self._columns).table)
         needed, alike = apart(world, kept.world, drive), told_alike(world, kept.world)
         differs = [bool(needed & going_on) for going_on in self._going_on[drive.number]]
         if alike and not any(differs):
@@ -298,37 +266,7 @@ class Rig:
         replay = kept.replays[drive.number]
         if any(differs):
             replay = self._replayed(drive, world, self._columns, replay, differs, alike)
-        return self._told(drive, world, replay.table)
-
-    def _told(self, drive: Drive, world: World, table: Floats) -> Stack:
-        """Channels as sensors, frames and the tables of logs give what was noted."""
-        stack = sensed(self._split(table), world.theta_in(drive), ROW_S)
-        for group, values in stack.items():
-            late = world.late_s[_NODE[group]] if group in _NODE else 0.0
-            if late:
-                stack[group] = later(values, late / ROW_S, straight=group in ("pressure", "motor"))
-            elif group == "wheel":
-                seen = _mean_over(values, world.window_rows2)
-                stack[group] = later(seen, self._tooth_rows(values) * world.tooth_share)
-        found = {group: averaged(values, drive.stride) for group, values in stack.items()}
-        if "wheel" in found:
-            self._at_measured_speed(found, drive)
-        return found
-
-    def _tooth_rows(self, omega_rad_s: Floats) -> Floats:
-        """Half the time between two teeth, rows; two rows at most."""
-        pitch = 2.0 * np.pi / self.vehicle.parameters.sensor.teeth
-        return np.minimum(0.5 * pitch / np.fmax(np.abs(omega_rad_s), 0.1) / ROW_S, _TOOTH_ROWS)
-
-    def _at_measured_speed(self, found: Stack, drive: Drive) -> None:
-        """The turning of the car as it is at the measured speed."""
-        faster = np.nan_to_num(drive.measured["wheel"] - found["wheel"]).mean(axis=1)
-        turning = np.maximum(found["wheel"].mean(axis=1), SLOW_MPS / _USUAL_RADIUS_M)
-        share = np.clip(faster / turning, -0.2, 0.2)
-        powers = _powers(turning * self.vehicle.parameters.wheel.rolling_radius_m, self._characteristic_mps)
-        for group, power in zip(("ay", "yaw"), powers, strict=True):
-            if group in found:
-                found[group] *= (1.0 + power * share)[:, None]
+        return self.telling.told(drive, world, replay.table)
 
     def states(self, world: World, names: Sequence[str]) -> Floats:
         """States and outputs by name (`plant.model.column_indices`) over all drives, (rows, names)."""
@@ -337,16 +275,7 @@ class Rig:
 
     def _raw(self, drive: Drive, world: World) -> Stack:
         """What a world does in one drive, before any sensor."""
-        return self._split(self._replayed(drive, world, self._columns).table)
-
-    def _split(self, table: Floats) -> Stack:
-        stack: Stack = {}
-        at = 0
-        for group in self._groups:
-            width = len(_SOURCE[group])
-            stack[group] = table[:, at : at + width]
-            at += width
-        return stack
+        return self.telling.split(self._replayed(drive, world, self._columns).table)
 
     def _replayed(
         self, drive: Drive, world: World, columns: NDArray[np.int64], kept: _Replay | None = None,

@@ -1,0 +1,98 @@
+"""What sensors, frames and the tables of logs tell of a replay: channels as a log has them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hil.study.latency import later
+from hil.study.prepare import ROW_S, SLOW_MPS, Drive, averaged
+from hil.study.sensing import sensed
+from hil.study.table import Floats
+from hil.study.world import World
+from plant.parameters.plant import PlantParameters
+
+_WHEELS = ("fl", "fr", "rl", "rr")
+SOURCE = {
+    "wheel": [f"state.wheel_speed_rad_s_{wheel}" for wheel in _WHEELS],
+    "pressure": [f"state.pressure_pa_{wheel}" for wheel in _WHEELS],
+    "motor": [f"state.motor_torque_nm_{wheel}" for wheel in _WHEELS],
+    "ax": ["state.imu_longitudinal_mps2"],
+    "ay": ["state.imu_lateral_mps2"],
+    "yaw": ["state.imu_yaw_rate_rad_s"],
+    "gps": ["state.speed_mps"],
+}
+"""Columns of the plant that each group of channels tells of."""
+Stack = dict[str, Floats]
+"""Channels by group, (samples of all drives, channels)."""
+_NODE = {"ax": 0, "ay": 0, "yaw": 0, "pressure": 1, "motor": 2}
+_USUAL_RADIUS_M = 0.3
+_TOOTH_ROWS = 2.0
+
+
+@dataclass(frozen=True)
+class Telling:
+    """Channels of a case: which ``groups`` there are, the car's teeth and radius, the speed its turning goes with."""
+
+    groups: Sequence[str]
+    parameters: PlantParameters
+    characteristic_mps: float
+
+    def split(self, table: Floats) -> Stack:
+        """Columns of the plant, (rows, columns), by group."""
+        stack: Stack = {}
+        at = 0
+        for group in self.groups:
+            width = len(SOURCE[group])
+            stack[group] = table[:, at : at + width]
+            at += width
+        return stack
+
+    def told(self, drive: Drive, world: World, table: Floats) -> Stack:
+        """Channels as sensors, frames and the tables of logs give what was noted."""
+        stack = sensed(self.split(table), world.theta_in(drive), ROW_S)
+        for group, values in stack.items():
+            late = world.late_s[_NODE[group]] if group in _NODE else 0.0
+            if late:
+                stack[group] = later(values, late / ROW_S, straight=group in ("pressure", "motor"))
+            elif group == "wheel":
+                seen = _mean_over(values, world.window_rows2)
+                stack[group] = later(seen, self._tooth_rows(values) * world.tooth_share)
+        found = {group: averaged(values, drive.stride) for group, values in stack.items()}
+        if "wheel" in found:
+            self._at_measured_speed(found, drive)
+        return found
+
+    def _tooth_rows(self, omega_rad_s: Floats) -> Floats:
+        """Half the time between two teeth, rows; two rows at most."""
+        pitch = 2.0 * np.pi / self.parameters.sensor.teeth
+        return np.minimum(0.5 * pitch / np.fmax(np.abs(omega_rad_s), 0.1) / ROW_S, _TOOTH_ROWS)
+
+    def _at_measured_speed(self, found: Stack, drive: Drive) -> None:
+        """The turning of the car as it is at the measured speed."""
+        faster = np.nan_to_num(drive.measured["wheel"] - found["wheel"]).mean(axis=1)
+        turning = np.maximum(found["wheel"].mean(axis=1), SLOW_MPS / _USUAL_RADIUS_M)
+        share = np.clip(faster / turning, -0.2, 0.2)
+        both = powers(turning * self.parameters.wheel.rolling_radius_m, self.characteristic_mps)
+        for group, power in zip(("ay", "yaw"), both, strict=True):
+            if group in found:
+                found[group] *= (1.0 + power * share)[:, None]
+
+
+def powers(speed_mps: Floats, characteristic_mps: float) -> tuple[Floats, Floats]:
+    """Powers of the speed that lateral acceleration and yaw rate go with at a given steering angle.
+
+    Of the linear single-track model, a_y = v^2 delta / (l (1 + v^2 / v_ch^2)) (Mitschke and Wallentowitz 2014,
+    Dynamik der Kraftfahrzeuge, sec. 27).
+    """
+    squared = (speed_mps / characteristic_mps) ** 2
+    return 2.0 / (1.0 + squared), (1.0 - squared) / (1.0 + squared)
+
+
+def _mean_over(values: Floats, window_rows2: float) -> Floats:
+    """Means over a window about each row, by their second derivative; ``window_rows2`` is its width, squared."""
+    if not window_rows2:
+        return values
+    mean = values.copy()
+    mean[1:-1] += window_rows2 / 24.0 * (values[2:] - 2.0 * values[1:-1] + values[:-2])
+    return mean
