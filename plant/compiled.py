@@ -16,6 +16,8 @@ from typing import Any, TypeVar, cast
 import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
+PACKAGES = ("plant", "plant.parameters", "plant.effects", "plant.effects.sensing")
+"""Where the plant's sources are."""
 EFFECTS = os.environ.get("BRAKEBENCH_EFFECTS", "1") != "0"
 """False compiles the effects out: the build that the neutral one is compared with."""
 _nb: Any = numba  # whose options are declared in part
@@ -79,12 +81,17 @@ def entry(function: F) -> F:
     return cast(F, compiled)
 
 
+def digest(packages: tuple[str, ...], endings: tuple[str, ...] = (".py",)) -> str:
+    """SHA-256 of the source files of packages, their folders alone, in hexadecimal digits."""
+    found = hashlib.sha256()
+    for package in packages:
+        for file in sorted(resources.files(package).iterdir(), key=lambda item: item.name):
+            if file.name.endswith(endings):
+                found.update(file.read_bytes())
+    return found.hexdigest()
+
+
 @cache
 def _source_stamp() -> str:
-    """Digest of every source file of the plant."""
-    digest = hashlib.sha256(b"effects" if EFFECTS else b"")
-    for folder in ("plant", "plant.parameters", "plant.effects", "plant.effects.sensing"):
-        for file in sorted(resources.files(folder).iterdir(), key=lambda f: f.name):
-            if file.name.endswith(".py"):
-                digest.update(file.read_bytes())
-    return digest.hexdigest()
+    """Digest of every source file of the plant, and of which build it is."""
+    return digest(PACKAGES) + (" with effects" if EFFECTS else "")

@@ -10,7 +10,8 @@ import pytest
 from hil.hide.case import Case
 from hil.hide.cases import SEPARABLE, draw
 from hil.trials.run import run_case
-from hil.trials.sources import STUDIED, digest
+from hil.trials.sources import SOURCES, STUDIED
+from plant.compiled import digest
 
 COUNT, MOST_MISSES, MOST_ALARMS = 12, 2, 1
 SNR = 15.0
@@ -21,7 +22,7 @@ def drawn_seed() -> int:
     """From the sources; ``BRAKEBENCH_DRAWN_SEED`` repeats another one."""
     if "BRAKEBENCH_DRAWN_SEED" in os.environ:
         return int(os.environ["BRAKEBENCH_DRAWN_SEED"])
-    return int.from_bytes(digest(STUDIED)[:3], "big")
+    return int(digest(STUDIED, SOURCES)[:6], 16)
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """A digest of sources changes with them and with nothing else."""
 
-from hil.trials.sources import HIDDEN, STUDIED, digest, state
+from hil.trials.sources import HIDDEN, SOURCES, STUDIED, state
+from plant.compiled import digest
 
 
 def test_a_changed_source_changes_the_digest(tmp_path, monkeypatch) -> None:
@@ -17,5 +18,5 @@ def test_a_changed_source_changes_the_digest(tmp_path, monkeypatch) -> None:
 
 
 def test_the_state_is_that_of_study_and_hidden_car() -> None:
-    assert state() == digest(STUDIED + HIDDEN).hex()[:12]
+    assert state() == digest(STUDIED + HIDDEN, SOURCES)[:12]
     assert digest(STUDIED) != digest(HIDDEN)
