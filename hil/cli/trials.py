@@ -41,6 +41,12 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="instead: measure the model's own error on N null cases into FILE",
     )
     parser.add_argument(
+        "--apart",
+        type=Path,
+        metavar="FILE",
+        help="instead: measure which effects the hidden car can tell apart (d') into FILE",
+    )
+    parser.add_argument(
         "--out", type=Path, default=Path("trials"), metavar="DIR", help="cases, table and figure (default: trials)"
     )
     add_json(parser)
@@ -64,6 +70,11 @@ def run(args: argparse.Namespace) -> int:
 
         gains = measure(args.count, args.seed, _say)
         args.own_error.write_text(as_toml(ratios(gains), args.count, args.seed), encoding="utf-8")
+        return 0
+    if args.apart is not None:
+        from hil.trials import apart
+
+        args.apart.write_text(apart.as_toml(apart.measure(args.seed, _say), args.seed), encoding="utf-8")
         return 0
     families = FAMILIES if args.family is None else (args.family,)
     scored: dict[str, Any] = {}

@@ -4,13 +4,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from hil.trials import reading
+from hil.trials.apart import separable
 from hil.trials.metrics import Record
 
 _SURE = 8.0
 """Signal-to-noise ratio from which a single cause should be named."""
 _RIGHT: Mapping[str, Callable[[Record], bool]] = {
     "null": lambda r: not reading.answers(r),
-    "single": reading.is_top,
+    "single": lambda r: reading.is_top(r) or (reading.in_set(r) and not separable(r)),
     "onset": reading.is_top,
     "two": reading.is_exact,
     "three": reading.is_exact,

@@ -14,8 +14,9 @@ def _cause(effect: str, wheel: str, value: float, unit: str = "") -> dict[str, A
 
 def _record(hidden: list[dict[str, Any]], told: list[dict[str, Any]], **more: Any) -> dict[str, Any]:
     return {
-        "index": 4, "size": None, "reached": True, "hidden": hidden, "causes": told, "rivals": [], "not_testable": [],
-        "named": [cause["effect"] for cause in told], "verdict": "named" if told else "none",
+        "index": 4, "size": None, "noise": "low", "reached": True, "hidden": hidden, "causes": told,
+        "rivals": [], "not_testable": [], "named": [cause["effect"] for cause in told],
+        "verdict": "named" if told else "none",
     } | more  # fmt: skip
 
 
