@@ -34,17 +34,18 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="cases of a family; of single: at each signal-to-noise ratio, effects in turn (default: 12)",
     )
     add_seed(parser)
-    parser.add_argument(
+    instead = parser.add_mutually_exclusive_group()
+    instead.add_argument(
         "--own-error",
         type=Path,
         metavar="FILE",
         help="instead: measure the model's own error on N null cases into FILE",
     )
-    parser.add_argument(
+    instead.add_argument(
         "--apart",
         type=Path,
         metavar="FILE",
-        help="instead: measure which effects the hidden car can tell apart (d') into FILE",
+        help="instead: measure how far apart (d') the hidden car holds all effects into FILE",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("trials"), metavar="DIR", help="cases, table and figure (default: trials)"

@@ -11,6 +11,7 @@ import pytest
 from hil.hide.case import Hidden, make_case
 from hil.hide.cases import SEPARABLE, draw
 from hil.study.diagnosis import Settings
+from hil.trials.reading import in_set
 from hil.trials.run import run_case
 
 SEED = 7
@@ -66,10 +67,10 @@ def test_a_cause_that_begins_in_the_middle_is_named(index: int, effect: str) -> 
     assert record["named"] == [effect]
 
 
-@pytest.mark.xfail(strict=True, reason="tied, and a drag of the axle is told first")
-def test_rolling_resistance_of_an_axle_is_told_before_what_acts_alike() -> None:
-    record = run_case(draw("single", SINGLES.index("rolling_resistance"), 68, 15.0), 68, 15.0)
-    assert record["named"][:1] == ["rolling_resistance"]
+@pytest.mark.xfail(strict=True, reason="a drag of the axle is told alone")
+def test_rolling_resistance_of_an_axle_is_told_or_tied_with_what_acts_alike() -> None:
+    """Which is told first is not asked: they cannot be told apart (`hil.trials.apart`)."""
+    assert in_set(run_case(draw("single", SINGLES.index("rolling_resistance"), 68, 15.0), 68, 15.0))
 
 
 def _told_of_a_pair(settings: Settings | None = None) -> list[str]:
