@@ -12,7 +12,7 @@ import numpy as np
 from hil.errors import BrakebenchError
 from plant.effects.apply import SIZE
 from plant.effects.bank import NO_TERMS, Shape, Variable, term
-from plant.effects.effect import Effect, Scope
+from plant.effects.effect import NODES, Effect, Scope
 from plant.effects.joints import J
 from plant.effects.places import JOINTS
 from plant.effects.places import field as place
@@ -71,6 +71,8 @@ class Effects:
 
 
 NONE = Effects()
+_EARLY = (("timestamp_offset", "delay_s"), ("clock_drift", "share"))
+"""Numbers that, below 0, put a node's samples before they are taken: a log may show it, no running node can do it."""
 
 
 def plugin_table(effects: Theta) -> Vector:
@@ -115,7 +117,19 @@ def read_effects(tables: Mapping[str, Any], where: str) -> Effects:
             effects.set(theta, name, _filled(effects.effect(name), values, f"{where}.{name}"))
         except (KeyError, ValueError, TypeError) as error:
             raise EffectError(f"{where}.{name}: {error.args[0] if error.args else error}") from error
+    _refuse_early(effects, theta, where)
     return Effects(tuple(tables), theta, effects, terms, plugin_table(effects))
+
+
+def _refuse_early(effects: Theta, theta: Vector, where: str) -> None:
+    for name, number in _EARLY:
+        values = theta[effects.slice(name, number)]
+        if values.min() < 0.0:
+            node = NODES[int(values.argmin())]
+            raise EffectError(
+                f"{where}.{name}.{number}: expected 0 or more, got {values.min():g} ({node}): a running node cannot send a "
+                "sample before it is taken; leave it out, or make the other nodes late by as much"
+            )
 
 
 def read_laws(laws: Any, where: str) -> Vector:

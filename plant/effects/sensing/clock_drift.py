@@ -1,4 +1,4 @@
-"""One node's clock runs slow."""
+"""One node's clock runs slow, or fast."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from plant.layout import Vector
 
 
 def sense(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
-    """s'(t) = s(t - e t)."""
+    """s'(t) = s(t - e t); e below 0 needs whole arrays, no live node knows what comes."""
     return delayed(time_s, values, number["share"][:, NODES.index(node)] * np.maximum(time_s, 0.0), memory)
 
 
@@ -21,11 +21,11 @@ def undo(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Mem
 EFFECT = Effect(
     name="clock_drift",
     row=66,
-    title="One node's clock runs slow",
+    title="One node's clock runs slow, or fast",
     equation="s'(t) = s(t - e t)",
     joints=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
     scope=Scope.NODE,
-    parameters=(Parameter("share", "", 0.0, 0.002, 0.0005),),
+    parameters=(Parameter("share", "", -0.002, 0.002, 0.0005),),
     source="M: 20 to 100 ppm, 6 ms a minute; C: larger here, to be seen within a minute",
     signature="lag linear in the time of the log",
     manoeuvre="pressure_triangle",

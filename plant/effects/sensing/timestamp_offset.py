@@ -1,4 +1,4 @@
-"""One node's samples are older than their stamps."""
+"""One node's stamps are off: its samples are older than they say, or newer."""
 
 from plant.effects.effect import NODES, Effect, Parameter, Scope
 from plant.effects.sensing.delay import advanced, delayed
@@ -7,7 +7,7 @@ from plant.layout import Vector
 
 
 def sense(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
-    """s'(t) = s(t - d)."""
+    """s'(t) = s(t - d); d below 0 needs whole arrays, no live node knows what comes."""
     return delayed(time_s, values, number["delay_s"][:, NODES.index(node)], memory)
 
 
@@ -19,11 +19,11 @@ def undo(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Mem
 EFFECT = Effect(
     name="timestamp_offset",
     row=65,
-    title="One node's samples are older than their stamps",
+    title="One node's samples are older than their stamps, or newer",
     equation="s'(t) = s(t - d)",
     joints=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
     scope=Scope.NODE,
-    parameters=(Parameter("delay_s", "s", 0.0, 0.1, 0.02),),
+    parameters=(Parameter("delay_s", "s", -0.05, 0.1, 0.02),),
     source="M: 2 to 50 ms",
     signature="lag equal on all transients of one node",
     manoeuvre="pressure_steps",

@@ -56,6 +56,8 @@ def test_none_is_none():
         ({"pad_temp_fade": {"fade_1_k": "hot"}}, "a.toml: effects.pad_temp_fade"),
         ({"stuck_corner": {"at": ["left"]}}, "expected some of fl, fr, rl, rr"),
         ({"road_grade": {"grade": 2.0}}, "expected -0.2 to 0.2"),
+        ({"timestamp_offset": {"delay_s": {"imu": -0.004}}}, r"delay_s: expected 0 or more, got -0.004 \(imu\)"),
+        ({"clock_drift": {"share": {"motor": -1e-4}}}, r"share: expected 0 or more, got -0.0001 \(motor\)"),
     ],
 )
 def test_refusals_say_where_and_what(tables, error):
