@@ -127,8 +127,8 @@ def _refuse_early(effects: Theta, theta: Vector, where: str) -> None:
         if values.min() < 0.0:
             node = NODES[int(values.argmin())]
             raise EffectError(
-                f"{where}.{name}.{number}: expected 0 or more, got {values.min():g} ({node}): a running node cannot send a "
-                "sample before it is taken; leave it out, or make the other nodes late by as much"
+                f"{where}.{name}.{number}: expected 0 or more, got {values.min():g} ({node}): a running node cannot "
+                "send a sample before it is taken; leave it out, or make the other nodes late by as much"
             )
 
 

@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -69,14 +70,13 @@ def run(args: argparse.Namespace) -> int:
     if args.own_error is not None:
         from hil.trials.own_error import as_toml, measure, ratios
 
-        gains = measure(args.count, args.seed, _say)
-        args.own_error.write_text(as_toml(ratios(gains), args.count, args.seed), encoding="utf-8")
-        return 0
+        return _measured(
+            args.own_error, lambda: as_toml(ratios(measure(args.count, args.seed, _say)), args.count, args.seed)
+        )
     if args.apart is not None:
         from hil.trials import apart
 
-        args.apart.write_text(apart.as_toml(apart.measure(args.seed, _say), args.seed), encoding="utf-8")
-        return 0
+        return _measured(args.apart, lambda: apart.as_toml(apart.measure(args.seed, _say), args.seed))
     families = FAMILIES if args.family is None else (args.family,)
     scored: dict[str, Any] = {}
     singles: dict[tuple[int, float], Any] = {}
@@ -91,6 +91,16 @@ def run(args: argparse.Namespace) -> int:
     else:
         for family, entry in scored.items():
             print("\n".join(_lines(family, entry)))
+    return 0
+
+
+def _measured(path: Path, text: Callable[[], str]) -> int:
+    """Write what takes long to measure; a path that cannot be written is refused before."""
+    from hil.log.whole import written_whole
+
+    with written_whole(path, overwrite=True) as part:
+        part.touch()
+        part.write_text(text(), encoding="utf-8")
     return 0
 
 

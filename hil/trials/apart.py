@@ -1,16 +1,12 @@
 """How far apart causes are: d' of an effect and the listed one that comes nearest, by the hidden car's own equations.
 
-That the right effect is named first is asked only where effects can be told apart, from a d' of 4 on. ``apart.toml``
-holds d' for one car and drive of the full set (``brakebench trials --apart``), by effect, place, noise level and
-signal-to-noise ratio: the distance of two whitened signatures where the other effect has the size that brings it
-nearest, no tolerance or latency known better than the car's set states it.
+``apart.toml`` holds d' for one car and drive of the full set (``brakebench trials --apart``), by effect, place, noise
+level and signal-to-noise ratio: the distance of two whitened signatures where the other effect has the size that brings
+it nearest, no tolerance or latency known better than the car's set states it.
 """
 
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
-from importlib import resources
 from itertools import product
 
 import numpy as np
@@ -21,10 +17,7 @@ from hil.hide.cases import SEPARABLE
 from hil.hide.catalogue import Hideable, find
 from hil.hide.noise import LEVELS
 from hil.hide.snr import WHEELS, difference, signal_to_noise, whitened
-from hil.trials.metrics import Record
 
-SEPARATED = 4.0
-"""d' from which causes can be told apart."""
 _SIZES = (8.0, 15.0)
 """Signal-to-noise ratios at which the first name is asked for."""
 _NOTHING = 1e-6
@@ -137,20 +130,3 @@ def as_toml(found: Mapping[tuple[str, str, str], Mapping[float, Nearest]], seed:
     for (effect, place), rows in table.items():
         lines += [f"[{effect}.{place}]", *rows]
     return "\n".join(lines) + "\n"
-
-
-@cache
-def _table() -> Mapping[str, Mapping[str, Mapping[str, Mapping[str, tuple[float, str]]]]]:
-    source = resources.files("hil.trials") / "apart.toml"
-    return tomllib.loads(source.read_text(encoding="utf-8"))
-
-
-def separable(record: Record) -> bool:
-    """Whether the one cause a record hides can be told from every other, at the ratio it was asked for.
-
-    True where nobody measured it: below a ratio of 8.
-    """
-    (hidden,) = record["hidden"]
-    by_size = _table().get(hidden["effect"], {}).get(hidden["wheel"], {}).get(record["noise"], {})
-    told = by_size.get(f"at_{record['size']:g}")
-    return told is None or told[0] >= SEPARATED

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from hil.trials import reading
-from hil.trials.apart import separable
 from hil.trials.metrics import Record
+from hil.trials.separable import separable
 
 _SURE = 8.0
 """Signal-to-noise ratio from which a single cause should be named."""

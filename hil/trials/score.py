@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from hil.hide.catalogue import TWINS
-from hil.trials.apart import separable
 from hil.trials.calibration import calibration
 from hil.trials.detection import detection_limits
 from hil.trials.gain import gain, gain_of_oracle
@@ -26,6 +25,7 @@ from hil.trials.reading import (
     right_joint,
     right_law,
 )
+from hil.trials.separable import separable
 
 Records = Sequence[Record]
 
@@ -60,7 +60,7 @@ def _null(records: Records) -> Metrics:
 
 
 def _single(records: Records) -> Metrics:
-    """The first name is asked for where causes can be told apart (`hil.trials.apart`)."""
+    """The first name is asked for where causes can be told apart (`hil.trials.separable`)."""
     found: Metrics = {}
     for size in sorted({record["size"] for record in records}):
         of = _reached([record for record in records if record["size"] == size])

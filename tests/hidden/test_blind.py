@@ -59,6 +59,16 @@ def test_what_noise_had_taken_for_its_own_is_named(effect: str) -> None:
     assert record["named"][:1] == [effect]
 
 
+def test_stamps_that_are_too_early_are_named_and_within_their_interval() -> None:
+    """Wheel speeds 6.9 ms early were answered by less inertia on a heavier car: a stamp could only be late."""
+    record = run_case(draw("single", SINGLES.index("timestamp_offset"), 68, 15.0), 68, 15.0)
+    early = record["hidden"][0]["parameters"]["time_s"]["value"]
+    assert early < 0.0
+    assert record["named"] == ["timestamp_offset"]
+    low, high = record["causes"][0]["parameters"]["delay_s"]["ci95"]
+    assert low < early < high
+
+
 @pytest.mark.parametrize(("index", "effect"), [(0, "water"), (2, "clock_drift")])
 def test_a_cause_that_begins_in_the_middle_is_named(index: int, effect: str) -> None:
     """They were answered by a law in no list, and ``none``: the race took them for what was always there."""
@@ -69,7 +79,7 @@ def test_a_cause_that_begins_in_the_middle_is_named(index: int, effect: str) -> 
 
 @pytest.mark.xfail(strict=True, reason="a drag of the axle is told alone")
 def test_rolling_resistance_of_an_axle_is_told_or_tied_with_what_acts_alike() -> None:
-    """Which is told first is not asked: they cannot be told apart (`hil.trials.apart`)."""
+    """Which is told first is not asked: they cannot be told apart (`hil.trials.separable`)."""
     assert in_set(run_case(draw("single", SINGLES.index("rolling_resistance"), 68, 15.0), 68, 15.0))
 
 

@@ -6,6 +6,7 @@ import json
 import pytest
 
 from hil.cli import trials
+from hil.errors import BrakebenchError
 from hil.trials.run import plan
 
 
@@ -46,6 +47,30 @@ def test_json_stands_alone_and_files_are_written(tmp_path, capsys):
     assert single["detection_limits"] == {"road_grade": 8.0}
     assert json.loads((tmp_path / "table.json").read_text()) == told
     assert (tmp_path / "confusion.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("option", ["--own-error", "--apart"])
+def test_a_file_that_cannot_be_written_is_refused_before_anything_is_measured(option, tmp_path, monkeypatch):
+    def never(*_):
+        raise AssertionError("measured")
+
+    monkeypatch.setattr("hil.trials.own_error.measure", never)
+    monkeypatch.setattr("hil.trials.apart.measure", never)
+    path = tmp_path / "nowhere" / "measured.toml"
+    with pytest.raises(BrakebenchError, match=r"measured.toml.*cannot be written"):
+        run(option, path)
+
+
+def test_a_measurement_that_breaks_leaves_the_file_as_it_was(tmp_path, monkeypatch):
+    def breaks(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("hil.trials.apart.measure", breaks)
+    path = tmp_path / "measured.toml"
+    path.write_text("before")
+    with pytest.raises(KeyboardInterrupt):
+        run("--apart", path)
+    assert [p.read_text() for p in tmp_path.iterdir()] == ["before"]
 
 
 def test_families_run_one_by_one_share_a_table(tmp_path, capsys):

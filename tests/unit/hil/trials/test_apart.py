@@ -1,14 +1,11 @@
 """How far apart causes are: the nearest of all others, and what the table says of a record."""
 
 import tomllib
-from typing import Any
 
 import numpy as np
 import pytest
 
-from hil.hide.cases import SEPARABLE
-from hil.hide.noise import LEVELS
-from hil.trials.apart import Signature, as_toml, nearest, separable
+from hil.trials.apart import Signature, as_toml, nearest
 
 
 def _signatures(bounds: tuple[float, float] = (-10.0, 10.0)) -> list[Signature]:
@@ -40,24 +37,3 @@ def test_the_file_reads_back_and_says_how_it_was_made() -> None:
     text = as_toml({("a", "fl", "low"): {8.0: (2.0, "b@fl"), 15.0: (3.75, "b@car")}}, 7)
     assert tomllib.loads(text) == {"a": {"fl": {"low": {"at_8": [2.0, "b@fl"], "at_15": [3.8, "b@car"]}}}}
     assert "--apart FILE --seed 7" in text
-
-
-def _record(effect: str, wheel: str, size: float = 15.0, noise: str = "low") -> dict[str, Any]:
-    return {"hidden": [{"effect": effect, "wheel": wheel}], "size": size, "noise": noise}
-
-
-def test_a_drag_and_the_rolling_resistance_of_an_axle_are_one_but_a_grade_and_the_mass_stand_alone() -> None:
-    for noise in LEVELS:
-        assert not separable(_record("rolling_resistance", "front", noise=noise))
-        assert not separable(_record("residual_drag", "front", noise=noise))
-        assert separable(_record("road_grade", "car", noise=noise))
-        assert separable(_record("mass_offset", "car", 8.0, noise))
-
-
-def test_every_effect_of_the_family_was_measured_and_ratios_that_nothing_is_asked_of_were_not() -> None:
-    from hil.trials.apart import _table
-
-    assert {(e, w) for e, wheels in _table().items() for w in wheels} == {
-        (k.name, w) for k in SEPARABLE for w in k.where
-    }
-    assert separable(_record("rolling_resistance", "front", 5.0))

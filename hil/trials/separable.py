@@ -1,0 +1,31 @@
+"""Where the right effect must be named first: where it can be told apart from every other, from a d' of 4 on.
+
+``apart.toml`` says so of every effect, place, noise level and signal-to-noise ratio (`hil.trials.apart` measures it).
+"""
+
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+
+from hil.trials.metrics import Record
+
+SEPARATED = 4.0
+"""d' from which causes can be told apart."""
+
+
+@cache
+def _table() -> Mapping[str, Mapping[str, Mapping[str, Mapping[str, tuple[float, str]]]]]:
+    source = resources.files("hil.trials") / "apart.toml"
+    return tomllib.loads(source.read_text(encoding="utf-8"))
+
+
+def separable(record: Record) -> bool:
+    """Whether the one cause a record hides can be told from every other, at the ratio it was asked for.
+
+    True where nobody measured it: below a ratio of 8.
+    """
+    (hidden,) = record["hidden"]
+    by_size = _table().get(hidden["effect"], {}).get(hidden["wheel"], {}).get(record["noise"], {})
+    told = by_size.get(f"at_{record['size']:g}")
+    return told is None or told[0] >= SEPARATED
