@@ -1,7 +1,7 @@
 """Effects in scenarios, and effects that others add through the entry-point group ``brakebench.effects``."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cache
 from importlib.metadata import entry_points
@@ -68,6 +68,23 @@ class Effects:
     def for_node(self) -> dict[str, Any]:
         """Keyword arguments of `plant.node.PlantNode`."""
         return {"theta": self.theta, "layout": self.layout, "terms": self.terms, "plugins": self.plugins}
+
+    def number(self, effect: str, parameter: str) -> Vector:
+        """Values of a parameter of an effect, one for each of its members."""
+        return self.theta[self.layout.slice(effect, parameter)]
+
+    def without(self, *joints: str) -> "Effects":
+        """The others, where those that act at some of these joints are taken out, laws of one variable included."""
+        theta, neutral = self.theta.copy(), self.layout.neutral()
+        out = [effect for effect in self.layout.effects if set(effect.joints) & set(joints)]
+        for effect in out:
+            for name in ("onset_s", "until_s", *(parameter.name for parameter in effect.parameters)):
+                where = self.layout.slice(effect.name, name)
+                theta[where] = neutral[where]
+        at = {int(getattr(J, place(joint))) for joint in joints}
+        kept = [row for row in self.terms if int(row[0]) - (int(row[1]) if row[2] > 0.5 else 0) not in at]
+        on = tuple(name for name in self.on if name not in {effect.name for effect in out})
+        return replace(self, on=on, theta=theta, terms=np.array(kept) if kept else NO_TERMS.copy())
 
 
 NONE = Effects()

@@ -29,6 +29,13 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--out", type=Path, metavar="DIR", help="write the report and the figures")
     parser.add_argument("--seeds", type=int, default=20, metavar="N", help="seeds of the noise (default: 20)")
     parser.add_argument("--keep", type=Path, metavar="FILE", help="keep what is measured, go on from what is there")
+    parser.add_argument(
+        "--extend",
+        type=Path,
+        metavar="FILE",
+        help="extension that `explain` wrote: drive the paper's car with what it taught beside the nominal one, "
+        "not the nine other conditions",
+    )
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -39,14 +46,17 @@ def run(args: argparse.Namespace) -> int:
         raise BrakebenchError(f"--seeds: expected at least 1, got {args.seeds}")
     from hil.reproduce.identification import identification_rows, shipped_study
     from hil.reproduce.store import Store
-    from hil.reproduce.study import measure
+    from hil.reproduce.study import conditions_of, measure
 
     def say(line: str) -> None:
         print(line, file=sys.stderr, flush=True)
 
-    store = Store(args.keep)
+    conditions_of(args.extend)  # refuses a file that no car can have before anything is driven
+    store = Store(args.keep, args.extend)
     say("identifying the pad friction (Figures 3 to 5) ...")
-    rows = identification_rows(shipped_study()) + measure(args.seeds, len(os.sched_getaffinity(0)), say, store)
+    rows = identification_rows(shipped_study()) + measure(
+        args.seeds, len(os.sched_getaffinity(0)), say, store, args.extend
+    )
     if args.out is not None:
         _write(args.out, rows)
     if args.json:

@@ -2,15 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dbc.bench_messages import PhysicalFault
 from ecu.parameters.ecu import EcuParameters
+from hil.effects import NONE, Effects
 from hil.parameters import override
 from hil.reproduce import manoeuvres
-from hil.reproduce.conditions import Condition
+from hil.reproduce.conditions import BRAKE, Condition
 from hil.reproduce.runs import Fault, Run, Vector, drive, ecu_parameters, plant_parameters
 from plant.manoeuvre import Manoeuvre
 from plant.parameters.plant import PlantParameters
@@ -38,15 +40,17 @@ def with_pads(plant: PlantParameters, factor: float) -> PlantParameters:
     return override(plant, {"pad": {"a_1_ks": plant.pad.a_1_ks * factor}}, "pads")
 
 
-def ideal(manoeuvre: Manoeuvre, plant: PlantParameters, seed: int, alpha: float) -> Run:
+def ideal(manoeuvre: Manoeuvre, plant: PlantParameters, seed: int, alpha: float, effects: Effects = NONE) -> Run:
     """The run without disturbance: same car and actuators, brake exactly nominal, mass and radius known exactly."""
     nominal, ecu = plant_parameters(), method(enabled=False)
     pads = replace(plant.pad, a_1_ks=0.0, b_1_j=0.0)  # the friction stays at its start value
-    known = {"mass_kg": plant.vehicle.mass_kg}
-    known |= dict.fromkeys(("rolling_radius_m", "force_arm_m"), plant.wheel.rolling_radius_m)
+    radius_m = plant.wheel.rolling_radius_m * (1.0 + float(effects.number("tyre_radius", "gain").mean()))
+    known = {"mass_kg": plant.vehicle.mass_kg + float(effects.number("mass_offset", "mass_kg")[0])}
+    known |= dict.fromkeys(("rolling_radius_m", "force_arm_m"), radius_m)
     knows = override(ecu, {"vehicle": known, "joint_filter": {"start_mass": 1e-5}}, "ideal")
     manoeuvre = replace(manoeuvre, initial_pad_friction=ecu.friction_brake.pad_friction)
-    return drive(manoeuvre, replace(plant, pad=pads, friction_brake=nominal.friction_brake), knows, seed, alpha)
+    car = replace(plant, pad=pads, friction_brake=nominal.friction_brake)
+    return drive(manoeuvre, car, knows, seed, alpha, effects=effects.without(*BRAKE))
 
 
 def onset(run: Run, after_s: float = 0.0) -> int:
@@ -69,32 +73,35 @@ def estimation(condition: Condition, seed: int) -> Numbers:
     """Figures 9 and 11: wheel torque and pad friction of the front left wheel, and the worst wheel."""
     out: Numbers = {}
     plant = condition.plant(plant_parameters(), seed)
+    driven = partial(drive, effects=condition.effects)
     true = np.repeat(condition.friction, 2)
     for name in ("joint", "paper"):
         for alpha in ESTIMATION_ALPHAS:
-            run = drive(manoeuvres.stop(condition.road()), plant, method(name), seed, alpha)
+            run = driven(manoeuvres.stop(condition.road()), plant, method(name), seed, alpha)
             k = braking(run)
             error = run.estimated_torque_nm[k] - run.wheel_torque_nm[k]
-            friction = run.estimated_friction[k] / (run.pad_friction[k] * true) - 1.0
             share = [rms(error[:, w]) / np.abs(run.wheel_torque_nm[k, w]).mean() for w in range(4)]
             out[f"{name} torque {alpha:g}"] = 100.0 * share[0]
             out[f"{name} torque Nm {alpha:g}"] = rms(error[:, 0])
-            out[f"{name} friction {alpha:g}"] = 100.0 * rms(friction[:, 0])
-            out[f"{name} friction worst {alpha:g}"] = 100.0 * max(rms(friction[:, w]) for w in range(4))
+            if condition.tells_friction:
+                friction = run.estimated_friction[k] / (run.pad_friction[k] * true) - 1.0
+                out[f"{name} friction {alpha:g}"] = 100.0 * rms(friction[:, 0])
+                out[f"{name} friction worst {alpha:g}"] = 100.0 * max(rms(friction[:, w]) for w in range(4))
     return out
 
 
 def patch(condition: Condition, seed: int) -> Numbers:
     """Figure 10: eight metres of friction 0.2 in the stop, with and without the correction for the road."""
     plant = condition.plant(plant_parameters(), seed)
-    dry = drive(manoeuvres.stop(condition.road()), plant, method(), seed)
+    driven = partial(drive, effects=condition.effects)
+    dry = driven(manoeuvres.stop(condition.road()), plant, method(), seed)
     start_m = float(np.cumsum(dry.speed_mps)[onset(dry)]) * 0.01 + manoeuvres.PATCH_AFTER_M
     road = condition.road(((start_m, manoeuvres.PATCH_FRICTION), (start_m + manoeuvres.PATCH_LENGTH_M, 1.0)))
     out: Numbers = {}
     for name in ("joint", "paper"):
         error: dict[bool, float] = {}
         for corrected in (True, False):
-            run = drive(manoeuvres.stop(road), plant, method(name, road=corrected), seed)
+            run = driven(manoeuvres.stop(road), plant, method(name, road=corrected), seed)
             k = braking(run)
             off = np.abs(run.estimated_torque_nm[k, 0] - run.wheel_torque_nm[k, 0])
             error[corrected] = rms(off)
@@ -122,17 +129,18 @@ def compensation(condition: Condition, seed: int) -> Numbers:
     """Figures 12 and 13: torque error with and without compensation, four blending factors, three sets of pads."""
     out: Numbers = {}
     plant = condition.plant(plant_parameters(), seed)
+    driven = partial(drive, effects=condition.effects)
     manoeuvre = manoeuvres.stop(condition.road())
     for alpha in ALPHAS:
-        best = ideal(manoeuvre, plant, seed, alpha)
+        best = ideal(manoeuvre, plant, seed, alpha, condition.effects)
         for name, factor in PADS.items():
             pads = with_pads(plant, factor)
-            without = torque_error(drive(manoeuvre, pads, method(enabled=False), seed, alpha), best)
+            without = torque_error(driven(manoeuvre, pads, method(enabled=False), seed, alpha), best)
             out[f"without {name} {alpha:g}"] = without
             for prefix, observer in (("", "joint"), ("paper ", "paper")):
                 if observer == "paper" and alpha not in (0.0, 0.7):
                     continue
-                error = torque_error(drive(manoeuvre, pads, method(observer), seed, alpha), best)
+                error = torque_error(driven(manoeuvre, pads, method(observer), seed, alpha), best)
                 out[f"{prefix}with {name} {alpha:g}"] = error
                 out[f"{prefix}cut {name} {alpha:g}"] = 100.0 * (1.0 - error / without)
                 out[f"{prefix}worse {name} {alpha:g}"] = error - without
@@ -155,14 +163,15 @@ def series(condition: Condition, seed: int) -> Numbers:
     """Figures 14 and 15: slope of deceleration over pedal at each stop, against the ideal run's, %."""
     out: Numbers = {}
     plant = condition.plant(plant_parameters(), seed)
+    driven = partial(drive, effects=condition.effects)
     manoeuvre = manoeuvres.series(condition.road())
     for alpha in (0.0, 0.7):
-        best = slopes(ideal(manoeuvre, plant, seed, alpha))
+        best = slopes(ideal(manoeuvre, plant, seed, alpha, condition.effects))
         for name in ("joint", "paper"):
             worst = np.zeros(3)
             for factor in (0.8, 1.25):
                 pads = with_pads(plant, factor)
-                mine = slopes(drive(manoeuvre, pads, method(name), seed, alpha))
+                mine = slopes(driven(manoeuvre, pads, method(name), seed, alpha))
                 worst = np.maximum(worst, np.abs(np.array(mine) / np.array(best) - 1.0))
             out[f"{name} stop 1 {alpha:g}"] = 100.0 * float(worst[0])
             out[f"{name} later {alpha:g}"] = 100.0 * float(worst[1:].max())
@@ -190,17 +199,18 @@ def failures(condition: Condition, seed: int) -> Numbers:
     """Motors lost and battery full in the middle of a stop at alpha 0.7."""
     out: Numbers = {}
     plant = condition.plant(plant_parameters(), seed)
+    driven = partial(drive, effects=condition.effects)
     at = manoeuvres.FAULT_AT_S
     for name, wheels in (("one", 0b0001), ("axle", 0b0011), ("all", 0b1111)):
         fault = Fault(PhysicalFault.MOTOR_DEAD, wheels, at)
-        run = drive(manoeuvres.stop(condition.road()), plant, method(), seed, 0.7, (fault,))
+        run = driven(manoeuvres.stop(condition.road()), plant, method(), seed, 0.7, (fault,))
         out |= {f"{name} {key}": value for key, value in dips(run, at, condition.grade).items()}
     at += 0.01 * (seed % 10)  # the battery speaks every 0.1 s: any moment between
     refuses = Fault(PhysicalFault.BATTERY_REFUSES_CHARGE, 0, at)
     for name, vehicle in (("announced", plant), ("at once", without_notice(plant))):
-        run = drive(manoeuvres.stop(condition.road()), vehicle, method(), seed, 0.7, (refuses,))
+        run = driven(manoeuvres.stop(condition.road()), vehicle, method(), seed, 0.7, (refuses,))
         out |= {f"{name} {key}": value for key, value in dips(run, at, condition.grade).items()}
-    run = drive(full_battery(condition), small_battery(plant), method(), seed, 0.7)
+    run = driven(full_battery(condition), small_battery(plant), method(), seed, 0.7)
     out["full depth"] = dips(run, run.time_s[onset(run)] + SETTLED_S, condition.grade)["depth"]
     return out
 
@@ -223,20 +233,22 @@ def full_battery(condition: Condition) -> Manoeuvre:
 def weak_pads(condition: Condition, seed: int) -> Numbers:
     """Pads x0.7, two stops: error of the estimate in the first, deceleration of the second, with and without."""
     plant = with_pads(condition.plant(plant_parameters(), seed), WEAK)
+    driven = partial(drive, effects=condition.effects)
     out: Numbers = {}
     true = np.repeat(condition.friction, 2)
     for name, ecu in (("with", method()), ("paper", method("paper")), ("without", method(enabled=False))):
-        run = drive(manoeuvres.two_stops(condition.road()), plant, ecu, seed)
+        run = driven(manoeuvres.two_stops(condition.road()), plant, ecu, seed)
         second = onset(run, manoeuvres.STOP_AT_S + 10.0)
         k = slice(second + 60, second + 460)
         hill = GRAVITY_MPS2 * condition.grade  # as in `dips`
         braked = float(np.mean(-run.acceleration_mps2[k])) - hill
         reached = 100.0 * (braked / float(np.mean(run.demanded_mps2[k])) - 1.0)
         out[f"{name} second"] = abs(reached)
-        first = onset(run)
-        at = slice(first + 150, first + 430)
-        error = run.estimated_friction[at] / (run.pad_friction[at] * true) - 1.0
-        out[f"{name} estimate"] = 100.0 * float(np.abs(error.mean(axis=0)).max())
+        if condition.tells_friction:
+            first = onset(run)
+            at = slice(first + 150, first + 430)
+            error = run.estimated_friction[at] / (run.pad_friction[at] * true) - 1.0
+            out[f"{name} estimate"] = 100.0 * float(np.abs(error.mean(axis=0)).max())
     return out
 
 
@@ -251,10 +263,11 @@ def shift(condition: Condition, seed: int) -> Numbers:
     Without it the blending factor stays what was asked; the compensation works in both.
     """
     plant = with_pads(condition.plant(plant_parameters(), seed), WEAK)
+    driven = partial(drive, effects=condition.effects)
     manoeuvre = manoeuvres.series(condition.road())
-    best = slopes(ideal(manoeuvre, plant, seed, SHIFT_ALPHA))
+    best = slopes(ideal(manoeuvre, plant, seed, SHIFT_ALPHA, condition.effects))
     controllers = (("", method()), ("no ", unshifted()))
-    runs = {name: drive(manoeuvre, plant, ecu, seed, SHIFT_ALPHA) for name, ecu in controllers}
+    runs = {name: driven(manoeuvre, plant, ecu, seed, SHIFT_ALPHA) for name, ecu in controllers}
     out: Numbers = {}
     for name, run in runs.items():
         rise = run.disc_temperature_k[:, 0] - run.disc_temperature_k[0, 0]

@@ -1,16 +1,23 @@
 """The worlds that the claims are tried in: the nominal one, each thing the controller does not know, all at once."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
+from hil.effects import NONE, Effects
 from hil.parameters import override
+from hil.scenario import load_scenario
+from hil.study.extended import extended_scenario
 from plant.parameters.plant import PlantParameters
 from plant.road import RoadSegment
 
 MOTOR_GAIN = 0.02
 ACCELERATION_OFFSET_MPS2 = 0.02
+BRAKE = ("friction.mu", "brake.torque")
+"""Joints of the friction brake: what acts there is what compensation is to make up for."""
 
 
 @dataclass(frozen=True)
@@ -23,6 +30,7 @@ class Condition:
     grade : of the road, rise over run.
     friction : true friction of the pads on each axle over what the pads alone have, as seen through the controller's
         nominal brake geometry.
+    car : the set that ``factors`` and ``values`` change, None for the paper's.  effects : what it has besides.
     """
 
     name: str
@@ -30,9 +38,18 @@ class Condition:
     values: dict[str, dict[str, Any]] = field(default_factory=dict)
     grade: float = 0.0
     friction: tuple[float, float] = (1.0, 1.0)
+    car: PlantParameters | None = None
+    effects: Effects = NONE
+
+    @property
+    def tells_friction(self) -> bool:
+        """Whether what the pads alone have says what friction acts: not where an effect is between the two."""
+        other = self.effects.without(*BRAKE)
+        return np.array_equal(other.theta, self.effects.theta) and len(other.terms) == len(self.effects.terms)
 
     def plant(self, nominal: PlantParameters, seed: int) -> PlantParameters:
         """The plant of one seed: this condition, and the spread that sensors have in every condition."""
+        nominal = self.car or nominal
         rng = np.random.default_rng([seed, 7])
         changes: dict[str, dict[str, Any]] = {}
         for table, entries in self.factors.items():
@@ -44,7 +61,9 @@ class Condition:
             changes.setdefault(table, {}).update(entries_)
         constant = nominal.motor.torque_constant_nm_a * (1.0 + rng.uniform(-MOTOR_GAIN, MOTOR_GAIN))
         changes.setdefault("motor", {})["torque_constant_nm_a"] = constant
-        offset = changes.setdefault("sensor", {}).get("acceleration_offset_mps2", (0.0, 0.0))
+        offset = changes.setdefault("sensor", {}).get(
+            "acceleration_offset_mps2", nominal.sensor.acceleration_offset_mps2
+        )
         changes["sensor"]["acceleration_offset_mps2"] = (
             offset[0] + ACCELERATION_OFFSET_MPS2 * float(rng.standard_normal()),
             offset[1],
@@ -85,3 +104,16 @@ CONDITIONS = (
         friction=(0.97, 0.97 * 0.8),
     ),
 )
+
+
+def taught(extension: Path) -> Condition:
+    """The paper's car with what a diagnosis taught.
+
+    Raises
+    ------
+    hil.study.table.UnusableError, hil.scenario_table.ScenarioError, hil.effects.EffectError
+        An extension file that cannot be used, or nothing in it that a simulated car can have.
+    """
+    with TemporaryDirectory() as folder:
+        scenario = load_scenario(str(extended_scenario("stop72", extension, Path(folder))))
+    return Condition(f"as {extension.name} taught", car=scenario.plant, effects=scenario.effects)

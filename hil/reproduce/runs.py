@@ -25,6 +25,7 @@ from dbc.frame import Frame, Received
 from dbc.messages import EhbPressureFront, EhbPressureRear
 from ecu.node import EcuNode
 from ecu.parameters.ecu import EcuParameters
+from hil.effects import NONE, Effects
 from hil.parameters import load_set
 from hil.rt.lockstep import Member, lockstep
 from plant.manoeuvre import Manoeuvre
@@ -121,15 +122,16 @@ def drive(
     seed: int,
     blending: float = 0.0,
     faults: tuple[Fault, ...] = (),
+    effects: Effects = NONE,
 ) -> Run:
     """Drive one manoeuvre to its end and return its samples.
 
     Parameters
     ----------
     plant, ecu : parameter sets of the two nodes.  seed : of the sensors' noise.
-    blending : factor alpha set on the bench bus.
+    blending : factor alpha set on the bench bus.  effects : what the car has that its set does not state.
     """
-    vehicle, controller = PlantNode(plant, manoeuvre, seed), EcuNode(ecu)
+    vehicle, controller = PlantNode(plant, manoeuvre, seed, **effects.for_node()), EcuNode(ecu)
     members = [
         Member(vehicle, TICK_NS),
         Member(controller, TICK_NS),

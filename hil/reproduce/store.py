@@ -2,11 +2,11 @@
 
 import hashlib
 import json
-from importlib import resources
 from pathlib import Path
 
 from hil.errors import BrakebenchError
 from hil.reproduce.cases import Numbers
+from plant.compiled import PACKAGES, digest
 
 Job = tuple[str, int, int]  # case, number of the condition, seed
 
@@ -17,6 +17,7 @@ class Store:
     Parameters
     ----------
     path : file to go on with (made where there is none); None keeps nothing beyond this run.
+    extension : file of the car that is driven beside the nominal one, see `hil.reproduce.study.measure`.
 
     Raises
     ------
@@ -24,12 +25,14 @@ class Store:
         Where the file cannot be used: no such store, or numbers of other sources.
     """
 
-    def __init__(self, path: Path | None = None) -> None:
+    def __init__(self, path: Path | None = None, extension: Path | None = None) -> None:
         self.numbers: dict[Job, Numbers] = {}
         self._path = path
         if path is None:
             return
         stamp = {"sources": sources()}
+        if extension is not None:
+            stamp["extension"] = hashlib.sha256(extension.read_bytes()).hexdigest()[:16]
         try:
             if not path.exists():
                 path.write_text(json.dumps(stamp) + "\n", encoding="utf-8")
@@ -59,19 +62,5 @@ class Store:
 
 def sources() -> str:
     """Digest of all that decides the numbers: contract, controller, plant, and the cases here."""
-    digest = hashlib.sha256()
-    for package in (
-        "dbc",
-        "ecu",
-        "ecu.law",
-        "ecu.law.joint",
-        "ecu.parameters",
-        "plant",
-        "plant.parameters",
-        "hil.rt",
-        "hil.reproduce",
-    ):
-        for file in sorted(resources.files(package).iterdir(), key=lambda f: f.name):
-            if file.name.endswith((".py", ".toml", ".dbc")):
-                digest.update(file.read_bytes())
-    return digest.hexdigest()[:16]
+    measured = ("ecu", "ecu.law", "ecu.law.joint", "ecu.parameters", *PACKAGES, "hil.rt", "hil.reproduce")
+    return digest(("dbc", *measured), (".py", ".toml", ".dbc"))[:16]

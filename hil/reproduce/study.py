@@ -2,14 +2,15 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
+from pathlib import Path
 
 import numpy as np
 
 from hil.process import worker_pool
 from hil.reproduce.cases import CASES, Numbers
 from hil.reproduce.claims import CLAIMS, Claim
-from hil.reproduce.conditions import CONDITIONS, Condition
+from hil.reproduce.conditions import CONDITIONS, NOMINAL, Condition, taught
 from hil.reproduce.store import Job, Store
 
 DEGRADED = 2.0
@@ -38,13 +39,21 @@ class Row:
     degradation: float | None
 
 
-def job(what: Job) -> Numbers:
+@cache
+def conditions_of(extension: Path | None) -> tuple[Condition, ...]:
+    """What is driven: the paper's conditions, or the nominal one beside the car of an extension file."""
+    return CONDITIONS if extension is None else (NOMINAL, taught(extension))
+
+
+def job(what: Job, extension: Path | None = None) -> Numbers:
     """Measure one case under one condition with one seed (by its number: workers take plain values)."""
     case, condition, seed = what
-    return CASES[case](CONDITIONS[condition], seed)
+    return CASES[case](conditions_of(extension)[condition], seed)
 
 
-def measure(seeds: int, workers: int, say: Callable[[str], None], store: Store) -> list[Row]:
+def measure(
+    seeds: int, workers: int, say: Callable[[str], None], store: Store, extension: Path | None = None
+) -> list[Row]:
     """Drive everything and return the rows, nominal condition first.
 
     Parameters
@@ -53,35 +62,44 @@ def measure(seeds: int, workers: int, say: Callable[[str], None], store: Store) 
     workers : processes.
     say : takes lines of progress.
     store : numbers that need not be measured again; takes each as it is found.
+    extension : of the car to drive beside the nominal one, instead of the paper's other conditions.
     """
-    jobs = [(case, k, seed) for seed in range(1, seeds + 1) for k in range(len(CONDITIONS)) for case in CASES]
+    conditions = conditions_of(extension)
+    jobs = [(case, k, seed) for seed in range(1, seeds + 1) for k in range(len(conditions)) for case in CASES]
     missing = [what for what in jobs if what not in store.numbers]
     if len(missing) < len(jobs):
         say(f"{len(jobs) - len(missing)} of {len(jobs)} cases were driven before")
     with worker_pool(workers) as pool:
+        in_turn = pool.map(partial(job, extension=extension), missing)
         try:
-            for done, (what, numbers) in enumerate(zip(missing, pool.map(job, missing), strict=True), 1):
+            for done, (what, numbers) in enumerate(zip(missing, in_turn, strict=True), 1):
                 store.add(what, numbers)
                 if done % 20 == 0 or done == len(missing):
-                    say(f"{done} of {len(missing)} cases driven (seed {what[2]}, {CONDITIONS[what[1]].name})")
+                    say(f"{done} of {len(missing)} cases driven (seed {what[2]}, {conditions[what[1]].name})")
         except BaseException:  # a Ctrl-C must not wait for hours of work that nobody will see
             pool.shutdown(wait=False, cancel_futures=True)
             raise
     found: dict[tuple[str, int], list[Numbers]] = {}
     for what in jobs:
         found.setdefault(what[:2], []).append(store.numbers[what])
-    return rows(found, seeds)
+    return rows(found, seeds, conditions)
 
 
-def rows(found: Mapping[tuple[str, int], Sequence[Numbers]], seeds: int) -> list[Row]:
-    """Rows from what was measured: (case, number of the condition) -> numbers of each seed."""
+def rows(
+    found: Mapping[tuple[str, int], Sequence[Numbers]], seeds: int, conditions: Sequence[Condition] = CONDITIONS
+) -> list[Row]:
+    """Rows from what was measured: (case, number of the condition) -> numbers of each seed.
+
+    A claim about the friction of pads has none where an effect of a taught car stands between friction and pads.
+    """
     pick = partial(_row, found)
-    nominal = [pick(claim, 0, CONDITIONS[0], seeds, None) for claim in CLAIMS]
+    nominal = [pick(claim, 0, conditions[0], seeds, None) for claim in CLAIMS]
     others = [
         pick(claim, k, condition, seeds, base.median)
-        for k, condition in enumerate(CONDITIONS)
+        for k, condition in enumerate(conditions)
         if k > 0
         for claim, base in zip(CLAIMS, nominal, strict=True)
+        if claim.key in found[claim.case, k][0]
     ]
     return nominal + others
 

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from hil.report.report import Number, Report, Section, Table, Verdict
-from hil.reproduce.conditions import CONDITIONS, NOMINAL
 from hil.reproduce.study import DEGRADED, Row
 
 _COLUMNS = (
@@ -23,7 +22,7 @@ _COLUMNS = (
 
 def build_report(rows: list[Row], figures: Mapping[str, Report]) -> Report:
     """Put rows and figures into one report."""
-    others = {condition.name for condition in CONDITIONS if condition is not NOMINAL}
+    others = {row.conditions for row in rows if row.degradation is not None}
     base = [row for row in rows if row.conditions not in others]
     other = [row for row in rows if row.conditions in others]
     missed = [row for row in base if not row.met]

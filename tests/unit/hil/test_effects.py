@@ -43,6 +43,20 @@ def test_at_names_the_members():
     assert effects.theta[THETA.slice("stuck_corner", "held_pa")].tolist() == [0.0] * 4
 
 
+def test_what_acts_at_a_joint_is_taken_out_and_all_else_left():
+    law = {"joint": "friction.mu", "variable": "speed", "centre": 10.0, "width": 5.0, "value": 0.1, "at": ["rl"]}
+    drag = law | {"joint": "body.force", "value": -50.0, "adds": True}
+    del drag["at"]
+    weak = {"pad_mu_gain": {"gain": -0.3, "onset_s": 2.0}, "mass_offset": {"mass_kg": 90.0}}
+    all_of_it = read_effects({**weak, "laws": [law, drag]}, WHERE)
+    left = all_of_it.without("friction.mu", "brake.torque")
+    alone = read_effects({"mass_offset": {"mass_kg": 90.0}, "laws": [drag]}, WHERE)
+    np.testing.assert_array_equal(left.theta, alone.theta)
+    np.testing.assert_array_equal(left.terms, alone.terms)
+    assert left.on == ("mass_offset",)
+    assert all_of_it.on == ("pad_mu_gain", "mass_offset")
+
+
 def test_none_is_none():
     assert read_effects({}, WHERE) is NONE
 

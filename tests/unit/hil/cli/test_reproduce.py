@@ -14,7 +14,7 @@ def quick(monkeypatch):
     asked = []
     monkeypatch.setattr(identification, "shipped_study", lambda: None)
     monkeypatch.setattr(identification, "identification_rows", lambda _: [])
-    monkeypatch.setattr(study, "measure", lambda seeds, workers, say, store: asked.append(seeds) or [ROW])
+    monkeypatch.setattr(study, "measure", lambda seeds, workers, say, store, extension: asked.append(seeds) or [ROW])
     return asked
 
 
@@ -38,3 +38,13 @@ def test_prints_the_table(quick, capsys):
 def test_refuses_no_seeds(quick, capsys):
     assert main(["reproduce", "--seeds", "0"]) == 2
     assert "at least 1" in capsys.readouterr().err
+
+
+def test_an_extension_no_car_can_have_is_refused_before_anything_is_driven(quick, tmp_path, capsys):
+    path = tmp_path / "extension.toml"
+    path.write_text("[effects.mass_offset]\nmass_kg = 1e6\n")
+    assert main(["reproduce", "--extend", str(path)]) == 2
+    assert "mass_offset" in capsys.readouterr().err
+    assert main(["reproduce", "--extend", str(tmp_path / "none.toml")]) == 2
+    assert "none.toml" in capsys.readouterr().err
+    assert quick == []

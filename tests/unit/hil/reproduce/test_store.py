@@ -31,7 +31,7 @@ def test_a_stopped_measurement_goes_on_where_it_was(tmp_path, monkeypatch):
     driven = []
     keys = {claim.key for claim in study.CLAIMS} | {claim.paper_key for claim in study.CLAIMS}
 
-    def job(what):
+    def job(what, extension):
         if len(driven) == 5:
             raise KeyboardInterrupt
         driven.append(what)
@@ -46,7 +46,9 @@ def test_a_stopped_measurement_goes_on_where_it_was(tmp_path, monkeypatch):
     assert len(Store(path).numbers) == 5
     assert stopped == [(False, True)]  # what nobody will see is not driven
     path.write_text(path.read_text() + '["estim', encoding="utf-8")  # killed while writing
-    monkeypatch.setattr(study, "job", lambda what: driven.append(what) or dict.fromkeys(keys, float(what[2])))
+    monkeypatch.setattr(
+        study, "job", lambda what, extension: driven.append(what) or dict.fromkeys(keys, float(what[2]))
+    )
     said = []
     rows = study.measure(2, 1, said.append, Store(path))
     assert said[0] == f"5 of {2 * len(CASES) * len(CONDITIONS)} cases were driven before"
@@ -61,6 +63,18 @@ def test_numbers_of_other_sources_are_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(store, "sources", lambda: "other")
     with pytest.raises(BrakebenchError, match="other sources"):
         Store(path)
+
+
+def test_numbers_of_another_car_are_refused(tmp_path):
+    path, extension = tmp_path / "numbers.jsonl", tmp_path / "extension.toml"
+    extension.write_text("[effects.mass_offset]\nmass_kg = 100.0\n")
+    Store(path, extension).add(("patch", 1, 1), {"a": 1.0})
+    assert Store(path, extension).numbers == {("patch", 1, 1): {"a": 1.0}}
+    with pytest.raises(BrakebenchError, match="other sources"):
+        Store(path)
+    extension.write_text("[effects.mass_offset]\nmass_kg = 200.0\n")
+    with pytest.raises(BrakebenchError, match="other sources"):
+        Store(path, extension)
 
 
 @pytest.mark.parametrize("text", ["nothing of ours\n", json.dumps({"sources": sources()}) + "\n[1]\n", ""])

@@ -6,9 +6,9 @@ import pytest
 
 from hil.reproduce import cases, manoeuvres
 from hil.reproduce.claims import CLAIMS, Claim
-from hil.reproduce.conditions import CONDITIONS, NOMINAL, Condition
+from hil.reproduce.conditions import CONDITIONS, NOMINAL, Condition, taught
 from hil.reproduce.runs import Run, ecu_parameters, plant_parameters
-from hil.reproduce.study import rows
+from hil.reproduce.study import job, rows
 from hil.reproduce.summary import build_report
 
 
@@ -79,7 +79,7 @@ def test_every_claim_is_measured_by_its_case(monkeypatch):
         disc_temperature_k=400.0 + np.repeat(time[:, None], 4, axis=1),
     )
     other = dataclasses.replace(stop, wheel_torque_nm=1.1 * stop.wheel_torque_nm)
-    monkeypatch.setattr(cases, "drive", lambda *_: stop)
+    monkeypatch.setattr(cases, "drive", lambda *_, **__: stop)
     monkeypatch.setattr(cases, "ideal", lambda *_: other)
     found = {name: case(NOMINAL, 1) for name, case in cases.CASES.items()}
     for claim in CLAIMS:
@@ -127,6 +127,36 @@ def test_conditions_change_what_they_say_and_keep_the_sensors_spread():
     shift = plants["IMU bias 0.2 m/s2"].sensor.acceleration_offset_mps2[0]
     assert shift == pytest.approx(0.2 + plants["nominal"].sensor.acceleration_offset_mps2[0])
     assert {s.grade for s in Condition("g", grade=0.03).road(((10.0, 0.2),))} == {0.03}
+
+
+def test_a_taught_car_has_what_the_extension_says(tmp_path):
+    path = tmp_path / "found.toml"
+    path.write_text(
+        "[effects.mass_offset]\nmass_kg = 120.0\n[effects.tyre_radius]\ngain = { fl = -0.01 }\n"
+        "[parameters]\nvehicle_drag_coefficient = [0.31]\n"
+    )
+    condition = taught(path)
+    assert condition.name == "as found.toml taught"
+    assert condition.effects.number("mass_offset", "mass_kg").tolist() == [120.0]
+    assert condition.plant(plant_parameters(), 3).vehicle.drag_coefficient == 0.31
+    assert condition.plant(plant_parameters(), 3).motor == NOMINAL.plant(plant_parameters(), 3).motor
+    assert condition.tells_friction
+    path.write_text("[effects.pad_mu_gain]\ngain = { fl = -0.25 }\n")
+    assert not taught(path).tells_friction
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_the_observer_still_finds_the_torques_of_a_taught_car_and_the_ideal_run_knows_its_mass(tmp_path):
+    path = tmp_path / "found.toml"
+    path.write_text(
+        "[effects.pad_mu_gain]\ngain = { fl = -0.1, fr = -0.1 }\n[effects.mass_offset]\nmass_kg = 120.0\n"
+    )
+    torques = job(("estimation", 1, 1), path)
+    assert torques["joint torque 0"] < 3.0
+    assert "joint friction 0" not in torques
+    assert torques["paper torque 0"] > 1.1 * job(("estimation", 0, 1), path)["paper torque 0"]
+    assert job(("series", 1, 1), path)["joint later 0"] < 3.0
 
 
 def test_manoeuvres_brake_with_the_papers_pedal():
