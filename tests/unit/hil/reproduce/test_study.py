@@ -149,9 +149,7 @@ def test_a_taught_car_has_what_the_extension_says(tmp_path):
 @pytest.mark.timeout(900)
 def test_the_observer_still_finds_the_torques_of_a_taught_car_and_the_ideal_run_knows_its_mass(tmp_path):
     path = tmp_path / "found.toml"
-    path.write_text(
-        "[effects.pad_mu_gain]\ngain = { fl = -0.1, fr = -0.1 }\n[effects.mass_offset]\nmass_kg = 120.0\n"
-    )
+    path.write_text("[effects.pad_mu_gain]\ngain = { fl = -0.1, fr = -0.1 }\n[effects.mass_offset]\nmass_kg = 120.0\n")
     torques = job(("estimation", 1, 1), path)
     assert torques["joint torque 0"] < 3.0
     assert "joint friction 0" not in torques
