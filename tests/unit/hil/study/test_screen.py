@@ -47,22 +47,27 @@ def test_the_models_own_error_raises_what_is_asked() -> None:
 
 
 def test_a_cause_that_shows_through_others_is_no_error_of_the_model() -> None:
-    """Signatures that all resemble one: the cause inflates what every one explains, and nothing beside it."""
+    """Signatures that all resemble one: the cause inflates what every one explains, and nothing beside it.
+
+    Noise along what they share is explained by all of them at once, so one draw says little: the median of eleven does.
+    """
     listed = [c for c in CANDIDATES.values() if len(c.columns) == 1 and c.parameter.low < 0.0]
-    rng = np.random.default_rng(5)
-    shared = rng.standard_normal(3000)
     count = 1 + max(c.columns[0] for c in listed)
     tau = np.ones(count)
     for candidate in listed:
         tau[candidate.columns[0]] = candidate.spread
-    signatures = (0.8 * shared[:, None] + 0.6 * rng.standard_normal((3000, count))) / tau
-    cause = listed[0]
-    hidden = 0.3 * cause.spread * signatures[:, cause.columns[0]]
-    joined = np.column_stack((rng.standard_normal(3000) + hidden, signatures))
-    total = Sums((joined.T @ joined)[None], 0, 3000, 0.0)
-    found = scores(listed, project(total.total(), 0), 0, [0.0] * len(listed))
-    assert inflation(found) > 3.0
-    assert inflation(beside_best(found, total, np.zeros(0), ())) == pytest.approx(1.0, abs=0.5)
+    cause, beside = listed[0], []
+    for seed in range(11):
+        rng = np.random.default_rng(seed)
+        shared = rng.standard_normal(3000)
+        signatures = (0.8 * shared[:, None] + 0.6 * rng.standard_normal((3000, count))) / tau
+        hidden = 0.3 * cause.spread * signatures[:, cause.columns[0]]
+        joined = np.column_stack((rng.standard_normal(3000) + hidden, signatures))
+        total = Sums((joined.T @ joined)[None], 0, 3000, 0.0)
+        found = scores(listed, project(total.total(), 0), 0, [0.0] * len(listed))
+        assert inflation(found) > 3.0
+        beside.append(inflation(beside_best(found, total, np.zeros(0), ())))
+    assert np.median(beside) == pytest.approx(1.0, abs=0.3)
 
 
 def test_a_gain_is_shared_out_over_the_models_own_error() -> None:
