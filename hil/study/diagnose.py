@@ -15,7 +15,7 @@ from hil.study.left_over import FORM, LeftOver
 from hil.study.noise import Frame, Noise
 from hil.study.numbers import STRAINED, Numbers, strain
 from hil.study.onset import price, with_onsets
-from hil.study.own_error import variance_of, variance_of_law
+from hil.study.own_error import shared_out, variance_of, variance_of_law
 from hil.study.prepare import Case
 from hil.study.race import LawRace, best_of_each, least_gain, with_law
 from hil.study.rig import Rig
@@ -67,6 +67,7 @@ class _Search:
         self.numbers = Numbers(self.rig, self.frame, vehicle, base, settings.relinearise)
         self.field = Field(self.rig, self.frame, vehicle.untold)
         self.race: LawRace | None = None
+        self.told = float(len(self.numbers.nuisances))
         self.began_again = False
 
     @property
@@ -111,6 +112,7 @@ class _Search:
         """What each candidate explains where the numbers alone explain all they can, and so what is asked of one."""
         self.say(f"sensitivities of {len(self.field.candidates)} candidates")
         self._shown_at(found.base)
+        self.told = self.fitter.told(found.first_noise)
         found.sums = self.fitter.screen(found.base, self.field.tracks, found.first_noise)
         found.screened = self.field.scores(self.fitter, found.sums, found.base, found.first_noise)
         found.untestable = sorted({*not_testable(found.screened), *self.rig.vehicle.untold})
@@ -333,7 +335,7 @@ class _Search:
         return (better.cost - both.cost) / variance_of(clear.term.candidate) >= least * self._strain(both.z)
 
     def _strain(self, z: Floats) -> float:
-        return strain(z, self.fitter.farthest)
+        return shared_out(strain(z, self.fitter.farthest, self.told))
 
     def _gained(self, contender: Contender, reference: float) -> Contender:
         """With its gain, shared out over the model's own error and less what a chosen beginning takes."""

@@ -219,6 +219,14 @@ class Fitter:
             self._white_for = noise
         return self._products
 
+    def told(self, noise: Noise) -> float:
+        """How many nuisances the data tell: what squares of right ones, fitted, add up to (MacKay 1992, eq. 4.9).
+
+        MacKay, D. J. C.: Bayesian interpolation. Neural Computation 4, 415.
+        """
+        information = self.products(noise)
+        return float(np.trace(np.linalg.solve(information + np.eye(len(information)), information)))
+
     def _of_nuisances(self, noise: Noise) -> tuple[Floats, Floats]:
         """Whitened sensitivities of the nuisances, and their products."""
         if self._white_for is noise:

@@ -21,16 +21,18 @@ _COARSE, _FINE = 0.5, 3.0
 _TURNS, _MOST_ANEW, _SETTLED, _STALE, _FAR = 20, 4, 3.0, 0.3, 1.0
 
 
-def strain(z: Floats, farthest: Floats | float = np.inf) -> float:
+def strain(z: Floats, farthest: Floats | float = np.inf, told: float | None = None) -> float:
     """How much farther the vehicle's numbers went than their tolerance lets them, as a variance, at least 1.
 
     A model that needs that for these logs errs in what it says of causes too (Birge 1932, Phys. Rev. 40, 207). Where
     much is strained, a number that went as far as it may (``farthest``) counts as if it wanted to go as far again.
+    ``told`` is how many numbers the data tell (`hil.study.fit.Fitter.told`), all of them without: one of which they say
+    nothing stays where it is, and is no sign that the others are right.
     """
     squares = np.square(z)
     if squares.sum() >= STRAINED * len(z):
         squares = squares * np.where(np.abs(z) >= farthest, 4.0, 1.0)
-    return max(1.0, float(squares.sum()) / max(len(z), 1))
+    return max(1.0, float(squares.sum()) / max(len(z) if told is None else told, 1.0))
 
 
 class Numbers:

@@ -44,5 +44,9 @@ def variance_of_law(name: str, place: str) -> float:
 
 def _variance(effect: str, number: str, place: str) -> float:
     by_kind = _table().get(effect, {}).get(number, {})
-    ratio = max(by_kind.get(kind_of(place), USUAL), 1.0)
-    return ratio**2 * (FEW if ratio > UNSURE else 1.0)
+    return shared_out(max(by_kind.get(kind_of(place), USUAL), 1.0) ** 2)
+
+
+def shared_out(variance: float) -> float:
+    """What a gain is divided by for an error of the model of so many variances of noise, known from few."""
+    return variance * (FEW if variance > UNSURE**2 else 1.0)

@@ -22,8 +22,17 @@ def _bump(speed_mps: float, pressure_pa: np.ndarray) -> np.ndarray:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_nothing_is_named_where_the_car_is_only_simpler() -> None:
-    assert explain(logs(_plain), vehicle=VEHICLE).json["verdict"] == "none"
+@pytest.mark.parametrize("first_seed", [7, 107, 507])
+def test_nothing_is_named_where_the_car_is_only_simpler(first_seed: int) -> None:
+    assert explain(logs(_plain, first_seed), vehicle=VEHICLE).json["verdict"] == "none"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.long
+@pytest.mark.xfail(strict=True, reason="one draw of ten: a pressure clock 160 ppm fast (decision 0073)")
+def test_nothing_is_named_in_the_tenth_draw_either() -> None:
+    assert explain(logs(_plain, 207), vehicle=VEHICLE).json["verdict"] == "none"
 
 
 @pytest.mark.slow

@@ -72,6 +72,6 @@ def drive(kind: str, seed: int, law: Law) -> dict[str, np.ndarray]:
     return log
 
 
-def logs(law: Law) -> list[dict[str, np.ndarray]]:
+def logs(law: Law, first_seed: int = 7) -> list[dict[str, np.ndarray]]:
     """Four drives."""
-    return [drive(kind, 10 * k + 7, law) for k, kind in enumerate(("stops", "mixed", "motors", "coast"))]
+    return [drive(kind, 10 * k + first_seed, law) for k, kind in enumerate(("stops", "mixed", "motors", "coast"))]

@@ -23,6 +23,36 @@ def test_numbers_within_their_tolerance_strain_nothing():
     assert strain(np.full(50, 2.0)) == pytest.approx(4.0)
 
 
+def test_numbers_that_data_say_nothing_of_do_not_hide_a_strain():
+    z = np.concatenate((np.full(10, 2.0), np.zeros(40)))
+    assert strain(z) == 1.0
+    assert strain(z, told=10.0) == pytest.approx(4.0)
+
+
+def test_squares_of_right_numbers_add_up_to_what_the_data_tell_of_them():
+    """Fitted to data made with numbers drawn by their tolerance; drawn three times as far, they strain nine-fold."""
+    vehicle = paper_car()
+    log = log_of_pulses()
+    case = prepare([log], 0.308)
+    frame = Frame.of(case)
+    numbers = Numbers(Rig(case, vehicle), frame, vehicle, nominal(vehicle), False)
+    numbers.anew(np.zeros(len(numbers.nuisances)))
+    noise = numbers.fitter.start()[1]
+    told, rng = numbers.fitter.told(noise), np.random.default_rng(11)
+    assert 1.0 < told < len(numbers.nuisances)
+    information = numbers.fitter.products(noise)
+    root = np.linalg.cholesky(information + 1e-9 * np.eye(len(information)))
+
+    def fitted(times: float) -> float:
+        true = times * rng.standard_normal(len(information))
+        pull = information @ true + root @ rng.standard_normal(len(information))
+        z = np.linalg.solve(information + np.eye(len(information)), pull)
+        return float(z @ z)
+
+    assert np.mean([fitted(1.0) for _ in range(400)]) == pytest.approx(told, rel=0.1)
+    assert np.mean([fitted(3.0) for _ in range(400)]) > 6.0 * told
+
+
 def test_a_strained_number_at_its_end_wants_to_go_on():
     z = np.array([3.0, 1.0, 1.0, 1.0])
     assert strain(z) == pytest.approx(3.0)
