@@ -7,6 +7,15 @@ import pytest
 from hil.process import interrupts_held
 
 
+@pytest.fixture
+def interruptible():
+    """Python's own handler: a shell lets what it starts in the background ignore interrupts."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_waits_for_the_end_of_the_block():
     done = []
 
