@@ -48,5 +48,6 @@ def _variance(effect: str, number: str, place: str) -> float:
 
 
 def shared_out(variance: float) -> float:
-    """What a gain is divided by for an error of the model of so many variances of noise, known from few."""
+    """What a gain is divided by where the model errs by ``variance``, in variances of noise: more if it is large, for
+    it is known from few drives or numbers."""
     return variance * (FEW if variance > UNSURE**2 else 1.0)

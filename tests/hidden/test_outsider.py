@@ -31,7 +31,7 @@ def test_nothing_is_named_where_the_car_is_only_simpler(first_seed: int) -> None
 @pytest.mark.timeout(3600)
 @pytest.mark.long
 def test_of_ten_draws_at_most_two_are_named() -> None:
-    """One is (a pressure clock 160 ppm fast), of another the rounding of sums decides (a grade of 0.7 %)."""
+    """One is (a pressure clock 160 ppm fast), of another the rounding of sums decides (decision 0073)."""
     drawn = [explain(logs(_plain, first_seed), vehicle=VEHICLE) for first_seed in (7, *range(107, 908, 100))]
     assert sum(answer.json["verdict"] != "none" for answer in drawn) <= 2
 
