@@ -30,7 +30,7 @@ def test_numbers_that_data_say_nothing_of_do_not_hide_a_strain():
 
 
 def test_squares_of_right_numbers_add_up_to_what_the_data_tell_of_them():
-    """Fitted to data made with numbers drawn by their tolerance; drawn three times as far, the sum is many times that."""
+    """Fitted to data made with numbers drawn by their tolerance; three times as far, the sum is many times that."""
     vehicle = paper_car()
     log = log_of_pulses()
     case = prepare([log], 0.308)
