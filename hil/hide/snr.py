@@ -17,6 +17,8 @@ WHEELS = ("fl", "fr", "rl", "rr")
 START_MPS, RADIUS_M = 0.05, NOMINAL.rolling_radius_m
 SLOW_RAD_S = 10.0
 LAG_ROWS = 6  # in which a motor has reached what it may give
+CLEAR_NM = 5.0  # by which a motor at a limit gives less than demanded; a torque that passes zero does so by less
+RAMP_NM = 0.95 * NOMINAL.motor_rate_limit_nm_s * TICK_S  # a row
 NEAR_ROWS = 20  # about the moment a motor meets a limit
 SAME_SPEED = 0.005  # share of the speed beyond which a bend is another bend
 _BY_SPEED = {"ay_mps2": 1.7, "yaw_rate_rad_s": 0.7}
@@ -73,26 +75,41 @@ def whitened(differences: Sequence[Table], base: Sequence[Table], noise: Noise) 
 
 
 def _answered(apart: Table, table: Table, omega: Vector) -> tuple[Vector, NDArray[np.bool_]]:
-    """Motor torque that only answers another speed: no signature, but what the motion has to be cleared of, (n, 4).
+    """Motor torque that only answers another speed, (n, 4): no signature, but what the motion has to be cleared of.
 
-    The driver who holds a speed shows in the demand. Where a motor gives less than demanded, its torque follows the
-    fading at low speed, T / (v - v0), or constant power, -T / omega. True where that is no linear matter: where braking
-    fades, and about the moments a limit is met or left.
+    The driver who holds a speed shows in the demand. Where a motor gives clearly less than demanded, its torque follows
+    the fading at low speed, T / (v - v0), or constant power, -T / omega. Torque gets there with the motor's lag; while
+    it goes as fast as it may, two torques stay as far apart as they are. True where that is no linear matter: where
+    braking fades, and about the moments a limit is met or left.
     """
     result, unclear = np.zeros_like(omega), np.zeros(omega.shape, dtype=bool)
+    keep = exp(-TICK_S / NOMINAL.motor_time_constant_s)
     for i, w in enumerate(WHEELS):
         torque, demand = table[f"motor_torque_{w}_nm"], table[f"motor_torque_demand_{w}_nm"]
         speed, turned = omega[:, i] * NOMINAL.rolling_radius_m, np.nan_to_num(apart[f"wheel_speed_{w}_rad_s"])
         settled = np.minimum(np.abs(demand), np.abs(np.concatenate([demand[:1].repeat(LAG_ROWS), demand[:-LAG_ROWS]])))
-        short = np.abs(torque) < 0.97 * settled
+        short = np.abs(torque) < np.minimum(0.97 * settled, settled - CLEAR_NM)
         fades = short & (speed < NOMINAL.motor_fade_start_mps)
         over = np.maximum(speed - NOMINAL.motor_fade_end_mps, 0.2)
-        result[:, i] = np.where(fades, torque / over * NOMINAL.rolling_radius_m * turned, 0.0)
-        result[:, i] += np.where(short & ~fades, -torque / np.maximum(omega[:, i], 1.0) * turned, 0.0)
-        result[:, i] += np.where(short, 0.0, apart[f"motor_torque_demand_{w}_nm"])
+        aimed = (
+            np.where(fades, torque / over * NOMINAL.rolling_radius_m, -torque / np.maximum(omega[:, i], 1.0)) * turned
+        )
+        aimed = np.where(short, aimed, np.nan_to_num(apart[f"motor_torque_demand_{w}_nm"]))
+        result[:, i] = _with_lag(aimed, np.abs(np.diff(torque, append=torque[-1:])) > RAMP_NM, keep)
         met = np.convolve(np.abs(np.diff(short, prepend=short[:1])), np.ones(2 * NEAR_ROWS + 1), mode="same") > 0.5
         unclear[:, i] = fades | (met & (np.abs(turned) > 0.0))
-    return np.nan_to_num(result), unclear
+    return result, unclear
+
+
+@entry
+def _with_lag(aimed: Vector, ramp: NDArray[np.bool_], keep: float) -> Vector:
+    """Difference of torques that go for targets ``aimed`` apart; ``keep`` is left after a row, all where they ramp."""
+    found = np.empty_like(aimed)
+    now = aimed[0] if aimed.size else 0.0
+    for k in range(aimed.size):
+        found[k] = now
+        now = now if ramp[k] else keep * now + (1.0 - keep) * aimed[k]
+    return found
 
 
 def difference(one: Sequence[Table], other: Sequence[Table]) -> list[dict[str, Vector]]:

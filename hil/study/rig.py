@@ -75,6 +75,20 @@ class _Kept:
     told: list[Stack]
 
 
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """The world that made what drives the car; for each drive its inputs as that world tells them, and these taken back
+    again. The latter differ from the inputs by what reading between rows costs, twice."""
+
+    world: World
+    told: list[tuple[Floats, Floats]]
+
+
+def _taken_back(inputs: Floats, drive: Drive, world: World) -> Floats:
+    """Measured inputs of a drive without what sensors and nodes of a world added; demands when they are acted on."""
+    return in_time(inverted(inputs, world.theta_in(drive), ROW_S), world.late_s)
+
+
 def _at_once(drive: Drive) -> NDArray[np.int64]:
     """How many steps each row of a drive makes as one.
 
@@ -123,6 +137,7 @@ class Rig:
         self._given = [drive.inputs for drive in case.drives]
         self._pace = [_at_once(drive) for drive in case.drives]
         self._kept: _Kept | None = None
+        self._made: _Made | None = None
         self.runs = 0
 
     def quieted(self, world: World) -> "Rig":
@@ -136,24 +151,41 @@ class Rig:
     def quieten(self, world: World) -> None:
         """What drives the car becomes the simulated value plus the smoothed difference of the measured one.
 
-        So steps stay sharp, between two samples too, if this world has what makes them.
+        So steps stay sharp, between two samples too, if this world has what makes them. The measured one is taken back
+        first: what its node, in this world, scaled or sampled late.
         """
         wanted = [(group, part) for group, part in _INPUTS if group in self._groups]
-        self._kept = None
-        drives = []
+        self._kept = self._made = None
+        drives, told = [], []
         for drive, given in zip(self.case.drives, self._given, strict=True):
             drive = replace(drive, inputs=given)
             raw = self._raw(drive, world)
-            inputs = given.copy()
+            inputs = _taken_back(given, drive, world).copy()
             for group, part in wanted:
                 where = INPUT.slice(part)
-                apart = given[:, where] - raw[group]
+                apart = inputs[:, where] - raw[group]
                 window = min(_SMOOTH, (len(apart) - 1) // 2 * 2 + 1)
                 inputs[:, where] = raw[group] + savgol_filter(apart, window, 2, axis=0)
             if "motor" in self._groups:
                 inputs[:, INPUT.slice("motor_torque_bend_nm")] = self._bend(drive, world)
-            drives.append(replace(drive, inputs=inputs))
+            again = given.copy()
+            drive = replace(drive, inputs=inputs)
+            seen = self.telling.at_rows({group: inputs[:, INPUT.slice(part)] for group, part in wanted}, drive, world)
+            for group, part in wanted:
+                again[:, INPUT.slice(part)] = seen[group]
+            told.append((again, _taken_back(again, drive, world)))
+            drives.append(drive)
         self.case = replace(self.case, drives=tuple(drives))
+        self._made = _Made(world, told)
+
+    def _driving(self, drive: Drive, world: World) -> Floats:
+        """What drives the car in a world whose sensors and nodes told it as it is in the logs."""
+        if self._made is None:
+            return _taken_back(drive.inputs, drive, world)
+        if told_alike(world, self._made.world):
+            return drive.inputs
+        told, back = self._made.told[drive.number]
+        return np.asarray(drive.inputs + (_taken_back(told, drive, world) - back))
 
     def _bend(self, drive: Drive, world: World) -> Floats:
         """Torque of the simulated motors in the middle of each row, beyond the straight line to the next, (rows, 4)."""
@@ -287,10 +319,7 @@ class Rig:
         those of ``kept`` where sensors and frames are ``alike``.
         """
         theta = world.theta_in(drive)
-        if kept is not None and alike:
-            inputs = kept.inputs
-        else:
-            inputs = in_time(inverted(drive.inputs, theta, ROW_S), world.late_s)
+        inputs = kept.inputs if kept is not None and alike else self._driving(drive, world)
         x = self._start(drive, world, inputs[0])
         table = np.empty((len(inputs), len(columns)))
         cut, switch, y, pace = self.case.cut, healthy(), OUTPUT.zeros(), self._pace[drive.number]

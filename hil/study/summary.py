@@ -94,6 +94,12 @@ def _joined_time(answer: Answer) -> tuple[Floats, Floats]:
     return np.concatenate(times), np.concatenate(gaps)
 
 
+def _mean(values: Floats) -> Floats:
+    """Mean of the channels of each row that are known; NaN where none is."""
+    known = np.isfinite(values).sum(axis=1)
+    return np.asarray(np.where(known > 0, np.nansum(values, axis=1) / np.maximum(known, 1), np.nan))
+
+
 def _comparison(answer: Answer) -> Section:
     """Measured, as handed in, and extended, over all logs in a row; residuals below."""
     found = answer.found
@@ -105,11 +111,11 @@ def _comparison(answer: Answer) -> Section:
             continue
         factor = found.fitter.radius if group == "wheel" else 1.0
         unit: Unit = _SHOWN.get(group, "m/s²")
-        known = np.nanmean(measured[group], axis=1) * factor
+        known = _mean(measured[group]) * factor
         shown = ~gaps & (found.fitter.frame.present.get("ax", ~gaps) > 0.5) if group == "ax" else ~gaps
         traces = []
         for name, model in _models(answer):
-            simulated = np.nanmean(model.stack[group], axis=1) * factor
+            simulated = _mean(model.stack[group]) * factor
             traces.append(
                 Trace(name, t, np.where(shown, simulated, np.nan), group="rl" if name == "handed in" else "fl")
             )
@@ -117,7 +123,7 @@ def _comparison(answer: Answer) -> Section:
         panels.append(Panel(title, unit, tuple(traces)))
         residuals = []
         for name, model in _models(answer):
-            left = known - np.nanmean(model.stack[group], axis=1) * factor
+            left = known - _mean(model.stack[group]) * factor
             residuals.append(Trace(name, t, np.where(shown, left, np.nan), group="rl" if name == "handed in" else "fl"))
         panels.append(Panel(f"{title.split(',')[0]}: measured less simulated", unit, tuple(residuals)))
     return Section(

@@ -11,6 +11,7 @@ from hil.study.sensing import sensed
 from hil.study.table import Floats
 from hil.study.world import World
 from plant.parameters.plant import PlantParameters
+from plant.vectors import INPUT
 
 _WHEELS = ("fl", "fr", "rl", "rr")
 SOURCE = {
@@ -28,6 +29,9 @@ Stack = dict[str, Floats]
 _NODE = {"ax": 0, "ay": 0, "yaw": 0, "pressure": 1, "motor": 2}
 _USUAL_RADIUS_M = 0.3
 _TOOTH_ROWS = 2.0
+_FINER = 4
+"""Points a row between which a motor's torque goes straight: as it lags it is bent, and a straight line from row to row
+would come 1.3 ms late."""
 
 
 @dataclass(frozen=True)
@@ -50,18 +54,29 @@ class Telling:
 
     def told(self, drive: Drive, world: World, table: Floats) -> Stack:
         """Channels as sensors, frames and the tables of logs give what was noted."""
-        stack = sensed(self.split(table), world.theta_in(drive), ROW_S)
-        for group, values in stack.items():
-            late = world.late_s[_NODE[group]] if group in _NODE else 0.0
-            if late:
-                stack[group] = later(values, late / ROW_S, straight=group in ("pressure", "motor"))
-            elif group == "wheel":
-                seen = _mean_over(values, world.window_rows2)
-                stack[group] = later(seen, self._tooth_rows(values) * world.tooth_share)
+        stack = self.at_rows(self.split(table), drive, world)
         found = {group: averaged(values, drive.stride) for group, values in stack.items()}
         if "wheel" in found:
             self._at_measured_speed(found, drive)
         return found
+
+    def at_rows(self, happened: Stack, drive: Drive, world: World) -> Stack:
+        """Channels as sensors and frames give what happened, row by row."""
+        theta = world.theta_in(drive)
+        others = {group: values for group, values in happened.items() if group != "motor"}
+        stack = sensed(others, theta, ROW_S) if others else {}
+        for group, values in stack.items():
+            late = world.late_s[_NODE[group]] if group in _NODE else 0.0
+            if late:
+                stack[group] = later(values, late / ROW_S, straight=group == "pressure")
+            elif group == "wheel":
+                seen = _mean_over(values, world.window_rows2)
+                stack[group] = later(seen, self._tooth_rows(values) * world.tooth_share)
+        if "motor" in happened:
+            fine = _finer(happened["motor"], drive.inputs[:, INPUT.slice("motor_torque_bend_nm")])
+            fine = sensed({"motor": fine}, theta, ROW_S / _FINER)["motor"]
+            stack["motor"] = later(fine, _FINER * world.late_s[_NODE["motor"]] / ROW_S, straight=True)[::_FINER]
+        return stack
 
     def _tooth_rows(self, omega_rad_s: Floats) -> Floats:
         """Half the time between two teeth, rows; two rows at most."""
@@ -87,6 +102,15 @@ def powers(speed_mps: Floats, characteristic_mps: float) -> tuple[Floats, Floats
     """
     squared = (speed_mps / characteristic_mps) ** 2
     return 2.0 / (1.0 + squared), (1.0 - squared) / (1.0 + squared)
+
+
+def _finer(torque_nm: Floats, bend_nm: Floats) -> Floats:
+    """Torque on rows and between them: a parabola that is off the straight line by ``bend_nm`` in the middle."""
+    share = np.arange(_FINER)[:, None] / _FINER
+    ahead = np.diff(torque_nm, axis=0, append=torque_nm[-1:])
+    return np.asarray(
+        torque_nm[:, None] + share * ahead[:, None] + 4.0 * share * (1.0 - share) * bend_nm[:, None]
+    ).reshape(-1, torque_nm.shape[1])
 
 
 def _mean_over(values: Floats, window_rows2: float) -> Floats:

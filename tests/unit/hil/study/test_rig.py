@@ -10,6 +10,7 @@ from hil.study.rig import STEPS, Rig
 from hil.study.table import Log, make_log
 from hil.study.vehicle import paper_car
 from hil.study.world import World, nominal
+from plant.effects.effect import NODES
 from plant.effects.theta import THETA
 from plant.model import initial_state, pack, replay
 from plant.vectors import INPUT, P
@@ -17,6 +18,7 @@ from plant.vectors import INPUT, P
 WHEELS = ("fl", "fr", "rl", "rr")
 RECUPERATES, BRAKES = (10.0, 15.0), (19.0, 23.0)
 SEGMENTS = 3
+MOTOR_NODE = np.array([node == "motor" for node in NODES]) * 1.0
 
 
 def _log() -> Log:
@@ -37,7 +39,7 @@ def rig() -> Rig:
     return Rig(prepare([_log()], 0.308), paper_car())
 
 
-def _with(world: World, effect: str, number: str, value: float) -> World:
+def _with(world: World, effect: str, number: str, value: float | np.ndarray) -> World:
     theta = world.theta.copy()
     theta[THETA.slice(effect, number)] = value
     return replace(world, theta=theta)
@@ -152,6 +154,55 @@ def test_what_drives_the_car_has_the_steps_of_the_world_that_made_it():
     after = np.abs(_middle(rig) - true[: len(_middle(rig))]).max()
     assert before > 10.0
     assert after < 1.0
+
+
+@pytest.mark.parametrize("late_by", ["latency", "stamp", "clock", "scale"])
+def test_what_drives_the_car_is_what_happened_however_the_torque_is_told(late_by):
+    """What was told is taken back before the simulated torque is set beside it."""
+    log, _ = _driven(0.008)
+    vehicle = paper_car()
+    t, changed = log.t_s, dict(log.channels)
+    true = changed["motor_torque_fl_nm"]
+    level = nominal(vehicle)
+    world = {
+        "latency": replace(level, late_s=(0.0, 0.0, 0.006, 0.0, 0.0)),
+        "stamp": _with(level, "timestamp_offset", "delay_s", MOTOR_NODE * 0.006),
+        "clock": _with(level, "clock_drift", "share", MOTOR_NODE * 5e-4),
+        "scale": _with(level, "wrong_scale", "factor", MOTOR_NODE * -0.2),
+    }[late_by]
+    taken_s = t * (1.0 - 5e-4) if late_by == "clock" else t - 0.006
+    seen = 0.8 * true if late_by == "scale" else np.interp(taken_s, t, true)
+    changed |= {f"motor_torque_{w}_nm": seen for w in WHEELS}
+    rig = Rig(prepare([replace(log, channels=changed)], 0.308), vehicle).quieted(world)
+    rig.keep(world)
+    driving = rig._kept.replays[0].inputs[:, INPUT.at.motor_torque_nm]
+    assert np.abs(seen - true)[20:-20].max() > 20.0
+    assert np.abs(driving - true[: len(driving)])[20:-20].max() < 6.0
+    assert np.sqrt(np.mean((driving - true[: len(driving)])[20:-20] ** 2)) < 0.5
+
+
+@pytest.mark.parametrize("told", ["latency", "stamp"])
+def test_a_torque_told_half_a_row_late_is_the_one_between_two_rows(told):
+    """It lags its demand, so a straight line comes later.
+
+    Of what is left, 0.7 N m where a ramp ends, 0.5 is what drives the car: smoothed, not the measured torque itself.
+    """
+    log, true = _driven(0.008)
+    vehicle = paper_car()
+    level = nominal(vehicle)
+    level.p[P.motor_time_constant_s] = 0.008
+    rig = Rig(prepare([log], 0.308), vehicle).quieted(level)
+    drive = rig.case.drives[0]
+    late = (
+        replace(level, late_s=(0.0, 0.0, 0.005, 0.0, 0.0))
+        if told == "latency"
+        else _with(level, "timestamp_offset", "delay_s", MOTOR_NODE * 0.005)
+    )
+    happened = {"motor": drive.inputs[:, INPUT.slice("motor_torque_nm")]}
+    seen = rig.telling.at_rows(happened, drive, late)["motor"][1:, 0]
+    straight = 0.5 * (happened["motor"][:-1, 0] + happened["motor"][1:, 0])
+    far, near = (np.abs(values - true[: len(values)])[20:-20].max() for values in (straight, seen))
+    assert near < 0.8 < 2.0 < far
 
 
 def test_steps_are_short_where_a_torque_steps_and_noise_is_no_step():
