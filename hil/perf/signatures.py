@@ -54,7 +54,7 @@ def problem(logs: Sequence[Path], vehicle: Path) -> Problem:
     frame = Frame.of(rig.case)
     rig.keep(base)
     simulated = rig.run(base)
-    apart = {group: (values - simulated[group])[:, :, None] for group, values in rig.measured().items()}
+    apart = {group: values - simulated[group] for group, values in rig.measured().items()}
     residual = tracks_of(apart, frame, radius_m)
     of = columns(car.untold)
     worlds = [column.stepped(base) for column in of]

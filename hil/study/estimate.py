@@ -1,12 +1,11 @@
 """The noise of largest likelihood for what a simulation leaves of a log."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize
 
-from hil.study.likelihoods import coloured_each, moving_each
+from hil.study.likelihoods import coloured_each, information_of, moving_each
 from hil.study.noise import LONG, REFERENCE_MPS, Frame, Noise, Track, evened, scale_of, white_variance, whiten
 from hil.study.table import Floats
 from hil.study.whiten import HUBER
@@ -20,9 +19,12 @@ _COLOURS, _TIMES_S = (0.1, 0.3, 1.0, 3.0), (0.1, 0.5, 2.0)
 """Offered to begin a search: colour as a share of the white noise, and its time. From too much of it the way down leads
 past what is there to none at all, where nothing points back."""
 _PRIOR_SAMPLES, _SCALES = 60.0, (0.4, 8.0)
-_DIFFERENCE, _SETTLED, _FAR = 1e-3, 1e-8, 16.0
-"""Of the search, in logarithms: step of a difference, share of the cost that ends it, and how far it goes."""
-Costs = Callable[[Floats], Floats]
+_DIFFERENCE, _SETTLED, _FAR = 1e-3, 5e-3, 16.0
+"""Of the search, in logarithms: step of a difference, how little less cost is worth no step, and how far it goes."""
+_STEPS, _FARTHEST, _RIDGE = 30, 2.0, 1e-3
+"""Steps at most, how far one goes, and information where innovations have none."""
+Costs = Callable[[Floats], tuple[Floats, Floats, Floats]]
+"""Negative log-likelihoods of points, (points,); innovations and their variances, (samples, points)."""
 
 
 def first_guess(tracks: Mapping[str, Floats], frame: Frame, enabled: bool = True) -> Noise:
@@ -55,22 +57,55 @@ def estimate(tracks: Mapping[str, Floats], frame: Frame, start: Noise) -> Noise:
     return noise
 
 
-def _smallest(costs: Costs, starts: Sequence[Floats], low: Floats, high: Floats) -> Floats:
-    """Where the cost is least: from the best of the starts, down along differences (Byrd et al. 1995, L-BFGS-B).
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Where a search is: the cost there, its slope, and the information of the numbers."""
 
-    ``costs`` takes points, (points, numbers), all at once.
+    z: Floats
+    cost: float
+    slope: Floats
+    information: Floats
+
+    def step(self, low: Floats, high: Floats, damping: float) -> tuple[Floats, float]:
+        """The way to the least cost by what is known here, and how much less that would be."""
+        free = ~(((self.z <= low) & (self.slope > 0.0)) | ((self.z >= high) & (self.slope < 0.0)))
+        a = self.information[np.ix_(free, free)]
+        step = np.zeros_like(self.z)
+        step[free] = np.linalg.solve(a + np.diag(damping * np.diag(a) + _RIDGE), -self.slope[free])
+        return step, -0.5 * float(self.slope @ step)
+
+
+def _smallest(costs: Costs, starts: Sequence[Floats], low: Floats, high: Floats, known: Floats) -> Floats:
+    """Where the cost is least: from the first start if it is there already, else from the best of all, by scoring.
+
+    ``costs`` takes points, (points, numbers), all at once. Steps are those of the information that innovations have of
+    the numbers (Gupta and Mehra 1974, IEEE Trans. AC 19, 774), and of what is ``known`` of them before, damped after
+    Marquardt (1963).
     """
     steps = _DIFFERENCE * np.eye(len(low))
 
-    def with_slope(z: Floats) -> tuple[float, Floats]:
-        found = costs(np.vstack([z, z + steps]))
-        return float(found[0]), (found[1:] - found[0]) / _DIFFERENCE
+    def here(z: Floats) -> _Place:
+        found, off, size = costs(np.vstack([z, z + steps]))
+        information = information_of(off, size, HUBER) / _DIFFERENCE**2 + np.diag(known)
+        return _Place(z, float(found[0]), (found[1:] - found[0]) / _DIFFERENCE, information)
 
     offered = np.clip(starts, low, high)
-    begin = offered[int(np.argmin(costs(offered)))]
-    bounds = list(zip(low, high, strict=True))
-    found = minimize(with_slope, begin, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": _SETTLED})
-    return np.asarray(found.x)
+    now, damping = here(offered[0]), 0.0
+    if now.step(low, high, 0.0)[1] < _SETTLED:
+        return now.z
+    found = costs(offered)[0]
+    if np.argmin(found):
+        now = here(offered[int(np.argmin(found))])
+    for _ in range(_STEPS):
+        step, foretold = now.step(low, high, damping)
+        if foretold < _SETTLED:
+            break
+        there = here(np.clip(now.z + np.clip(step, -_FARTHEST, _FARTHEST), low, high))
+        if there.cost < now.cost:
+            now, damping = there, 0.1 * damping
+        else:
+            damping = max(10.0 * damping, 0.1)
+    return now.z
 
 
 def _of_side(name: str, values: Floats, frame: Frame, noise: Noise) -> Noise:
@@ -81,12 +116,13 @@ def _of_side(name: str, values: Floats, frame: Frame, noise: Noise) -> Noise:
     faster = np.square(frame.speed_mps / REFERENCE_MPS)
     by_speed = name.startswith("wheel")
 
-    def costs(points: Floats) -> Floats:
+    def costs(points: Floats) -> tuple[Floats, Floats, Floats]:
         a, c, tau_s, *more = np.exp(points.T)
         white = common[:, None] + a**2 + (faster[:, None] * more[0] ** 2 if more else 0.0)
         colour = (c**2 if noise.enabled else 0.0 * c) + 1e-16
         keep = np.exp(-frame.sample_s / tau_s)
-        return np.asarray(-coloured_each(scaled[:, 0], frame.fresh, known, white, keep, colour))
+        off, size = np.zeros(white.shape), np.ones(white.shape)
+        return -coloured_each(scaled[:, 0], frame.fresh, known, white, keep, colour, off, size), off, size
 
     a = max(_differences(values[:, 0], known), floor)
     offered = [at, *(Track(a, 0.0, share * a, tau_s) for share in _COLOURS for tau_s in _TIMES_S)]
@@ -94,7 +130,9 @@ def _of_side(name: str, values: Floats, frame: Frame, noise: Noise) -> Noise:
     low = np.array([np.log(floor), -_FAR, np.log(_SHORTEST_S), -_FAR])
     high = np.array([_FAR, _FAR, np.log(_LONGEST_S), _FAR])
     count = 4 if by_speed else 3
-    found = np.exp(_smallest(costs, [start[:count] for start in starts], low[:count], high[:count])).tolist()
+    found = np.exp(
+        _smallest(costs, [start[:count] for start in starts], low[:count], high[:count], np.zeros(count))
+    ).tolist()
     track = Track(found[0], found[3] if by_speed else 0.0, found[1], found[2])
     return replace(noise, tracks={**noise.tracks, name: track})
 
@@ -114,24 +152,28 @@ def _of_moving(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> Nois
         white[:, m] = white_variance(name, Track(0.0, b if name == "wheel.mean" else 0.0, 0.0, 1.0), frame)
     on = 1.0 if noise.enabled else 0.0
 
-    def costs(points: Floats) -> Floats:
+    def costs(points: Floats) -> tuple[Floats, Floats, Floats]:
         sizes = np.exp(points.T)
         sensor = np.zeros((3, len(points)))
         sensor[[LONG.index(name) for name in there]] = sizes[8:] ** 2
         keep, colour = np.exp(-frame.sample_s / sizes[4:8]), on * sizes[:4] ** 2 + 1e-12
+        off, size = np.zeros((samples, 3, len(points))), np.ones((samples, 3, len(points)))
         found = moving_each(
-            y, frame.fresh, frame.restart, frame.moving, known, white, share, frame.sample_s, keep, colour, sensor
-        )
+            y, frame.fresh, frame.restart, frame.moving, known, white, share, frame.sample_s, keep, colour, sensor,
+            off, size,
+        )  # fmt: skip
         # weak knowledge of sizes and times keeps what the data do not show where roads and cars have it
         unusual = (points[:, :8] - np.log(_USUAL)) / _SPREAD
-        return np.asarray(-found + 0.5 * np.square(unusual).sum(axis=1))
+        cost = -found + 0.5 * np.square(unusual).sum(axis=1)
+        return cost, off.reshape(-1, len(points)), size.reshape(-1, len(points))
 
     sizes, taus = zip(*noise.disturbances, strict=True)
     own = np.log([noise.tracks[name].a for name in there])
     starts = [np.concatenate((np.log([*sizes, *taus]), own)), np.concatenate((np.log(_USUAL), own))]
     low = np.array([-_FAR] * 4 + [np.log(_SHORTEST_S)] * 4 + [np.log(_floor(name)) for name in there])
     high = np.array([_FAR] * 4 + [np.log(_LONGEST_MOVING_S)] * 4 + [_FAR] * len(there))
-    found = np.exp(_smallest(costs, starts, low, high)).tolist()
+    before = np.array([*_SPREAD**-2, *np.zeros(len(there))])
+    found = np.exp(_smallest(costs, starts, low, high, before)).tolist()
     changed = {
         name: Track(a, b if name == "wheel.mean" else 0.0, 0.0, 1.0) for name, a in zip(there, found[8:], strict=True)
     }

@@ -109,7 +109,7 @@ class Fitter:
 
     def of_stack(self, stack: Stack) -> Tracks:
         """Tracks, (samples, 1), of channels."""
-        return tracks_of({group: values[:, :, None] for group, values in stack.items()}, self.frame, self.radius)
+        return tracks_of(stack, self.frame, self.radius)
 
     def cost(self, residual: Tracks, z: Floats, noise: Noise) -> float:
         """Twice the negative log-likelihood, tolerances included."""
@@ -265,9 +265,10 @@ class Fitter:
             at = 1 + count + np.arange(len(known))
             total[at, at] += known
         z, terms, covariance, _ = self.moved(model, total)
-        moved = np.array([new.value - old.value for new, old in zip(terms, model.terms, strict=True)])
+        moved = np.array([new.value - old.value for new, old in zip(terms, model.terms, strict=True)], np.float32)
+        change = np.asarray(z - model.z, np.float32)  # as precise as the sensitivities
         residual = {
-            name: values - (self.nuisance_columns[name] @ (z - model.z) + own[name] @ moved)[:, None]
+            name: values - (self.nuisance_columns[name] @ change + own[name].astype(np.float32) @ moved)[:, None]
             for name, values in model.residual.items()
         }
         return Model(z, terms, residual, self.cost(residual, z, noise), covariance)

@@ -1,7 +1,7 @@
 """Likelihoods of many noises at once, over lanes that the processor takes together.
 
 The filters are those of `hil.study.whiten`; what differs from lane to lane are the parameters of the noise, and
-(lanes,) log-likelihoods come back.
+(lanes,) log-likelihoods come back. Innovations and their variances, (samples, lanes), are noted for the curvature.
 """
 
 import numpy as np
@@ -13,7 +13,9 @@ from hil.study.whiten import HUBER, UNKNOWN
 _TOGETHER = 4  # samples whose variances are multiplied before one logarithm is taken
 
 
-def _coloured_each(y: Floats, fresh: Floats, known: Floats, white: Floats, keep: Floats, colour: Floats) -> Floats:
+def _coloured_each(
+    y: Floats, fresh: Floats, known: Floats, white: Floats, keep: Floats, colour: Floats, off: Floats, size: Floats
+) -> Floats:  # fmt: skip
     lanes = len(keep)
     state, variance = np.zeros(lanes), colour.copy()
     product, likelihood = np.ones(lanes), np.zeros(lanes)
@@ -30,6 +32,7 @@ def _coloured_each(y: Floats, fresh: Floats, known: Floats, white: Floats, keep:
                 total = variance[k] + white[t, k]
                 gain = variance[k] / total
                 innovation = y[t] - state[k]
+                off[t, k], size[t, k] = innovation, total
                 state[k] += gain * innovation
                 variance[k] -= gain * variance[k]
                 square = innovation * innovation / total
@@ -45,7 +48,7 @@ def _coloured_each(y: Floats, fresh: Floats, known: Floats, white: Floats, keep:
 
 def _moving_each(
     y: Floats, fresh: Floats, restart: Floats, rolling: Floats, known: Floats, white: Floats, share: Floats,
-    step_s: float, keep: Floats, colour: Floats, sensor: Floats,
+    step_s: float, keep: Floats, colour: Floats, sensor: Floats, off: Floats, size: Floats,
 ) -> Floats:  # fmt: skip
     lanes = keep.shape[1]
     x, cov, h = np.zeros((5, lanes)), np.zeros((5, 5, lanes)), np.zeros((5, lanes))
@@ -89,9 +92,10 @@ def _moving_each(
             for k in range(lanes):
                 total = white[t, m] + sensor[m, k] + one * h[first, k] + other * h[second, k]
                 inverse[k] = 1.0 / total
-                off = y[t, m] - one * x[first, k] - other * x[second, k]
-                innovation[k] = off * inverse[k]
-                square = off * innovation[k]
+                apart = y[t, m] - one * x[first, k] - other * x[second, k]
+                off[t, m, k], size[t, m, k] = apart, total
+                innovation[k] = apart * inverse[k]
+                square = apart * innovation[k]
                 far = 2.0 * HUBER * np.sqrt(square) - HUBER * HUBER
                 likelihood[k] -= 0.5 * (far if square > HUBER * HUBER else square)
                 product[k] *= total
@@ -108,9 +112,31 @@ def _moving_each(
     return likelihood - 0.5 * np.log(product)
 
 
+def _information_of(off: Floats, size: Floats, limit: float) -> Floats:
+    lanes = off.shape[1] - 1
+    found, turned, grown = np.zeros((lanes, lanes)), np.zeros(lanes), np.zeros(lanes)
+    for t in range(len(off)):
+        inverse = 1.0 / size[t, 0]
+        far = abs(off[t, 0]) * np.sqrt(inverse)
+        weight = inverse * (limit / far if far > limit else 1.0)
+        half = 0.5 * inverse * inverse
+        for k in range(lanes):
+            turned[k], grown[k] = off[t, 1 + k] - off[t, 0], size[t, 1 + k] - size[t, 0]
+        for i in range(lanes):
+            for k in range(lanes):
+                found[i, k] += weight * turned[i] * turned[k] + half * grown[i] * grown[k]
+    return found
+
+
 coloured_each = compiled(_coloured_each)
 """One track (samples,), ``known`` (samples,) where it is compared, ``white`` (samples, lanes) variance, ``keep`` and
-``colour`` (lanes,): what is left of the coloured noise from sample to sample, and its variance."""
+``colour`` (lanes,): what is left of the coloured noise from sample to sample, and its variance. Innovations go into
+``off`` (samples, lanes), their variances into ``size``, where the track is compared."""
 moving_each = compiled(_moving_each)
 """The moving car: ``y``, ``known`` and the ``white`` variance that all lanes share are (samples, 3 tracks); ``keep``
-and ``colour`` are (4 disturbances, lanes), ``sensor`` (3 tracks, lanes) is white variance of their own."""
+and ``colour`` are (4 disturbances, lanes), ``sensor`` (3 tracks, lanes) is white variance of their own; ``off`` and
+``size`` are (samples, 3 tracks, lanes)."""
+
+information_of = compiled(_information_of)
+"""Products, (lanes, lanes), of what innovations and their variances (samples, 1 + lanes) change from the first lane to
+the others; innovations beyond ``limit`` standard deviations count less, as in the likelihood."""

@@ -41,7 +41,7 @@ def track_columns(
     radius = float(rig.vehicle.parameters.wheel.rolling_radius_m)
     out = {name: np.zeros((len(frame.fresh), len(worlds)), np.float32) for name in frame.names}
     for k, (stack, step) in enumerate(zip(rig.run_all(worlds), steps, strict=True)):
-        change = {group: ((values - base[group]) / step)[:, :, None] for group, values in stack.items()}
+        change = {group: (values - base[group]) / step for group, values in stack.items()}
         for name, values in tracks_of(change, frame, radius).items():
             out[name][:, k] = np.clip(values[:, 0], -1e12, 1e12)
     return out

@@ -128,19 +128,19 @@ def _known(group: str, values: Floats, moving_now: Floats, resting: Floats) -> d
 
 
 def tracks_of(stack: Stack, frame: Frame, radius_m: float) -> dict[str, Floats]:
-    """Residuals or sensitivities by track; wheel speeds as m/s. Arrays are (samples, channels, columns) by group."""
+    """Residuals or sensitivities (samples, channels) of groups as tracks (samples, 1); wheel speeds as m/s."""
     found: dict[str, Floats] = {}
     for group, values in stack.items():
         if group in SINGLES:
-            found[group] = values[:, 0]
+            found[group] = values
             continue
         factor = radius_m if group == "wheel" else 1.0
         if group == "wheel" and "wheel.front-rear" not in frame.names:
-            found["wheel.mean"] = factor * np.nanmean(values, axis=1)
+            found["wheel.mean"] = factor * np.nanmean(values, axis=1, keepdims=True)
             continue
-        for mode, weights in zip(MODE_NAMES, MODES, strict=True):
-            found[f"{group}.{mode}"] = factor * np.einsum("c,sck->sk", weights, values)
-    return {name: np.nan_to_num(values) for name, values in found.items() if name in frame.names}
+        modes = values @ (factor * MODES.T)
+        found |= {f"{group}.{mode}": modes[:, k : k + 1] for k, mode in enumerate(MODE_NAMES)}
+    return {name: np.where(np.isnan(values), 0.0, values) for name, values in found.items() if name in frame.names}
 
 
 def whiten(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> tuple[dict[str, Floats], float]:

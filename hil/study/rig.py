@@ -254,9 +254,9 @@ class Rig:
             yield from pool.map(self.run, worlds)
 
     def residual(self, world: World) -> Stack:
-        """Measured less simulated, (samples, channels, 1); NaN where nothing is measured."""
+        """Measured less simulated, (samples, channels); NaN where nothing is measured."""
         simulated = self.run(world)
-        return {group: (measured - simulated[group])[:, :, None] for group, measured in self.measured().items()}
+        return {group: measured - simulated[group] for group, measured in self.measured().items()}
 
     def measured(self) -> Stack:
         """Measured channels of all drives."""

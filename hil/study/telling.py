@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hil.study.between import cubic, finer, straight_at
+from hil.study.compiled import compiled
 from hil.study.latency import later
 from hil.study.prepare import ROW_S, SLOW_MPS, Drive, averaged
 from hil.study.sensing import sensed
@@ -28,7 +30,7 @@ Stack = dict[str, Floats]
 """Channels by group, (samples of all drives, channels)."""
 _NODE = {"ax": 0, "ay": 0, "yaw": 0, "pressure": 1, "motor": 2}
 _USUAL_RADIUS_M = 0.3
-_TOOTH_ROWS = 2.0
+_TOOTH_ROWS, _TURNS_RAD_S = 2.0, 0.1
 _FINER = 4
 """Points a row between which a motor's torque goes straight: as it lags it is bent, and a straight line from row to row
 would come 1.3 ms late."""
@@ -70,18 +72,15 @@ class Telling:
             if late:
                 stack[group] = later(values, late / ROW_S, straight=group == "pressure")
             elif group == "wheel":
-                seen = _mean_over(values, world.window_rows2)
-                stack[group] = later(seen, self._tooth_rows(values) * world.tooth_share)
+                half_turned = np.pi / self.parameters.sensor.teeth / ROW_S
+                stack[group] = np.empty_like(values)
+                toothed(values, world.window_rows2, half_turned, world.tooth_share, stack[group])
         if "motor" in happened:
             fine = _finer(happened["motor"], drive.inputs[:, INPUT.slice("motor_torque_bend_nm")])
             fine = sensed({"motor": fine}, theta, ROW_S / _FINER)["motor"]
-            stack["motor"] = later(fine, _FINER * world.late_s[_NODE["motor"]] / ROW_S, straight=True)[::_FINER]
+            stack["motor"] = np.empty_like(happened["motor"])
+            straight_at(fine, _FINER, _FINER * world.late_s[_NODE["motor"]] / ROW_S, stack["motor"])
         return stack
-
-    def _tooth_rows(self, omega_rad_s: Floats) -> Floats:
-        """Half the time between two teeth, rows; two rows at most."""
-        pitch = 2.0 * np.pi / self.parameters.sensor.teeth
-        return np.minimum(0.5 * pitch / np.fmax(np.abs(omega_rad_s), 0.1) / ROW_S, _TOOTH_ROWS)
 
     def _at_measured_speed(self, found: Stack, drive: Drive) -> None:
         """The turning of the car as it is at the measured speed."""
@@ -106,17 +105,23 @@ def powers(speed_mps: Floats, characteristic_mps: float) -> tuple[Floats, Floats
 
 def _finer(torque_nm: Floats, bend_nm: Floats) -> Floats:
     """Torque on rows and between them: a parabola that is off the straight line by ``bend_nm`` in the middle."""
-    share = np.arange(_FINER)[:, None] / _FINER
-    ahead = np.diff(torque_nm, axis=0, append=torque_nm[-1:])
-    return np.asarray(
-        torque_nm[:, None] + share * ahead[:, None] + 4.0 * share * (1.0 - share) * bend_nm[:, None]
-    ).reshape(-1, torque_nm.shape[1])
+    out = np.empty((len(torque_nm) * _FINER, torque_nm.shape[1]))
+    finer(torque_nm, bend_nm, out)
+    return out
 
 
-def _mean_over(values: Floats, window_rows2: float) -> Floats:
-    """Means over a window about each row, by their second derivative; ``window_rows2`` is its width, squared."""
-    if not window_rows2:
-        return values
-    mean = values.copy()
-    mean[1:-1] += window_rows2 / 24.0 * (values[2:] - 2.0 * values[1:-1] + values[:-2])
-    return mean
+@compiled
+def toothed(omega: Floats, window_rows2: float, half_pitch: float, share: float, out: Floats) -> None:
+    """Speeds (rows, wheels) as toothed wheels tell them, when a tooth has passed, into ``out``.
+
+    ``half_pitch`` is half the angle between two teeth, rad rows/s: a speed comes later by a ``share`` of the time that
+    takes, two rows at most. It is a mean over a window of squared width ``window_rows2``, by its second derivative.
+    """
+    last, mean = omega.shape[0] - 1, omega.copy()
+    for t in range(1, last):
+        for k in range(omega.shape[1]):
+            mean[t, k] += window_rows2 / 24.0 * (omega[t + 1, k] - 2.0 * omega[t, k] + omega[t - 1, k])
+    for t in range(omega.shape[0]):
+        for k in range(omega.shape[1]):
+            rows = min(half_pitch / max(abs(omega[t, k]), _TURNS_RAD_S), _TOOTH_ROWS)
+            out[t, k] = cubic(mean, k, t - share * rows)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hil.study.likelihoods import coloured_each, moving_each
+from hil.study.likelihoods import coloured_each, information_of, moving_each
 from hil.study.whiten import coloured, moving
 
 STEP_S, SAMPLES, LANES = 0.02, 400, 5
@@ -22,10 +22,13 @@ def test_one_track() -> None:
     y = rng.standard_normal(SAMPLES)
     y[100] = 40.0  # beyond what is squared
     white, keep, colour = 0.1 + rng.random((SAMPLES, LANES)), rng.uniform(0.5, 0.99, LANES), rng.random(LANES)
-    each = coloured_each(y, fresh, known, white, keep, colour)
+    off, size = np.zeros((SAMPLES, LANES)), np.ones((SAMPLES, LANES))
+    each = coloured_each(y, fresh, known, white, keep, colour, off, size)
     out = np.empty((SAMPLES, 1))
-    alone = [coloured(y[:, None], fresh, known * white[:, k], keep[k], colour[k], out) for k in range(LANES)]
-    assert each == pytest.approx(alone, rel=1e-9)
+    for k in range(LANES):
+        alone = coloured(y[:, None], fresh, known * white[:, k], keep[k], colour[k], out)
+        assert each[k] == pytest.approx(alone, rel=1e-9)
+        assert off[:, k] / np.sqrt(size[:, k]) == pytest.approx(out[:, 0], rel=1e-9)
 
 
 def test_the_moving_car() -> None:
@@ -38,13 +41,26 @@ def test_the_moving_car() -> None:
     white, share = 0.01 + rng.random((SAMPLES, 3)), rng.random(SAMPLES)
     keep, colour = rng.uniform(0.5, 0.99, (4, LANES)), rng.random((4, LANES))
     sensor = rng.random((3, LANES))
-    each = moving_each(y, fresh, restart, rolling, known, white, share, STEP_S, keep, colour, sensor)
+    off, size = np.zeros((SAMPLES, 3, LANES)), np.ones((SAMPLES, 3, LANES))
+    each = moving_each(y, fresh, restart, rolling, known, white, share, STEP_S, keep, colour, sensor, off, size)
     out = np.empty((SAMPLES, 3, 1))
-    alone = [
-        moving(
+    for k in range(LANES):
+        alone = moving(
             y[:, :, None], fresh, restart, rolling, known * (white + sensor[:, k]), share, STEP_S,
             np.stack((keep[:, k], colour[:, k]), axis=1), out,
-        )
-        for k in range(LANES)
-    ]  # fmt: skip
-    assert each == pytest.approx(alone, rel=1e-9)
+        )  # fmt: skip
+        assert each[k] == pytest.approx(alone, rel=1e-9)
+        assert off[:, :, k] / np.sqrt(size[:, :, k]) == pytest.approx(out[:, :, 0], rel=1e-9)
+
+
+def test_information_is_what_innovations_and_variances_change() -> None:
+    """Of white noise whose level is unknown: n / 2 of the log of the variance."""
+    rng = np.random.default_rng(3)
+    step, count = 1e-4, 5000
+    off = np.stack([rng.standard_normal(count)] * 2, axis=1)
+    size = np.ones((count, 2)) * np.exp([0.0, step])
+    assert information_of(off, size, 6.0)[0, 0] / step**2 == pytest.approx(count / 2, rel=1e-3)
+    off[:, 1] += step  # a mean is told by all samples, by one far off in part
+    off[0, 0] += 60.0
+    off[0, 1] += 60.0
+    assert information_of(off, np.ones((count, 2)), 6.0)[0, 0] / step**2 == pytest.approx(count - 0.9, abs=0.02)

@@ -117,3 +117,24 @@ def test_a_little_colour_is_not_lost_in_much_white_noise(seed: int) -> None:
     track = estimate(tracks, frame, first_guess(tracks, frame)).tracks[name]
     assert track.a == pytest.approx(white, rel=0.05)
     assert track.c == pytest.approx(size, rel=0.4)
+
+
+def test_no_noise_nearby_is_likelier_than_the_one_found() -> None:
+    """The search ends at the least cost: every number of the moving car a little off, either way, is no better."""
+    rng, n, step = np.random.default_rng(11), 6000, 0.02
+    keep = np.exp(-step / 1.0)
+    force = lfilter([1.0], [1.0, -keep], 0.05 * np.sqrt(1.0 - keep**2) * rng.standard_normal(n))
+    speed = step * np.cumsum(force) + 0.004 * rng.standard_normal(n)
+    tracks = {"wheel.mean": speed[:, None], "ax": (force + 0.02 * rng.standard_normal(n))[:, None]}
+    fresh = (np.arange(n) == 0) * 1.0
+    ones, zeros = np.ones(n), np.zeros(n)
+    frame = Frame(fresh, zeros, ones, 20.0 * ones, zeros, step, dict.fromkeys(tracks, ones), tuple(tracks))
+    found = estimate(tracks, frame, first_guess(tracks, frame))
+    best = whiten(tracks, frame, found)[1]
+    for change in (0.9, 1.1):
+        for name, track in found.tracks.items():
+            off = replace(found, tracks={**found.tracks, name: replace(track, a=track.a * change)})
+            assert whiten(tracks, frame, off)[1] < best
+        (size, tau_s), *others = found.disturbances
+        for first in ((size * change, tau_s), (size, tau_s * change)):
+            assert whiten(tracks, frame, replace(found, disturbances=(first, *others)))[1] < best + 0.2
