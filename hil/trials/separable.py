@@ -21,11 +21,15 @@ def _table() -> Mapping[str, Mapping[str, Mapping[str, Mapping[str, tuple[float,
 
 
 def separable(record: Record) -> bool:
-    """Whether the one cause a record hides can be told from every other, at the ratio it was asked for.
+    """Whether the one cause a record hides can be told from every other, at the ratio it was asked for."""
+    (hidden,) = record["hidden"]
+    return told_apart(hidden["effect"], hidden["wheel"], record["noise"], record["size"])
+
+
+def told_apart(effect: str, wheel: str, noise_level: str, size: float) -> bool:
+    """Whether an effect at a place can be told from every other at a signal-to-noise ratio.
 
     True where nobody measured it: below a ratio of 8.
     """
-    (hidden,) = record["hidden"]
-    by_size = _table().get(hidden["effect"], {}).get(hidden["wheel"], {}).get(record["noise"], {})
-    told = by_size.get(f"at_{record['size']:g}")
+    told = _table().get(effect, {}).get(wheel, {}).get(noise_level, {}).get(f"at_{size:g}")
     return told is None or told[0] >= SEPARATED

@@ -10,6 +10,7 @@ import pytest
 from hil.hide.case import Case
 from hil.hide.cases import SEPARABLE, draw
 from hil.trials.run import run_case
+from hil.trials.separable import told_apart
 from hil.trials.sources import SOURCES, STUDIED
 from plant.compiled import digest
 
@@ -33,10 +34,11 @@ def seed() -> int:
 
 
 def _singles(seed: int) -> Iterator[Case]:
-    """Cases that reach the size asked for, effects in a drawn order."""
+    """Cases that reach the size asked for and can be told from all others, effects in a drawn order."""
     for index in np.random.default_rng(seed).permutation(len(SEPARABLE)):
         case = draw("single", int(index), seed, SNR)
-        if case.reached:
+        (hidden,) = case.hidden
+        if case.reached and told_apart(hidden.effect, hidden.wheel, case.noise_level, SNR):
             yield case
 
 
