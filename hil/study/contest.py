@@ -8,10 +8,10 @@ from typing import TypeVar
 import numpy as np
 
 from hil.study.candidates import Candidate
+from hil.study.compiled import WORKERS
 from hil.study.fit import Fitter, Model, Term, Tracks
 from hil.study.noise import Noise
 from hil.study.onset import begins
-from hil.study.rig import WORKERS
 from hil.study.screen import Score, rescored, share_of, sized
 
 _ROUNDS, _SETTLED = 4, 1.0

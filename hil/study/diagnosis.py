@@ -11,9 +11,9 @@ from hil.study.prepare import Case
 from hil.study.screen import Score
 from hil.study.vehicle import Vehicle
 
-ALPHA = 3e-4
+ALPHA = 1e-3
 """Chance of a false alarm in one set of logs if the model's own error were normal. One in a hundred may be borne; the
-rest is kept for tails heavier than that (decision 0065)."""
+rest is kept for tails heavier than that (decision 0077)."""
 MOST_CAUSES = 3
 TIED = 9.2
 """Twice the log of the odds, 100 to 1, within which causes are not told apart."""

@@ -10,6 +10,7 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import savgol_filter
 
 from hil.study import acting
+from hil.study.compiled import WORKERS
 from hil.study.latency import in_time
 from hil.study.prepare import ROW_S, SLOW_MPS, Case, Drive, Segment, averaged
 from hil.study.sensing import inverted, wheel_speed_before
@@ -28,7 +29,6 @@ from plant.vectors import INPUT, OUTPUT, STATE, P, U, X
 
 STEPS = 4
 """Steps in a row where a torque changes quickly; elsewhere they are made as one (`_at_once`)."""
-WORKERS = 2
 _QUICK_NM, _RINGS_ROWS = 3.0, 12
 _QUICK_PA, _FOLLOWS_ROWS = 2e4, 20
 _OF_NOISE = 4.0

@@ -10,7 +10,7 @@ from hil.hide.files import write
 from hil.study.answer import Answer
 from hil.study.basis import PIECES
 from hil.study.candidates import kind_of
-from hil.study.diagnosis import Diagnosis, Settings
+from hil.study.diagnosis import Diagnosis
 from hil.study.explain import explain
 from hil.study.own_error import UNLISTED, USUAL
 from hil.study.race import LawRace
@@ -27,14 +27,15 @@ def measure(count: int, seed: int, say: Callable[[str], None]) -> Gains:
     """Gains of every number of an effect, and of every law in no list, by kind of place, over ``count`` null cases.
 
     All places count, not the better ones: the best of nine explains twice what one does by chance alone, and how many
-    looks are taken is the threshold's business (`hil.study.screen.threshold`).
+    looks are taken is the threshold's business (`hil.study.screen.threshold`). They are taken where the whole search
+    ends, which may have begun again from numbers that explain more.
     """
     found: Gains = defaultdict(list)
     for index in range(count):
         with TemporaryDirectory() as folder:
             logs = Path(folder) / "logs"
             write(draw("null", index, seed), logs)
-            answer = explain(logs, logs / "vehicle.toml", settings=Settings(most_causes=0))
+            answer = explain(logs, logs / "vehicle.toml")
         assert isinstance(answer, Answer)  # the hidden car's logs tell forces
         for key, gain in (*_of_numbers(answer.found.screened), *_of_laws(answer.found)):
             found[key].append(gain)
@@ -52,7 +53,7 @@ def _of_numbers(screened: Iterable[Score]) -> Iterator[tuple[Key, float]]:
 def _of_laws(found: Diagnosis) -> Iterator[tuple[Key, float]]:
     """Gains of the laws in no list, by coefficient."""
     fitter, model = found.fitter, found.base
-    for entry in LawRace(fitter, fitter.world(model.z, ())).entries(fitter, model, found.noise):
+    for entry in LawRace(fitter, fitter.world(model.z, ())).entries(fitter, model, found.first_noise):
         yield (UNLISTED, entry.curve.law.name, kind_of(entry.curve.place)), entry.gain / PIECES
 
 

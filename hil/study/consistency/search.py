@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from scipy.stats import t as student
 
+from hil.study.compiled import WORKERS
 from hil.study.consistency.likelihood import Fit, Values, deviations, fit, usual
 from hil.study.consistency.model import Model
 from hil.study.table import Floats
@@ -17,7 +18,6 @@ _STARTS: Mapping[str, Sequence[float]] = {
     "gain": (0.0, -0.5, 0.5, -2.0), "filter_s": (0.02, 0.1, 0.5, 2.0), "delay_s": (0.02, -0.02, 0.15, -0.15),
     "yaw_gain": (0.0, -2.0), "ay_gain": (0.0, -2.0),
 }  # fmt: skip
-_WORKERS = 2
 Say = Callable[[str], None]
 
 
@@ -81,7 +81,7 @@ def search(
     names = [n for n in (candidates or model.numbers) if n not in always]
     while len(found.steps) < most:
         left = [n for n in names if n not in found.final.sensor]
-        with ThreadPoolExecutor(_WORKERS) as pool:
+        with ThreadPoolExecutor(WORKERS) as pool:
             tried = dict(zip(left, pool.map(lambda n: _with(found, n), left), strict=True))
         taken = _take(found, tried)
         if taken is None:
