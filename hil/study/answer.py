@@ -19,6 +19,8 @@ from hil.study.patterns import WORDS, Wrong
 from hil.study.tied import Tied, tied_set
 
 _MOST_TIED = 5
+_SILENT = 0.5
+"""Share of the effects that the manoeuvres would not show, beyond which finding nothing says nothing."""
 _CERTAIN = 4.6
 """Difference in chi2 (ten to one) below which a cause of another name is not told apart."""
 
@@ -69,7 +71,8 @@ def answer(
 
 def _verdict(found: Diagnosis, causes: list[dict[str, Any]], tied: Tied | None) -> str:
     if not causes:
-        return "none"
+        effects = {item.candidate.effect.name for item in found.screened}
+        return "not_testable" if len(effects.intersection(found.untestable)) > _SILENT * len(effects) else "none"
     if any(isinstance(term.candidate, Piece) for term in found.final.terms):
         return "unlisted"
     if tied is not None and tied.indices:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from outsider import VEHICLE, logs
+from outsider import VEHICLE, drive, logs
 
 from hil.study.diagnosis import Settings
 from hil.study.explain import explain
@@ -25,6 +25,16 @@ def _bump(speed_mps: float, pressure_pa: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("first_seed", [7, 507, 807])
 def test_nothing_is_named_where_the_car_is_only_simpler(first_seed: int) -> None:
     assert explain(logs(_plain, first_seed), vehicle=VEHICLE).json["verdict"] == "none"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_car_that_only_rolls_says_too_little() -> None:
+    """Neither brakes nor motors act: most effects would not show, so that nothing was found is no clean bill."""
+    answer = explain([drive("coast", 7, _plain)], vehicle=VEHICLE).json
+    assert answer["verdict"] == "not_testable"
+    assert {"pad_mu_gain", "iwm_gain"} <= set(answer["not_testable"])
+    assert not answer["causes"]
 
 
 @pytest.mark.slow
