@@ -13,6 +13,8 @@ from hil.study.table import Floats
 
 ASKED = 20.0
 """Gain in -2 log likelihood asked of a number: noise gives it once in 100,000 looks, were the model true."""
+_WORTH_A_FIT = 0.5
+"""Share of that from which a number that was tried for a few rounds is fitted to the end: it may gain more then."""
 ALPHA = 0.003
 _STARTS: Mapping[str, Sequence[float]] = {
     "gain": (0.0, -0.5, 0.5, -2.0), "filter_s": (0.02, 0.1, 0.5, 2.0), "delay_s": (0.02, -0.02, 0.15, -0.15),
@@ -110,9 +112,11 @@ def _with(found: Found, number: str) -> Fit:
 
 def _take(found: Found, tried: Mapping[str, Fit]) -> tuple[Step, Fit, Values] | None:
     for number in sorted(tried, key=lambda n: tried[n].cost):
-        if found.final.cost - tried[number].cost < ASKED:
+        if found.final.cost - tried[number].cost < _WORTH_A_FIT * ASKED:
             return None
         better = fit(found.model, tried[number].sensor, tried[number].noise, fixed=found.handed)
+        if found.final.cost - better.cost < ASKED:
+            continue
         deviation = deviations(found.model, better, found.block, found.handed)
         if _beyond(found, better, deviation, number):
             others = {n: f for n, f in tried.items() if n != number}
