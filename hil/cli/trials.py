@@ -18,8 +18,9 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="blind trials of explain: hide, explain, open the answer, score",
         description="Draws cases of a family from a car that shares no code with the plant, lets explain look at the "
         "logs alone, opens the sealed answer and scores it. Every finished case is appended to DIR/cases.jsonl; a "
-        "second run goes on where the first one ended. DIR/table.json has scores and misses of all families with this "
-        "seed, DIR/confusion.png what was named for what was hidden. A case takes one to five minutes.",
+        "second run goes on where the first one ended, and families may run side by side. DIR/table.json has scores "
+        "and misses of all families with this seed, DIR/confusion.png what was named for what was hidden. A case takes "
+        "half a minute to three.",
         epilog="families: null, nothing hidden; single, one effect at signal-to-noise 15, 8, 5 and 3; two and three at "
         "once; onset, one that begins in the middle; unlisted, a law in no list; confounded, straight stops that leave "
         "the cause open, then the manoeuvres that decide; twin, a sensor against its physical twin; not_testable, what "

@@ -42,7 +42,10 @@ def plan(family: str, count: int) -> list[tuple[str, int, float | None]]:
 def run_family(
     family: str, count: int, seed: int, out: Path, say: Say, settings: Settings | None = None
 ) -> list[Record]:
-    """Run what is not yet in ``out/cases.jsonl``; all records of the family, in order of the plan."""
+    """Run what is not yet in ``out/cases.jsonl``; all records of the family, in order of the plan.
+
+    Several processes may do so with different families.
+    """
     out.mkdir(parents=True, exist_ok=True)
     path = out / "cases.jsonl"
     done = {_key(record): record for record in _read(path) if record["seed"] == seed}
@@ -51,8 +54,8 @@ def run_family(
         key = (drawn, index, size)
         if key not in done:
             done[key] = run_case(draw(drawn, index, seed, size), seed, size, settings)
-            with path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(done[key]) + "\n")
+            with path.open("ab", buffering=0) as file:  # one write: other families may be appending too
+                file.write(f"{json.dumps(done[key])}\n".encode())
         records.append(done[key])
         say(f"{family} {index} {'' if size is None else size}: {done[key]['verdict']} {done[key]['named'][:1]}")
     return records
