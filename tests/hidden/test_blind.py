@@ -36,6 +36,11 @@ def test_what_was_an_alarm_once_is_none_now(index: int, seed: int) -> None:
     assert run_case(draw("null", index, seed), seed, None)["causes"] == []
 
 
+@pytest.mark.xfail(strict=True, reason="a play of 19 kPa in the callipers of one side is told, gain 22.6")
+def test_play_that_nobody_hid_is_not_told() -> None:
+    assert run_case(draw("null", 23, 68), 68, None)["causes"] == []
+
+
 @pytest.mark.parametrize("effect", ["pad_temp_fade", "mu_nv_dynamics", "mu_warmup"])
 def test_a_single_cause_is_named(effect: str) -> None:
     record = run_case(draw("single", SINGLES.index(effect), SEED, 15.0), SEED, 15.0)
