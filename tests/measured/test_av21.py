@@ -34,6 +34,8 @@ def test_the_channels_that_lie(answer):
     assert 2.0 < slow["ci95"][0] < slow["ci95"][1] < 2.8
     late = _cause(answer, "timestamp_offset", "pressure")["parameters"]["delay_s"]
     assert 0.3 < late["ci95"][0] < late["ci95"][1] < 0.5
+    ahead = _cause(answer, "imu_position", "imu")["parameters"]["x_m"]
+    assert -1.1 < ahead["ci95"][0] < ahead["ci95"][1] < -0.7
     assert any("feels no road" in text for text in answer["remarks"])
     gain = answer["gain"]["ax_mps2"]
     assert gain["ci95"][1] < 0.05 * gain["before"]

@@ -23,6 +23,10 @@ from plant.effects.theta import THETA
 _ROLL = 0.15  # the body rolls, and its accelerometer with it (effects, 56)
 _TRACK = 0.03
 _PULLED_MPS2, _PULLED_S = 0.7, 5.0
+_NO_ROAD = 0.02
+"""Slope, m/s2, below which an accelerometer feels no road: roads are 1 to 3 % (effects, 1), 0.1 m/s2 and more."""
+_DEAD = -0.5
+"""Scale, of 1, off by which a channel would not show a road it felt."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +155,7 @@ def _remarks(models: Mapping[str, Found], causes: Sequence[Cause]) -> list[str]:
         if not limit.low <= c.names[0].factor * c.value <= limit.high:
             said.append(f"{c.names[0].effect}: larger than any sensor's ({limit.low:g} to {limit.high:g} {limit.unit})")
     along = models.get("along")
-    if along is not None and along.final.noise["slope_mps2"] < 0.02 and "gain" not in along.final.sensor:
+    if along is not None and along.final.noise["slope_mps2"] < _NO_ROAD and along.numbers.get("gain", 0.0) > _DEAD:
         said.append(
             f"ax_mps2 feels no road: a slope of {along.final.noise['slope_mps2']:.3f} m/s2 at most goes with it. "
             "An accelerometer feels gravity; this channel is computed from the speed"

@@ -14,6 +14,8 @@ Values = dict[str, float]
 _STEP = 1e-3
 NOTHING: Mapping[str, float] = MappingProxyType({})
 _WIDEST = 3.0
+_NO_STEP = 2
+"""Status of a search along which no step was good enough."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +37,9 @@ def fit(
     weights: Floats | None = None, rounds: int = 40, only_sensor: bool = False,
 ) -> Fit:  # fmt: skip
     """Move the numbers ``sensor`` and all noise to the largest likelihood.
+
+    Where a number that cells resolve stands at the edge of one, the likelihood has a step or a bend that no search
+    along a gradient passes: the others go on without it.
 
     Parameters
     ----------
@@ -62,6 +67,10 @@ def fit(
     bounds = [(_scaled(number, number.low), _scaled(number, number.high)) for number in numbers]
     options = {"maxiter": rounds, "eps": _STEP, "ftol": 1e-9, "maxls": 15}
     found = minimize(cost, z0, method="L-BFGS-B", bounds=bounds, options=options)
+    edged = [n in model.resolution for n in names]
+    if found.status == _NO_STEP and any(edged) and not all(edged):
+        held = [(z, z) if e else b for e, z, b in zip(edged, found.x, bounds, strict=True)]
+        found = minimize(cost, found.x, method="L-BFGS-B", bounds=held, options=options)
     moved, noisy = split(found.x)
     return Fit(moved, noisy, float(found.fun))
 

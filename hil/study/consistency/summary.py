@@ -48,10 +48,11 @@ def build_report(answer: Consistency, sources: Sequence[str]) -> Report:
 def _cards(answer: Consistency) -> list[Number]:
     cards = [Number("Verdict", answer.json["verdict"].replace("_", " "))]
     for cause in answer.json["causes"]:
-        for name, entry in cause["parameters"].items():
+        for entry in cause["parameters"].values():
             low, high = entry["ci95"]
-            label = f"{', '.join(cause['channels'])}: {cause['effect'].replace('_', ' ')}, {name.replace('_', ' ')}"
-            cards.append(Number(label, _short(entry["value"]), entry["unit"], note=f"95 %: {low:.3g} to {high:.3g}"))
+            label = f"{cause['effect'].replace('_', ' ')} ({cause['wheel']})"
+            note = f"{', '.join(cause['channels'])}; 95 %: {low:.3g} to {high:.3g}"
+            cards.append(Number(label, _short(entry["value"]), entry["unit"], note=note))
     for miss in answer.misses:
         if miss.before > 0.0 and miss.held_out < 0.8 * miss.before:
             note = "on manoeuvres that no fit saw"

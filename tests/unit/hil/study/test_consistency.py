@@ -5,6 +5,8 @@ import pytest
 
 from hil.study.consistency.along import Along
 from hil.study.consistency.check import unforced
+from hil.study.consistency.likelihood import fit
+from hil.study.consistency.model import Model, Number
 from hil.study.consistency.motion import motion_of
 from hil.study.consistency.search import search
 from hil.study.explain import explain
@@ -39,6 +41,25 @@ def _log(seed: int, gain: float = 0.0, late: int = 0) -> Log:
 def _found(log: Log):
     motion = motion_of([log], RADIUS_M)
     return search(Along(motion), motion.block, {}, {}, lambda _: None)
+
+
+class _Cells(Model):
+    """A delay that gets likelier up to the edge of a cell, and is unlikely beyond; a scale whose best value is 0.5."""
+
+    def __init__(self):
+        self.noise = {}
+        self.numbers = {"delay_s": Number(0.0, -0.5, 0.5, 0.02), "gain": Number(0.0, -1.0, 1.0, 0.05)}
+        self.resolution = {"delay_s": 0.02}
+
+    def score(self, sensor, noise):
+        late = sensor["delay_s"]
+        return np.zeros((1, 1)), np.array([(late if late < 0.12 else -10.0) - 100.0 * (sensor["gain"] - 0.5) ** 2])
+
+
+def test_a_delay_at_the_edge_of_a_cell_holds_no_other_number_back():
+    found = fit(_Cells(), {"delay_s": 0.11998, "gain": 0.0}, {})
+    assert found.sensor["gain"] == pytest.approx(0.5, abs=1e-3)
+    assert found.sensor["delay_s"] == pytest.approx(0.12, abs=1e-4)
 
 
 @pytest.mark.slow
