@@ -36,9 +36,11 @@ def test_what_was_an_alarm_once_is_none_now(index: int, seed: int) -> None:
     assert run_case(draw("null", index, seed), seed, None)["causes"] == []
 
 
-@pytest.mark.xfail(strict=True, reason="a play of 19 kPa in the callipers of one side is told, gain 22.6")
-def test_play_that_nobody_hid_is_not_told() -> None:
-    assert run_case(draw("null", 23, 68), 68, None)["causes"] == []
+@pytest.mark.xfail(strict=True, reason="a small cause is told whose interval is less than 4 deviations from nothing")
+@pytest.mark.parametrize("index", [23, 188, 212, 289])
+def test_what_nobody_hid_is_not_told(index: int) -> None:
+    """Play, a steering zero, a drag and a weak brake: the four alarms of 300 drives (docs/trials.md)."""
+    assert run_case(draw("null", index, 68), 68, None)["causes"] == []
 
 
 @pytest.mark.parametrize("effect", ["pad_temp_fade", "mu_nv_dynamics", "mu_warmup"])
