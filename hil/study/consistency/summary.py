@@ -48,10 +48,10 @@ def build_report(answer: Consistency, sources: Sequence[str]) -> Report:
 def _cards(answer: Consistency) -> list[Number]:
     cards = [Number("Verdict", answer.json["verdict"].replace("_", " "))]
     for cause in answer.json["causes"]:
-        for entry in cause["parameters"].values():
+        for name, entry in cause["parameters"].items():
             low, high = entry["ci95"]
-            label = f"{cause['effect'].replace('_', ' ')} ({cause['wheel']})"
-            note = f"{', '.join(cause['channels'])}; 95 %: {low:.3g} to {high:.3g}"
+            label = f"{', '.join(cause['channels'])}: {cause['effect'].replace('_', ' ')}"
+            note = f"{name.replace('_', ' ')}; 95 %: {low:.3g} to {high:.3g}"
             cards.append(Number(label, _short(entry["value"]), entry["unit"], note=note))
     for miss in answer.misses:
         if miss.before > 0.0 and miss.held_out < 0.8 * miss.before:
