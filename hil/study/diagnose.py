@@ -11,6 +11,7 @@ from hil.study.diagnosis import TIED, Diagnosis, Settings, causes_in
 from hil.study.field import Field, number_of
 from hil.study.fit import Fitter, Model
 from hil.study.handed_in import Refitted, from_handed_in
+from hil.study.intervals import deviations
 from hil.study.left_over import FORM, LeftOver
 from hil.study.noise import Frame, Noise
 from hil.study.numbers import STRAINED, Numbers, strain
@@ -43,8 +44,9 @@ _DATED = 2
 """Contenders for which it is asked when they begin before they are compared."""
 _LAWS_BESIDE = 4
 """Laws that are looked at with noise of their own."""
-_SURE = 3.0
-"""Standard deviations, the model's own error among them, that a cause beside another must be away from nothing."""
+_SURE = 0.05
+"""Chance that noise takes any of all values so far from nothing as is asked of one, in its own deviations, which know
+how far manoeuvres disagree: a second question beside what a cause explains (decision 0078)."""
 _HOPELESS, _POOR = 0.1, 0.4
 """Shares of the gain asked: below the one no candidate is looked at with noise of its own, below the other none is
 fitted."""
@@ -102,10 +104,9 @@ class _Search:
             bent, model = model, restated(model, self.numbers.nuisances, self.fitter.base)
             around = around + model.z - bent.z
         if model.terms:
+            bare = found.fitter
             found.final, found.noise, found.fitter = model, noise, self.fitter
-        if causes_in(model) > 1:
-            self._backward(found)
-            found.final = restated(found.final, self.numbers.nuisances, self.fitter.base)
+            self._backward(found, bare)
         return found
 
     def _screened(self, found: Diagnosis) -> None:
@@ -344,22 +345,34 @@ class _Search:
         gained = gained / self._strain(contender.model.z) - chosen
         return replace(contender, gained=gained)
 
-    def _backward(self, found: Diagnosis) -> None:
-        """Take out each cause in turn; what is not missed, or may as well be nothing, stays out."""
-        model = found.final
-        for k in reversed(range(len(model.terms))):
-            term = model.terms[k]
+    def _backward(self, found: Diagnosis, bare: Fitter) -> None:
+        """Take out each cause in turn; what is not missed, or may as well be nothing, stays out.
+
+        ``bare`` is the fitter of the model without any.
+        """
+        for k in reversed(range(len(found.final.terms))):
+            model, term = found.final, found.final.terms[k]
             if isinstance(term.candidate, Piece):
                 continue
-            error = variance_of(term.candidate) * self._strain(model.z)
+            error = variance_of(term.candidate)
+            away = abs(term.value) / (float(deviations(found)[k]) * float(np.sqrt(error)))
+            asked = float(np.sqrt(threshold(found.looks, _SURE)))
+            sure = away >= asked
+            why = "not needed beside the others" if sure else f"{away:.1f} deviations from nothing, asked {asked:.1f}"
+            if sure and causes_in(model) == 1:
+                return
             rest = tuple(other for j, other in enumerate(model.terms) if j != k)
             without = self.fitter.fit(self.fitter.at(model.z, rest, found.noise), found.noise, 5)
-            missed = without.cost - model.cost >= found.least_gain * error
-            if not missed or term.value**2 < _SURE**2 * error * float(model.covariance[k, k]):
-                self.say(f"{term.candidate.name} is not needed any more")
-                model = without
+            if not sure or without.cost - model.cost < found.least_gain * error * self._strain(model.z):
+                found.remarks.append(f"{term.candidate.name} = {term.value:.3g} is not told: {why}")
+                self.say(found.remarks[-1])
+                found.final = without
                 del found.contenders[k]
-        found.final = model
+        if found.final.terms:
+            found.final = restated(found.final, self.numbers.nuisances, self.fitter.base)
+            return
+        found.final, found.noise, found.fitter = found.base, found.first_noise, bare
+        self.rig.quieten(bare.world(found.base.z, found.base.terms))
 
 
 def _most(listed: Sequence[Score], left: LeftOver) -> float:

@@ -66,7 +66,8 @@ def explain(
         names = ", ".join(term.candidate.name for term in found.final.terms) or "no effect"
         extended = found.fitter.world(found.final.z, found.final.terms)
         write_extension(Path(written), handed_in, extended, found.final, f"Taught by {len(read)} logs: {names}")
-    remarks = [*car.remarks, *(f"{drive.log.name}: {text}" for drive in case.drives for text in drive.log.remarks)]
+    read_so = (f"{drive.log.name}: {text}" for drive in case.drives for text in drive.log.remarks)
+    remarks = [*car.remarks, *read_so, *found.remarks]
     return answer(found, gained, missed, written, remarks, None if out is None else Path(out))
 
 

@@ -32,7 +32,7 @@ def intervals(found: Diagnosis) -> list[tuple[float, float]]:
         return []
     world, nuisances = fitter.base.shifted(fitter.nuisances, model.z), fitter.nuisances
     bounds = []
-    for term, deviation in zip(model.terms, _deviations(found), strict=True):
+    for term, deviation in zip(model.terms, deviations(found), strict=True):
         half = half_width(term.candidate, term.value, float(deviation))
         same = same_number(term, nuisances, world)
         if same is not None:
@@ -43,7 +43,7 @@ def intervals(found: Diagnosis) -> list[tuple[float, float]]:
     return bounds
 
 
-def _deviations(found: Diagnosis) -> Floats:
+def deviations(found: Diagnosis) -> Floats:
     """Standard deviation of each value by noise: curvature of the likelihood, more where manoeuvres disagree."""
     model, fitter = found.final, found.fitter
     own, count = fitter.term_columns(model), len(fitter.nuisances)

@@ -8,6 +8,8 @@ import numpy as np
 from hil.report.report import Chart, Curve, Number, Panel, Report, Section, Table, Trace, Verdict
 from hil.report.units import BAR, Display, Unit
 from hil.study.answer import Answer
+from hil.study.contest import Contender
+from hil.study.diagnosis import TIED
 from hil.study.fit import Model
 from hil.study.measure import Gain, probabilities
 from hil.study.patterns import UNITS, WORDS
@@ -220,8 +222,9 @@ def _laws(answer: Answer) -> list[Section]:
 def _race(answer: Answer) -> Section:
     """Who was in the race, and how far apart they are."""
     found = answer.found
-    tables = []
+    tables, charts = [], []
     for k, listed in enumerate(found.races):
+        charts += _behind(f"Cause {k + 1}: how much worse than the best each candidate fits", listed)
         chances = probabilities(listed)
         rows = tuple(
             (
@@ -235,7 +238,7 @@ def _race(answer: Answer) -> Section:
                 f"Cause {k + 1}: candidates, fitted non-linearly",
                 ("candidate", "name", "value", "unit", "Δχ² to the best", "probability %"),
                 rows,
-                note="Below Δχ² 9.2 two candidates are rivals.",
+                note=f"Below Δχ² {TIED} two candidates are rivals.",
             )
         )
     top = sorted(found.screened, key=lambda s: -s.gain)[:15]
@@ -253,8 +256,19 @@ def _race(answer: Answer) -> Section:
     bars = Curve("gain", np.arange(1.0, len(top) + 1.0), np.array([s.gain for s in top]), style="points")
     asked = Curve("asked of a cause", np.array([0.5, len(top) + 0.5]), np.full(2, found.least_gain), style="demand")
     names = tuple(s.candidate.name for s in top)
-    chart = Chart("Explained by each candidate alone", "candidate", "", "Δχ²", "", (bars, asked), names)
-    return Section("Candidates", tables=tuple(tables), charts=(chart,) if top else ())
+    alone = Chart("Screen: explained by each candidate alone", "candidate", "", "Δχ²", "", (bars, asked), names)
+    return Section("Candidates", tables=tuple(tables), charts=(*charts, alone) if top else ())
+
+
+def _behind(title: str, listed: Sequence[Contender]) -> list[Chart]:
+    """Candidates for one cause, as fitted, and the line below which they are rivals."""
+    if len(listed) < 2:
+        return []
+    rows = np.arange(1.0, len(listed) + 1.0)
+    behind = Curve("fitted", rows, np.array([c.cost - listed[0].cost for c in listed]), style="points", group="fl")
+    rivals = Curve("rivals below", np.array([0.5, len(listed) + 0.5]), np.full(2, TIED), style="demand")
+    names = tuple(c.term.candidate.name for c in listed)
+    return [Chart(title, "candidate", "", "Δχ² to the best", "", (behind, rivals), names)]
 
 
 def _gained(answer: Answer) -> Section:

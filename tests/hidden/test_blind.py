@@ -29,18 +29,16 @@ def test_a_time_to_begin_at_makes_no_cause_of_noise() -> None:
     assert run_case(draw("null", 3, 9001), 9001, None)["causes"] == []
 
 
-@pytest.mark.parametrize(("index", "seed"), [(0, 68), (1, 778)])
+_TOLD_YET = pytest.mark.xfail(strict=True, reason="a steering zero of 0.15 mrad, 3.8 deviations from nothing")
+
+
+@pytest.mark.parametrize(
+    ("index", "seed"), [(0, 68), (1, 778), (23, 68), (212, 68), (289, 68), pytest.param(188, 68, marks=_TOLD_YET)]
+)
 def test_what_was_an_alarm_once_is_none_now(index: int, seed: int) -> None:
     """A zero of one pressure sensor, where a little colour was lost in much noise; a clock that drifts, where the car
-    acted on demands that no frame had told."""
+    acted on demands that no frame had told; play, a drag and a weak brake on which manoeuvres disagree."""
     assert run_case(draw("null", index, seed), seed, None)["causes"] == []
-
-
-@pytest.mark.xfail(strict=True, reason="a small cause is told whose interval is less than 4 deviations from nothing")
-@pytest.mark.parametrize("index", [23, 188, 212, 289])
-def test_what_nobody_hid_is_not_told(index: int) -> None:
-    """Play, a steering zero, a drag and a weak brake: the four alarms of 300 drives (docs/trials.md)."""
-    assert run_case(draw("null", index, 68), 68, None)["causes"] == []
 
 
 @pytest.mark.parametrize("effect", ["pad_temp_fade", "mu_nv_dynamics", "mu_warmup"])
