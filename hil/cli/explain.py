@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from hil.cli.options import add_json
-from hil.study.table import UnusableError
+from hil.study.logs.table import UnusableError
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     from hil.study.consistency.check import Consistency
     from hil.study.consistency.summary import build_report as sensor_report
     from hil.study.explain import explain
-    from hil.study.summary import build_report
+    from hil.study.verdict.summary import build_report
 
     def say(text: str) -> None:
         print(f"  {text} ...", file=sys.stderr)

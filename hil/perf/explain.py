@@ -21,8 +21,8 @@ from hil.perf.rivals import NONE, RIVALS, Guess
 from hil.perf.row import Row
 from hil.perf.signatures import problem
 from hil.rt.clock import process_cpu_time_ns
-from hil.study.answer import Answer
 from hil.study.explain import explain
+from hil.study.verdict.answer import Answer
 
 SEED, SNR = 1, 15.0
 SINGLES = (7, 22, 37, 52)

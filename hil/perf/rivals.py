@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.perf.signatures import Problem
-from hil.study.diagnosis import ALPHA
-from hil.study.screen import threshold
-from hil.study.table import Floats
+from hil.study.logs.table import Floats
+from hil.study.search.diagnosis import ALPHA
+from hil.study.search.screen import threshold
 
 NONE = "none"
 _CONDITION = 1e10

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from hil.study.candidates import Column, candidates, columns
-from hil.study.estimate import first_guess
-from hil.study.linear import track_columns
-from hil.study.noise import Frame, tracks_of
-from hil.study.prepare import prepare
-from hil.study.read import read_logs
-from hil.study.rig import Rig
-from hil.study.table import Floats
-from hil.study.vehicle import load_vehicle
-from hil.study.world import nominal
+from hil.study.fitting.candidates import Column, candidates, columns
+from hil.study.fitting.linear import track_columns
+from hil.study.likelihood.estimate import first_guess
+from hil.study.likelihood.noise import Frame, tracks_of
+from hil.study.logs.prepare import prepare
+from hil.study.logs.read import read_logs
+from hil.study.logs.table import Floats
+from hil.study.replay.rig import Rig
+from hil.study.replay.vehicle import load_vehicle
+from hil.study.replay.world import nominal
 
 _LEAST_REACH = 1e-3
 """Norm, in standard deviations of the noise, that the largest allowed value must make: below, nothing is to be seen."""
@@ -44,7 +44,7 @@ class Problem:
 def problem(logs: Sequence[Path], vehicle: Path) -> Problem:
     """Of logs, or folders of them: no number of the vehicle is fitted and no disturbance is modelled.
 
-    Inputs are rid of noise, tracks masked and sensitivities taken as `hil.study.diagnose` does.
+    Inputs are rid of noise, tracks masked and sensitivities taken as `hil.study.search.diagnose` does.
     """
     car = load_vehicle(vehicle)
     base = nominal(car)

@@ -8,19 +8,19 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from dbc.database import parse_database
-from hil.study.answer import Answer, answer
-from hil.study.channel_map import load_map
 from hil.study.consistency.check import Consistency, check, unforced
-from hil.study.diagnose import Say, diagnose
-from hil.study.diagnosis import Settings
-from hil.study.extension import load_extension, write_extension
-from hil.study.measure import gains
-from hil.study.patterns import wrongs
-from hil.study.prepare import prepare, without_unstated
-from hil.study.read import from_frame, read_logs
-from hil.study.table import Log
-from hil.study.vehicle import Vehicle, load_vehicle
-from hil.study.world import nominal
+from hil.study.logs.channel_map import load_map
+from hil.study.logs.prepare import prepare, without_unstated
+from hil.study.logs.read import from_frame, read_logs
+from hil.study.logs.table import Log
+from hil.study.replay.vehicle import Vehicle, load_vehicle
+from hil.study.replay.world import nominal
+from hil.study.search.diagnose import diagnose
+from hil.study.search.diagnosis import Say, Settings
+from hil.study.verdict.answer import Answer, answer
+from hil.study.verdict.extension import load_extension, write_extension
+from hil.study.verdict.measure import gains
+from hil.study.verdict.patterns import wrongs
 
 
 def explain(
@@ -44,7 +44,7 @@ def explain(
 
     Raises
     ------
-    hil.study.table.UnusableError
+    hil.study.logs.table.UnusableError
         Data or files that nothing can be concluded from: the message says why.
     """
     car = load_vehicle(shipped(Path(vehicle), "vehicle") if isinstance(vehicle, str | Path) else vehicle)

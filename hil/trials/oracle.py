@@ -8,13 +8,13 @@ from typing import Any
 
 from hil.hide.case import Case
 from hil.hide.files import write
-from hil.study.answer import Answer
-from hil.study.candidates import candidates, columns
-from hil.study.diagnosis import Diagnosis, Settings
 from hil.study.explain import explain
-from hil.study.fit import Fitter
-from hil.study.measure import gains
-from hil.study.patterns import WORDS
+from hil.study.fitting.candidates import candidates, columns
+from hil.study.fitting.fit import Fitter
+from hil.study.search.diagnosis import Diagnosis, Settings
+from hil.study.verdict.answer import Answer
+from hil.study.verdict.measure import gains
+from hil.study.verdict.patterns import WORDS
 from hil.trials.names import numbers
 
 Errors = dict[str, float]

@@ -7,14 +7,14 @@ from tempfile import TemporaryDirectory
 
 from hil.hide.cases import draw
 from hil.hide.files import write
-from hil.study.answer import Answer
-from hil.study.basis import PIECES
-from hil.study.candidates import kind_of
-from hil.study.diagnosis import Diagnosis
 from hil.study.explain import explain
-from hil.study.own_error import UNLISTED, USUAL
-from hil.study.race import LawRace
-from hil.study.screen import Score
+from hil.study.fitting.candidates import kind_of
+from hil.study.fitting.own_error import UNLISTED, USUAL
+from hil.study.search.basis import PIECES
+from hil.study.search.diagnosis import Diagnosis
+from hil.study.search.race import LawRace
+from hil.study.search.screen import Score
+from hil.study.verdict.answer import Answer
 
 _PRIOR_CASES = 6
 _LEAST_USUAL = 0.3
@@ -27,8 +27,8 @@ def measure(count: int, seed: int, say: Callable[[str], None]) -> Gains:
     """Gains of every number of an effect, and of every law in no list, by kind of place, over ``count`` null cases.
 
     All places count, not the better ones: the best of nine explains twice what one does by chance alone, and how many
-    looks are taken is the threshold's business (`hil.study.screen.threshold`). They are taken where the whole search
-    ends, which may have begun again from numbers that explain more.
+    looks are taken is the threshold's business (`hil.study.search.screen.threshold`). They are taken where the whole
+    search ends, which may have begun again from numbers that explain more.
     """
     found: Gains = defaultdict(list)
     for index in range(count):

@@ -10,10 +10,10 @@ from hil.errors import BrakebenchError
 from hil.hide.case import Case
 from hil.hide.cases import draw, followed_by
 from hil.hide.files import read_answer, write
-from hil.study.answer import Answer
-from hil.study.diagnosis import Settings
 from hil.study.explain import explain
-from hil.study.table import UnusableError
+from hil.study.logs.table import UnusableError
+from hil.study.search.diagnosis import Settings
+from hil.study.verdict.answer import Answer
 from hil.trials import oracle
 from hil.trials.sources import state
 

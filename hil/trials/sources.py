@@ -4,7 +4,8 @@ from functools import cache
 
 from plant.compiled import PACKAGES, digest
 
-STUDIED = (*PACKAGES, "hil.study")
+_FLOORS = ("logs", "replay", "likelihood", "fitting", "search", "verdict")
+STUDIED = (*PACKAGES, "hil.study", *(f"hil.study.{floor}" for floor in _FLOORS))
 """What an answer depends on."""
 HIDDEN = ("hil.hide",)
 """What a case depends on."""

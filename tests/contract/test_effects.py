@@ -196,7 +196,7 @@ def test_finite_at_the_corners_of_its_box(name):
             assert np.isfinite(simulate(plan, theta)).all()
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
 def test_finite_with_several_effects_anywhere_in_their_boxes(data):
     plan, _, _ = driven(data.draw(st.sampled_from(sorted(MANOEUVRES))))

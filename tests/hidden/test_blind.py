@@ -10,7 +10,7 @@ import pytest
 
 from hil.hide.case import Hidden, make_case
 from hil.hide.cases import SEPARABLE, draw
-from hil.study.diagnosis import Settings
+from hil.study.search.diagnosis import Settings
 from hil.trials.reading import in_set
 from hil.trials.run import run_case
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from outsider import VEHICLE, drive, logs
 
-from hil.study.diagnosis import Settings
 from hil.study.explain import explain
-from hil.study.extension import load_extension
+from hil.study.search.diagnosis import Settings
+from hil.study.verdict.extension import load_extension
 
 
 def _plain(speed_mps: float, pressure_pa: np.ndarray) -> np.ndarray:

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from hil.study.channel_map import load_map
 from hil.study.explain import explain, shipped
-from hil.study.read import read_logs
-from hil.study.table import PRESSURE_DEMAND, Log
+from hil.study.logs.channel_map import load_map
+from hil.study.logs.read import read_logs
+from hil.study.logs.table import PRESSURE_DEMAND, Log
 
 pytestmark = [pytest.mark.slow, pytest.mark.long, pytest.mark.timeout(1800)]
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from dbc.database import parse_database
-from hil.study.channel_map import load_map
 from hil.study.explain import explain, shipped
-from hil.study.read import read_logs
-from hil.study.table import WHEEL_SPEED, Log
+from hil.study.logs.channel_map import load_map
+from hil.study.logs.read import read_logs
+from hil.study.logs.table import WHEEL_SPEED, Log
 
 pytestmark = pytest.mark.slow
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from hil.study.prepare import prepare
-from hil.study.rig import Rig
-from hil.study.table import Log, make_log
-from hil.study.vehicle import Vehicle
-from hil.study.world import nominal
+from hil.study.logs.prepare import prepare
+from hil.study.logs.table import Log, make_log
+from hil.study.replay.rig import Rig
+from hil.study.replay.vehicle import Vehicle
+from hil.study.replay.world import nominal
 
 WHEELS = ("fl", "fr", "rl", "rr")
 FOLLOWED = (("pressure", "pa"), ("motor_torque", "nm"))

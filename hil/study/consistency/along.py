@@ -9,7 +9,7 @@ import numpy as np
 from hil.study.consistency.kalman import Linear, innovations
 from hil.study.consistency.model import Model, Number
 from hil.study.consistency.motion import Motion
-from hil.study.table import Floats
+from hil.study.logs.table import Floats
 
 NOISE: Final[Mapping[str, Number]] = {
     "speed_mps": Number(0.02, 1e-4, 1.0, 0.3, True, 2.0),

@@ -11,7 +11,7 @@ from hil.study.consistency.along import lag
 from hil.study.consistency.kalman import Linear, innovations
 from hil.study.consistency.model import Model, Number
 from hil.study.consistency.motion import Motion
-from hil.study.table import Floats
+from hil.study.logs.table import Floats
 
 _NOISE: Final[Mapping[str, Number]] = {
     "speed_mps": Number(0.03, 1e-4, 1.0, 0.3, True, 2.0),

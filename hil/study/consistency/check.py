@@ -16,8 +16,8 @@ from hil.study.consistency.search import Found, Say, search
 from hil.study.consistency.stops import estimates, nominal_braking, relative_sigma, stop_search
 from hil.study.consistency.turning import Turning
 from hil.study.consistency.wheels import SPREAD, Wheels
-from hil.study.table import MOTOR_DEMAND, MOTOR_TORQUE, PRESSURE, PRESSURE_DEMAND, WHEEL_SPEED, WHEELS, Floats, Log
-from hil.study.vehicle import Vehicle
+from hil.study.logs.table import MOTOR_DEMAND, MOTOR_TORQUE, PRESSURE, PRESSURE_DEMAND, WHEEL_SPEED, WHEELS, Floats, Log
+from hil.study.replay.vehicle import Vehicle
 from plant.effects.theta import THETA
 
 _ROLL = 0.15  # the body rolls, and its accelerometer with it (effects, 56)

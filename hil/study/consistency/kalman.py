@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.study.compiled import compiled
-from hil.study.table import Floats
+from hil.study.logs.table import Floats
 
 _CLIP = 4.0
 

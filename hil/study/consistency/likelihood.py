@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from hil.study.consistency.model import Model, Number
-from hil.study.table import Floats
+from hil.study.logs.table import Floats
 
 Values = dict[str, float]
 _STEP = 1e-3

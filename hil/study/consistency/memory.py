@@ -6,7 +6,7 @@ from pathlib import Path
 
 from hil.study.consistency.names import Cause
 from hil.study.consistency.search import Found
-from hil.study.table import UnusableError
+from hil.study.logs.table import UnusableError
 from plant.effects.effect import Scope
 from plant.effects.theta import THETA
 

@@ -13,7 +13,7 @@ from hil.study.consistency.motion import Motion
 from hil.study.consistency.search import Found
 from hil.study.consistency.turning import Turning
 from hil.study.consistency.wheels import Wheels
-from hil.study.table import WHEELS, Floats
+from hil.study.logs.table import WHEELS, Floats
 
 FOLDS = 4
 _DRAWS = 400

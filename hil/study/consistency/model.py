@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from hil.study.table import Floats
+from hil.study.logs.table import Floats
 
 
 @dataclass(frozen=True)

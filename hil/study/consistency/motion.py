@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hil.study.table import PRESSURE, PRESSURE_DEMAND, WHEEL_SPEED, Floats, Log, UnusableError
+from hil.study.logs.table import PRESSURE, PRESSURE_DEMAND, WHEEL_SPEED, Floats, Log, UnusableError
 
 CELL_S = 0.04
 SLOW_MPS = 3.0  # below, wheel-speed sensors hold and drop

@@ -9,7 +9,7 @@ from scipy.stats import t as student
 from hil.study.compiled import WORKERS
 from hil.study.consistency.likelihood import Fit, Values, deviations, fit, usual
 from hil.study.consistency.model import Model
-from hil.study.table import Floats
+from hil.study.logs.table import Floats
 
 ASKED = 20.0
 """Gain in -2 log likelihood asked of a number: noise gives it once in 100,000 looks, were the model true."""

@@ -10,7 +10,7 @@ from hil.study.consistency.braking import Braking
 from hil.study.consistency.likelihood import Fit, Values, deviations, fit, usual
 from hil.study.consistency.motion import Motion
 from hil.study.consistency.search import ALPHA, ASKED, Found, Say, Step
-from hil.study.vehicle import Vehicle, rest_friction
+from hil.study.replay.vehicle import Vehicle, rest_friction
 from plant.vectors import PARAMETER, P
 
 _UNKNOWN: Final = ("drive_mps2", "drive_delay_s", "engine_mps2")

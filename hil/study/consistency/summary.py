@@ -11,7 +11,7 @@ from hil.study.consistency.check import Consistency
 from hil.study.consistency.misses import Miss
 from hil.study.consistency.motion import Motion
 from hil.study.consistency.search import ASKED
-from hil.study.table import Floats
+from hil.study.logs.table import Floats
 
 _SENTENCE = {
     "none": "The sensors agree with the car's own motion within noise.",

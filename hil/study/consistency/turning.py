@@ -9,7 +9,7 @@ from hil.study.consistency.kalman import Linear, innovations
 from hil.study.consistency.model import Model, Number
 from hil.study.consistency.motion import Motion
 from hil.study.consistency.wheels import SPREAD
-from hil.study.table import Floats
+from hil.study.logs.table import Floats
 
 _NOISE: Final[Mapping[str, Number]] = {
     "turn_rad_s": Number(0.05, 1e-3, 2.0, 0.3, True, 2.0),

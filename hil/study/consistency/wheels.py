@@ -8,7 +8,7 @@ import numpy as np
 from hil.study.consistency.kalman import Linear, innovations
 from hil.study.consistency.model import Model, Number
 from hil.study.consistency.motion import Motion
-from hil.study.table import WHEELS, Floats
+from hil.study.logs.table import WHEELS, Floats
 
 SPREAD = 0.002
 """Wheel-to-wheel spread of rolling radii that no tolerance needs to state: 0.12 % on comma2k19 (effects, 13)."""

@@ -165,7 +165,7 @@ def test_what_is_no_database_is_refused_with_the_file(content):
 OURS = database_text(BusName.VEHICLE)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, len(OURS) - 1), st.integers(0, 40), st.text(max_size=6))
 def test_a_damaged_database_loads_or_is_refused(at, length, text):
     damaged = OURS[:at] + text + OURS[at + length :]

@@ -15,9 +15,7 @@ from ecu.law.types import Brake, Health, Inputs, Source
 from ecu.node import SOURCES, EcuNode
 
 TICK_NS = 10_000_000
-RELAXED = settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
-)
+RELAXED = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 
 
 def values(low, high):

@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dbc.bench_messages import PhysicalFault
@@ -245,7 +245,6 @@ VALUES = [
 ]
 
 
-@settings(deadline=None)
 @given(st.data())
 def test_no_mutated_file_gives_anything_but_our_own_errors(tmp_path_factory, data):
     lines = list(LINES)

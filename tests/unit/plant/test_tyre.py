@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from plant.model import pack
@@ -21,7 +21,6 @@ def p(paper_car):
     return pack(paper_car)
 
 
-@settings(deadline=None)
 @given(slips, angles, loads)
 def test_right_mirrors_left(p, slip, angle, load):
     left_x, left_y = combined(slip, angle, load, 1.0, 1.0, p)
@@ -30,7 +29,6 @@ def test_right_mirrors_left(p, slip, angle, load):
     assert right_y == pytest.approx(-left_y, abs=1e-9)
 
 
-@settings(deadline=None)
 @given(slips, angles, loads, st.floats(0.05, 1.0))
 def test_force_stays_inside_the_friction(p, slip, angle, load, friction):
     force, cross = combined(slip, angle, load, friction, 1.0, p)

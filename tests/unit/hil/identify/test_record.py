@@ -97,7 +97,7 @@ def test_refuses_what_is_no_text_or_not_there(tmp_path):
         read_record(tmp_path / "absent.csv")
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     line=st.integers(0, 300),
     text=st.text(st.characters(codec="utf-8"), max_size=30),

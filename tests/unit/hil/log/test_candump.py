@@ -135,7 +135,7 @@ PIECES = (
 LINE_PIECES = st.sampled_from(PIECES.split("|"))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.lists(st.tuples(st.lists(LINE_PIECES, max_size=9).map("".join), st.sampled_from([1, 17])), max_size=8))
 def test_the_array_path_takes_just_what_the_line_definition_takes(tmp_path_factory, lines):
     folder = tmp_path_factory.getbasetemp()
@@ -151,7 +151,7 @@ def test_the_array_path_takes_just_what_the_line_definition_takes(tmp_path_facto
     assert (fast.rejected, fast.first_rejected) == (slow.rejected, slow.first_rejected)
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(st.binary(max_size=300))
 def test_any_bytes_are_read(tmp_path_factory, content):
     path = tmp_path_factory.getbasetemp() / "bytes.log"

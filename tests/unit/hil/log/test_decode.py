@@ -73,7 +73,7 @@ def database_and_frames(draw):
     return dbc_of(*lines, *float_types), frames
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(database_and_frames())
 def test_values_equal_cantools(case):
     text, frames = case

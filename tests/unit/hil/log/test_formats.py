@@ -327,7 +327,7 @@ def test_blf_that_cannot_be_followed_is_refused(tmp_path, content):
         read_log(path)
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     suffix=st.sampled_from([".log", ".asc", ".blf", ".trc", ".csv", ".parquet"]),
     where=st.floats(0, 1),

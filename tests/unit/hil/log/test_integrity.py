@@ -62,7 +62,7 @@ def test_wrong_check_value_length_counter_and_data_id_are_corrupt():
     assert check_integrity(recording(frames)) == {spec.name: Integrity(7, 5, 0, 0)}
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.sampled_from(PROTECTED), st.lists(st.tuples(st.integers(0, 15), st.booleans()), max_size=40))
 def test_counts_equal_the_receivers_own(spec, sent):
     checker = e2e.Checker(spec.data_id, spec.length)

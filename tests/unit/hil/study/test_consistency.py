@@ -10,7 +10,7 @@ from hil.study.consistency.model import Model, Number
 from hil.study.consistency.motion import motion_of
 from hil.study.consistency.search import search
 from hil.study.explain import explain
-from hil.study.table import WHEEL_SPEED, Log, UnusableError, make_log
+from hil.study.logs.table import WHEEL_SPEED, Log, UnusableError, make_log
 
 RADIUS_M, STEP_S = 0.33, 0.01
 

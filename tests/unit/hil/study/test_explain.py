@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from hil.study.explain import explain
-from hil.study.extension import load_extension
-from hil.study.table import UnusableError
-from hil.study.vehicle import paper_car
+from hil.study.logs.table import UnusableError
+from hil.study.replay.vehicle import paper_car
+from hil.study.verdict.extension import load_extension
 from plant.effects.theta import THETA
 from plant.model import initial_state, pack, replay
 from plant.vectors import INPUT

@@ -4,9 +4,9 @@ import pytest
 
 from hil.hide.case import Hidden, make_case
 from hil.hide.files import read_answer, write
-from hil.study.diagnosis import Settings
 from hil.study.explain import explain
-from hil.study.patterns import WORDS
+from hil.study.search.diagnosis import Settings
+from hil.study.verdict.patterns import WORDS
 from hil.trials.oracle import told
 
 

@@ -53,7 +53,7 @@ def test_what_has_no_inverse_says_so():
         Chain(THETA.typical("quantisation")).undo("imu", TIME_S, signal("imu"))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.floats(-0.05, 0.1), st.integers(0, 2**16))
 def test_a_delay_shifts(delay_s, seed):
     theta = THETA.set(THETA.neutral(), "timestamp_offset", {"delay_s": {"imu": delay_s}})
@@ -63,7 +63,7 @@ def test_a_delay_shifts(delay_s, seed):
     np.testing.assert_allclose(shifted[20:, 0], expected, rtol=1e-9)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.floats(1e-5, 0.1))
 def test_a_low_pass_delays_a_ramp_by_its_lag(lag_s):
     theta = THETA.set(THETA.neutral(), "imu_filter", {"time_s": lag_s})

@@ -1,0 +1,101 @@
+"""The vehicle's numbers: sensitivities to them, and their fit with the noise in turn."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hil.study.fitting.fit import Fitter, Model, Term, with_term
+from hil.study.fitting.linear import track_columns
+from hil.study.likelihood.noise import Frame, Noise
+from hil.study.logs.table import Floats
+from hil.study.replay.rig import Rig
+from hil.study.replay.vehicle import Vehicle
+from hil.study.replay.world import World, start_nuisances
+
+STRAINED = 1.5
+"""Strain beyond which the numbers may be bent by what is no number."""
+_KINKED = ("ehb_dead_time_s",)
+"""What acts from step to step, with a kink at each."""
+_COARSE, _FINE = 0.5, 3.0
+"""Finite differences: in standard deviations of what is known before, and of what data say."""
+_TURNS, _MOST_ANEW, _SETTLED, _STALE, _FAR = 20, 4, 3.0, 0.3, 1.0
+
+
+def strain(z: Floats, farthest: Floats | float = np.inf, told: float | None = None) -> float:
+    """How much farther the vehicle's numbers went than their tolerance lets them, as a variance, at least 1.
+
+    A model that needs that for these logs errs in what it says of causes too (Birge 1932, Phys. Rev. 40, 207). Where
+    much is strained, a number that went as far as it may (``farthest``) counts as if it wanted to go as far again.
+    ``told`` is how many numbers the data tell (`hil.study.fitting.fit.Fitter.told`), all of them without: one of which
+    they say nothing stays where it is, and is no sign that the others are right.
+    """
+    squares = np.square(z)
+    if squares.sum() >= STRAINED * len(z):
+        squares = squares * np.where(np.abs(z) >= farthest, 4.0, 1.0)
+    return max(1.0, float(squares.sum()) / max(len(z) if told is None else told, 1.0))
+
+
+class Numbers:
+    """What may be off in the car as handed in (``base``), within its tolerance.
+
+    ``fitter`` has the sensitivities last taken; ``relinearise`` False keeps the first.
+    """
+
+    fitter: Fitter
+
+    def __init__(self, rig: Rig, frame: Frame, vehicle: Vehicle, base: World, relinearise: bool) -> None:
+        self._rig, self._frame, self._base, self._relinearise = rig, frame, base, relinearise
+        told = all(drive.log.disc_temperature_k is not None for drive in rig.case.drives)
+        self.nuisances = (*vehicle.nuisances, *start_nuisances(told))
+        self._steps: Floats = np.full(len(self.nuisances), _COARSE)
+
+    def anew(self, z: Floats, terms: Sequence[Term] = ()) -> None:
+        """Take the sensitivities where the numbers are ``z`` standard deviations off, beside these effects.
+
+        What drives the car is made by that car too (`Rig.quieten`).
+        """
+
+        def world(of: Floats) -> World:
+            found = self._base.shifted(self.nuisances, of)
+            for term in terms:
+                found = with_term(found, term)
+            return found
+
+        self._rig.quieten(world(z))
+        self._rig.keep(world(z))
+        base, own = self._rig.run(world(z)), np.diag(self._steps)
+        tracks = track_columns(self._rig, self._frame, base, [world(z + step) for step in own], self._steps.tolist())
+        for k, nuisance in enumerate(self.nuisances):
+            if nuisance.name in _KINKED:  # the mean of both sides
+                other = track_columns(self._rig, self._frame, base, [world(z - own[k])], [-float(self._steps[k])])
+                for name, columns in tracks.items():
+                    columns[:, k] = 0.5 * (columns[:, k] + other[name][:, 0])
+        self.fitter = Fitter(self._rig, self._frame, self._base, self.nuisances, tracks)
+
+    def fitted(self, model: Model, noise: Noise) -> tuple[Model, Noise]:
+        """Numbers and noise in turn, with sensitivities taken anew until neither moves.
+
+        What the numbers have not explained yet counts as noise, so the steps are forgiving; the first are made with the
+        noise at hand, for noise found there would take edges for its own that numbers explain.
+        """
+        cost, around, times = np.inf, model.z, 0
+        for turn in range(_TURNS):
+            if turn:
+                noise = self.fitter.estimated(model, noise)
+            model = self.fitter.fit(model, noise, 4, follow=True)
+            settled, cost = cost - model.cost < _SETTLED, model.cost
+            stale = float(np.abs(model.z - around).max()) > (_STALE * (1 + 2 * times) if settled else _FAR)
+            most = _MOST_ANEW if strain(model.z) < STRAINED else 2 * _MOST_ANEW
+            if self._relinearise and stale and times < most:
+                information = np.diag(self.fitter.products(noise))
+                self._steps = np.clip(_FINE / np.sqrt(np.maximum(information, 1e-9)), 0.03, _COARSE)
+                self.anew(model.z, model.terms)
+                model = self.fitter.at(model.z, model.terms, noise)
+                around, times, cost = model.z, times + 1, np.inf
+            elif settled:
+                break
+        return model, noise
+
+    def went_far(self, model: Model, around: Floats) -> bool:
+        """Whether the sensitivities taken at ``around`` hold no longer."""
+        return self._relinearise and float(np.abs(model.z - around).max()) >= _FAR

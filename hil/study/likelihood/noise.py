@@ -1,0 +1,220 @@
+"""The noise model: sensor noise and coloured disturbances, and residuals whitened by them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hil.study.likelihood.whiten import coloured, moving
+from hil.study.logs.case import SINGLES, Case
+from hil.study.logs.table import Floats
+
+Stack = Mapping[str, Floats]
+REFERENCE_MPS = 20.0
+MODES = np.array([[0.25, 0.25, 0.25, 0.25], [0.25, 0.25, -0.25, -0.25], [0.5, -0.5, 0.0, 0.0], [0.0, 0.0, 0.5, -0.5]])
+MODE_NAMES = ("mean", "front-rear", "left-right front", "left-right rear")
+_SWING_S = 0.3
+LONG = ("wheel.mean", "ax", "gps")
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Noise of one track: white variance a^2 + (b v / 20)^2, AR(1) of standard deviation c and time constant tau."""
+
+    a: float
+    b: float
+    c: float
+    tau_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Noise of all tracks.
+
+    ``disturbances``: force, slope, accelerometer (standard deviation m/s2, tau s) and what all wheels tell wrong
+    (m/s at 20 m/s, tau s).
+
+    ``scales``: by how much a manoeuvre is noisier than the others (one number each), per track; the moving car's
+    tracks share those of "long". Where the car is driven hard the model's own error is larger too.
+    ``enabled`` False keeps white sensor noise alone: what every test of a free-running simulation must not do.
+    """
+
+    tracks: Mapping[str, Track]
+    disturbances: tuple[tuple[float, float], ...]
+    enabled: bool = True
+    scales: Mapping[str, Floats] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What does not change with the residual: masks, starts, speeds, per sample of all drives.
+
+    ``waited`` is the variance of each track that comes of frames that wait for the bus: its slope times their time.
+    """
+
+    fresh: Floats
+    restart: Floats
+    moving: Floats
+    speed_mps: Floats
+    blocks: Floats
+    sample_s: float
+    present: Mapping[str, Floats]
+    names: tuple[str, ...]
+    waited: Mapping[str, Floats] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, case: Case) -> "Frame":
+        """Of a case."""
+        fresh, restart = [], []
+        for drive in case.drives:
+            begin, again = np.zeros(drive.samples), np.zeros(drive.samples)
+            begin[0] = 1.0
+            for segment in drive.segments[1:]:
+                again[segment.first // drive.stride] = 1.0
+            fresh.append(begin)
+            restart.append(again)
+        tracks: dict[str, list[Floats]] = {}
+        for drive in case.drives:
+            for group, values in drive.measured.items():
+                shown = _known(group, values, drive.moving, drive.resting)
+                for name, known in shown.items():
+                    tracks.setdefault(name, []).append(known)
+        present = {name: np.concatenate(parts) for name, parts in tracks.items()}
+        begun = np.concatenate(restart)  # a lag mixes the first sample with those before, a body in a bend swings in
+        swings = np.convolve(begun, np.ones(int(np.ceil(_SWING_S / case.sample_s))))[: len(begun)]
+        present = {
+            name: np.where((swings if name in ("ay", "yaw") else begun) > 0.5, 0.0, known)
+            for name, known in present.items()
+        }
+        present = {name: known for name, known in present.items() if known.sum() > 50}
+        return cls(
+            np.concatenate(fresh), np.concatenate(restart), np.concatenate([d.moving for d in case.drives]) * 1.0,
+            np.concatenate([d.speed_mps for d in case.drives]), case.blocks(), case.sample_s, present, tuple(present),
+            _waited(case),
+        )  # fmt: skip
+
+
+def _waited(case: Case) -> dict[str, Floats]:
+    """Variance by waiting of all tracks but the wheels', whose stamps are the log's.
+
+    At a corner the steeper side counts; two rows of a sample wait apart.
+    """
+    found: dict[str, list[Floats]] = {}
+    for drive in case.drives:
+        wait = drive.wait_s / (drive.stride**0.5 * case.sample_s)
+        for group, values in drive.measured.items():
+            if group in ("wheel", "gps"):
+                continue
+            weights = np.ones((1, 1)) if group in SINGLES else MODES.T
+            names = [group] if group in SINGLES else [f"{group}.{mode}" for mode in MODE_NAMES]
+            steps = wait * np.abs(np.nan_to_num(np.diff(values, axis=0)) @ weights)
+            ahead, behind = np.pad(steps, ((0, 1), (0, 0))), np.pad(steps, ((1, 0), (0, 0)))
+            for name, column in zip(names, (np.maximum(ahead, behind) ** 2).T, strict=True):
+                found.setdefault(name, []).append(column)
+    return {name: np.concatenate(parts) for name, parts in found.items()}
+
+
+def _known(group: str, values: Floats, moving_now: Floats, resting: Floats) -> dict[str, Floats]:
+    """Tracks of a group and where they are compared."""
+    finite = np.isfinite(values)
+    if group in SINGLES:
+        known = finite[:, 0] & (moving_now + (resting if group != "gps" else 0.0) > 0.5)
+        return {group: known * 1.0}
+    within = (moving_now > 0.5) if group == "wheel" else np.ones(len(values), bool)
+    if group == "wheel" and not finite.all(axis=1).any():
+        return {"wheel.mean": (finite.any(axis=1) & within) * 1.0}
+    known = finite.all(axis=1) & within
+    return {f"{group}.{mode}": known * 1.0 for mode in MODE_NAMES}
+
+
+def tracks_of(stack: Stack, frame: Frame, radius_m: float) -> dict[str, Floats]:
+    """Residuals or sensitivities (samples, channels) of groups as tracks (samples, 1); wheel speeds as m/s."""
+    found: dict[str, Floats] = {}
+    for group, values in stack.items():
+        if group in SINGLES:
+            found[group] = values
+            continue
+        factor = radius_m if group == "wheel" else 1.0
+        if group == "wheel" and "wheel.front-rear" not in frame.names:
+            found["wheel.mean"] = factor * np.nanmean(values, axis=1, keepdims=True)
+            continue
+        modes = values @ (factor * MODES.T)
+        found |= {f"{group}.{mode}": modes[:, k : k + 1] for k, mode in enumerate(MODE_NAMES)}
+    return {name: np.where(np.isnan(values), 0.0, values) for name, values in found.items() if name in frame.names}
+
+
+def whiten(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> tuple[dict[str, Floats], float]:
+    """Innovations by track, (samples, columns), in the precision given, and the log-likelihood of the first column."""
+    out: dict[str, Floats] = {}
+    total = 0.0
+    columns = next(iter(tracks.values())).shape[1]
+    there = [name for name in LONG if name in tracks]
+    if there:
+        value, found = _long(tracks, frame, noise, columns)
+        total += value
+        out |= found
+    for name, values in tracks.items():
+        if name not in LONG:
+            value, out[name] = _side(name, values, frame, noise)
+            total += value
+    return out, total
+
+
+def white_variance(name: str, track: Track, frame: Frame) -> Floats:
+    """Variance of the white noise of a track, by sample; 0 where nothing is known."""
+    variance: float | Floats = track.a**2
+    if track.b:
+        variance = variance + (track.b * frame.speed_mps / REFERENCE_MPS) ** 2
+    if name in frame.waited:
+        variance = variance + frame.waited[name]
+    return np.asarray(variance * frame.present[name])
+
+
+def scale_of(name: str, frame: Frame, noise: Noise) -> Floats:
+    """Scale of every sample."""
+    scales = noise.scales.get(name)
+    return np.ones(len(frame.fresh)) if scales is None else np.asarray(scales[np.asarray(frame.blocks, np.int64)])
+
+
+def kept(tau_s: float, step_s: float) -> float:
+    """What is left of coloured noise from sample to sample."""
+    return float(np.exp(-step_s / max(tau_s, 1e-3)))
+
+
+def _long(tracks: Mapping[str, Floats], frame: Frame, noise: Noise, columns: int) -> tuple[float, dict[str, Floats]]:
+    samples = len(frame.fresh)
+    kind = next(iter(tracks.values())).dtype
+    y, white = np.zeros((samples, 3, columns), kind), np.zeros((samples, 3))
+    scale = scale_of("long", frame, noise)
+    likelihood = 0.0
+    for m, name in enumerate(LONG):
+        if name in tracks:
+            np.divide(tracks[name], scale.astype(kind)[:, None], out=y[:, m])
+            likelihood -= float(np.log(scale) @ frame.present[name])
+            white[:, m] = white_variance(name, noise.tracks[name], frame)
+    on = 1.0 if noise.enabled else 0.0
+    colours = np.array([(kept(tau, frame.sample_s), on * size**2 + 1e-12) for size, tau in noise.disturbances])
+    out = np.empty_like(y)
+    share = frame.speed_mps / REFERENCE_MPS
+    value = moving(y, frame.fresh, frame.restart, frame.moving, white, share, frame.sample_s, colours, out)
+    return likelihood + float(value), {name: out[:, m] for m, name in enumerate(LONG) if name in tracks}
+
+
+def _side(name: str, values: Floats, frame: Frame, noise: Noise) -> tuple[float, Floats]:
+    scaled, value = evened(name, values, frame, noise)
+    out = np.empty_like(scaled)
+    return value + _filtered(name, noise.tracks[name], scaled, frame, noise.enabled, out), out
+
+
+def evened(name: str, values: Floats, frame: Frame, noise: Noise) -> tuple[Floats, float]:
+    """Values of a track over the scale of their manoeuvre, and what that adds to the log-likelihood."""
+    scale = scale_of(name, frame, noise)
+    even = np.ascontiguousarray(values / scale.astype(values.dtype)[:, None])
+    return even, -float(np.log(scale) @ frame.present[name])
+
+
+def _filtered(name: str, track: Track, scaled: Floats, frame: Frame, enabled: bool, out: Floats) -> float:
+    """Innovations of an evened track into ``out``, and their log-likelihood."""
+    white = white_variance(name, track, frame)
+    colour = track.c**2 if enabled else 0.0
+    return float(coloured(scaled, frame.fresh, white, kept(track.tau_s, frame.sample_s), colour + 1e-16, out))

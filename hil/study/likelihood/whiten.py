@@ -1,0 +1,122 @@
+"""Innovations of the noise model: what is left of a track, sample by sample, after all that the past foretells.
+
+The same linear filter goes over residuals and sensitivities, so a fit on its output is the fit of maximum likelihood.
+"""
+
+import numpy as np
+
+from hil.study.compiled import compiled
+from hil.study.logs.table import Floats
+
+HUBER = 6.0
+"""Innovations beyond so many standard deviations count in proportion, not squared (Huber 1964)."""
+UNKNOWN = 1e4  # variance of a start that nothing is known of
+
+
+def _coloured(y: Floats, fresh: Floats, white: Floats, phi: float, colour: float, out: Floats) -> float:
+    columns = y.shape[1]
+    state = np.zeros(columns)
+    variance, likelihood = colour, 0.0
+    for t in range(y.shape[0]):
+        if fresh[t] > 0.5:
+            state[:] = 0.0
+            variance = colour
+        else:
+            for k in range(columns):
+                state[k] *= phi
+            variance = phi * phi * variance + (1.0 - phi * phi) * colour
+        if white[t] > 0.0:
+            total = variance + white[t]
+            gain, scale = variance / total, 1.0 / np.sqrt(total)
+            for k in range(columns):
+                innovation = y[t, k] - state[k]
+                state[k] += gain * innovation
+                out[t, k] = innovation * scale
+            variance -= gain * variance
+            far = max(abs(out[t, 0]) - HUBER, 0.0)
+            likelihood -= 0.5 * (out[t, 0] * out[t, 0] - far * far + np.log(total))
+        else:
+            for k in range(columns):
+                out[t, k] = 0.0
+    return likelihood
+
+
+def _moving(
+    y: Floats, fresh: Floats, restart: Floats, rolling: Floats, white: Floats, share: Floats, step_s: float,
+    colours: Floats, out: Floats,
+) -> float:  # fmt: skip
+    # states: error of the speed, force disturbance, slope disturbance, disturbance of the accelerometer, of the wheels
+    columns = y.shape[2]
+    x = np.zeros((5, columns))
+    cov = np.zeros((5, 5))
+    h = np.zeros(5)
+    likelihood = 0.0
+    move = np.zeros((5, 5))
+    for t in range(y.shape[0]):
+        if fresh[t] > 0.5:
+            x[:] = 0.0
+            cov[:] = 0.0
+            for i in range(4):
+                cov[1 + i, 1 + i] = colours[i, 1]
+            cov[0, 0] = UNKNOWN
+        else:
+            step = step_s * rolling[t]
+            for k in range(columns):
+                x[0, k] += step * (x[1, k] + x[2, k])
+                for i in range(4):
+                    x[1 + i, k] *= colours[i, 0]
+            for i in range(5):
+                for j in range(5):
+                    move[i, j] = cov[i, j]
+            for j in range(5):
+                move[0, j] += step * (cov[1, j] + cov[2, j])
+                for i in range(4):
+                    move[1 + i, j] *= colours[i, 0]
+            for i in range(5):
+                cov[i, 0] = move[i, 0] + step * (move[i, 1] + move[i, 2])
+                for j in range(4):
+                    cov[i, 1 + j] = move[i, 1 + j] * colours[j, 0]
+            for i in range(4):
+                cov[1 + i, 1 + i] += (1.0 - colours[i, 0] ** 2) * colours[i, 1]
+            if restart[t] > 0.5:
+                for i in range(5):
+                    cov[0, i] = 0.0
+                    cov[i, 0] = 0.0
+                cov[0, 0] = UNKNOWN
+                for k in range(columns):
+                    x[0, k] = 0.0
+        for m in range(3):
+            if white[t, m] <= 0.0:
+                for k in range(columns):
+                    out[t, m, k] = 0.0
+                continue
+            # what is seen: wheels (speed and their own share), acceleration (of a car at rest none), ground speed
+            first, second = (1, 3) if m == 1 else (0, 4)
+            one = rolling[t] if m == 1 else 1.0
+            other = 1.0 if m == 1 else (share[t] if m == 0 else 0.0)
+            for i in range(5):
+                h[i] = one * cov[i, first] + other * cov[i, second]
+            total = white[t, m] + one * h[first] + other * h[second]
+            scale = 1.0 / np.sqrt(total)
+            for k in range(columns):
+                innovation = y[t, m, k] - one * x[first, k] - other * x[second, k]
+                for i in range(5):
+                    x[i, k] += h[i] / total * innovation
+                out[t, m, k] = innovation * scale
+            for i in range(5):
+                for j in range(5):
+                    cov[i, j] -= h[i] * h[j] / total
+            far = max(abs(out[t, m, 0]) - HUBER, 0.0)
+            likelihood -= 0.5 * (out[t, m, 0] ** 2 - far * far + np.log(total))
+    return likelihood
+
+
+coloured = compiled(_coloured)
+"""White noise and AR(1) on one track: (samples, columns) in, innovations of variance 1 into ``out``; log-likelihood of
+the first column. ``white`` is the variance of each sample, 0 where nothing is compared; ``fresh`` begins a log."""
+moving = compiled(_moving)
+"""The moving car: (samples, 3 tracks, columns) of speed, acceleration, ground speed.
+
+``colours`` holds rows (factor from sample to sample, variance) of force, slope, accelerometer and wheel disturbance,
+the last one weighted by ``share`` (samples,); ``restart`` forgets the speed's error. Force and slope move the car where
+it is ``rolling`` (samples,); one held at rest feels neither."""

@@ -1,0 +1,1 @@
+"""Measured logs: read, brought to one table, and cut into drives and manoeuvres."""

@@ -1,0 +1,47 @@
+"""Latencies on the study's arrays: channels seen later, held demands acted on later, inputs taken back in time."""
+
+import numpy as np
+
+from hil.study.logs.between import between, straight_between
+from hil.study.logs.case import ROW_S
+from hil.study.logs.table import Floats
+from plant.vectors import INPUT
+
+_MEASURED = (("pressure_pa", 1), ("motor_torque_nm", 2), ("motor_torque_bend_nm", 2))
+_STEERING = INPUT.slice("steering_wheel_rad")
+
+
+def later(values: Floats, rows: float | Floats, straight: bool = False) -> Floats:
+    """Channels as seen some rows later; ``rows`` for all, or for each value.
+
+    ``straight`` lines between rows for what has corners, as a motor at its rate limit; else `hil.study.logs.between`.
+    """
+    out = np.empty(values.shape)
+    (straight_between if straight else between)(values, np.broadcast_to(rows, values.shape), out)
+    return out
+
+
+def _held_later(values: Floats, rows: float) -> Floats:
+    """Held values that change a fraction of a row later (earlier where negative), as the mean over each row."""
+    change = np.diff(values, axis=0)
+    moved = values.copy()
+    if rows >= 0.0:
+        moved[1:] -= min(rows, 1.0) * change
+    else:
+        moved[:-1] += min(-rows, 1.0) * change
+    return moved
+
+
+def in_time(inputs: Floats, late_s: tuple[float, ...]) -> Floats:
+    """Measured inputs with their nodes' latency taken back, demands when they are acted on."""
+    if not any(late_s[1:]):
+        return inputs
+    moved = inputs.copy()
+    moved[:, _STEERING] = later(inputs[:, _STEERING], late_s[4] / ROW_S)
+    for part in ("pressure_demand_pa", "motor_demand_nm"):
+        where = INPUT.slice(part)
+        moved[:, where] = _held_later(inputs[:, where], late_s[3] / ROW_S)
+    for part, late in _MEASURED:
+        where = INPUT.slice(part)
+        moved[:, where] = later(inputs[:, where], -late_s[late] / ROW_S, straight=True)
+    return moved

@@ -1,0 +1,142 @@
+"""Numbers of the vehicle that may be off, and by how much: what the set states, and forms of curves that none does."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hil.study.logs.table import Floats
+from plant.layout import Layout
+
+CONSTANT_EPSILON_W = 1e7
+"""Pads from here on have one friction, whatever their temperature."""
+BRAKE_K = 423.15
+"""Temperature that brake gains are stated at."""
+HALF_WIDTH_TO_SIGMA = 0.5  # a tolerance is two standard deviations
+_GUESSED = 8.0
+_WIDE, _MOST_FACTOR, _MOST_TIMES = 0.1, 1.7, 5.0
+_FORM = {
+    "motor_time_constant_s": 0.1, "ehb_dead_time_s": 0.1, "wheel_inertia_kg_m2": 0.05, "vehicle_cog_height_m": 0.04,
+    "vehicle_yaw_inertia_kg_m2": 0.05, "vehicle_steering_ratio": 0.02,
+}  # fmt: skip
+"""Share that a number is off at least, however well it is stated: an equation's number is not what was measured."""
+_SUSPENSION = {
+    "suspension_ride_rate_n_m": 0.3, "suspension_progression_n_m3": 1.0, "suspension_damping_ns_m": 0.3,
+    "suspension_brake_support_tangent": 0.6, "suspension_anti_roll_nm_rad": 0.7, "suspension_roll_centre_height_m": 3.0,
+    "vehicle_pitch_inertia_kg_m2": 0.6, "vehicle_roll_inertia_kg_m2": 0.2,
+}  # fmt: skip
+_LIFT = 0.1
+"""The same of an axle's lift coefficient: it takes what two models of the axles' loads do not have in common. Known to
+0.03, it was off by 1.9 of what noise explains on drives with nothing hidden."""
+_THERMAL = {"friction_brake_heat_capacity_j_k": 0.2, "friction_brake_cooling_w_k": 0.3}
+"""Heat store of the discs; where the friction does not depend on temperature it does not matter."""
+_SIGNED = ("suspension_progression_n_m3", "suspension_brake_support_tangent", "suspension_roll_centre_height_m")
+"""Numbers that a car may have of either sign."""
+
+
+@dataclass(frozen=True, eq=False)
+class Nuisance:
+    """A number of the vehicle that may be off: ``p[at] += z * step``, z normal with standard deviation 1.
+
+    ``farthest`` is how many standard deviations it may be off at most; farther off it is a cause to be named.
+    ``kind`` says of what: a number of the vehicle (``signed`` if it may be below zero), the discs' temperature at the
+    start, the latency of a node, or of what holds a demand (never below zero), the lag of a toothed wheel, or the time
+    over which it is a mean (never below zero).
+    """
+
+    name: str
+    at: tuple[int, ...]
+    step: tuple[float, ...]
+    kind: str = "vehicle"
+    farthest: float = 3.0
+
+
+def guessed(nuisance: Nuisance, p: Floats) -> Nuisance:
+    """A number that no set states may go far, but to no more than five times or a fifth."""
+    factor = max(factor_of(p[at], step) for at, step in zip(nuisance.at, nuisance.step, strict=True))
+    limit = np.log(_MOST_TIMES) / np.log(factor) if factor > 1.0 else _GUESSED
+    return replace(nuisance, farthest=min(_GUESSED, float(limit)))
+
+
+def factor_of(now: float, step: float) -> float:
+    """By what one standard deviation multiplies a positive number known badly; 1 for one that it is added to."""
+    wide = now > 0.0 and abs(step) >= _WIDE * now
+    return min(1.0 + abs(step) / now, _MOST_FACTOR) if wide else 1.0
+
+
+def listed(p: Floats, tolerance: Mapping[str, float], thermal: bool, layout: Layout) -> list[Nuisance]:
+    """One a parameter; what acts alike is one (radius and area, pad numbers), axles are moved together or apart.
+
+    Parameters
+    ----------
+    tolerance : half-widths of numbers of the flat vehicle ``p``.  thermal : whether the discs' heat matters.
+    """
+    found: list[Nuisance] = []
+
+    def add(name: str, at: list[int], half: list[float]) -> None:
+        if any(half):
+            found.append(Nuisance(name, tuple(at), tuple(h * HALF_WIDTH_TO_SIGMA for h in half)))
+
+    for name in (
+        "vehicle_mass_kg", "vehicle_cog_height_m", "vehicle_drag_coefficient", "vehicle_rolling_resistance",
+        "wheel_rolling_radius_m", "wheel_inertia_kg_m2", "tyre_lkx", "tyre_lsgkp", "ehb_natural_frequency_hz",
+        "ehb_damping_ratio", "ehb_dead_time_s", "ehb_build_rate_pa_s", "ehb_release_rate_pa_s",
+        "tyre_lmux", "friction_brake_threshold_pressure_pa", "motor_time_constant_s",
+        "motor_rate_limit_nm_s", "motor_peak_torque_nm",
+        "motor_fade_end_mps", "motor_fade_start_mps", "battery_charge_power_w", "sensor_imu_cutoff_hz",
+        "tyre_lky", "vehicle_yaw_inertia_kg_m2", "vehicle_steering_ratio",
+    ):  # fmt: skip
+        at = layout.slice(name).start
+        add(name, [at], [max(tolerance.get(name, 0.0), _FORM.get(name, 0.0) * float(p[at]))])
+    cog = layout.slice("vehicle_cog_to_axle_m").start
+    add(
+        "vehicle_cog_to_axle_m",
+        [cog, cog + 1],
+        [tolerance.get("cog_to_front_axle_m", tolerance.get("vehicle_cog_to_axle_m", 0.0))] * 2,
+    )
+    found[-1] = replace(found[-1], step=(found[-1].step[0], -found[-1].step[1]))
+    for k, axle in enumerate(("front", "rear")):
+        area = layout.slice("friction_brake_piston_area_m2").start + k
+        radius = layout.slice("friction_brake_effective_radius_m").start + k
+        share = np.hypot(
+            tolerance.get("friction_brake_piston_area_m2", 0.0) / p[area],
+            tolerance.get("friction_brake_effective_radius_m", 0.0) / p[radius],
+        )
+        share = np.hypot(share, tolerance.get("friction_brake_efficiency", 0.0))
+        gain = tolerance.get(f"brake_gain_{axle}")
+        if gain is not None and np.isfinite(gain):
+            brake_gain = 2.0 * p[layout.slice("pad_a_1_ks").start] / p[layout.slice("pad_b_1_j").start]
+            brake_gain *= p[layout.slice("friction_brake_efficiency").start] * p[area] * p[radius]
+            temperature = p[layout.slice("friction_brake_ambient_k").start]
+            epsilon = p[layout.slice("pad_epsilon_w").start]
+            reached = temperature if epsilon >= CONSTANT_EPSILON_W else BRAKE_K
+            share = gain / (brake_gain * reached / epsilon)
+        add(f"brake_gain_{axle}", [area], [float(share) * p[area]])
+    for name in ("pad_a_1_ks", "pad_epsilon_w", "pad_c_1_s"):
+        add(name, [layout.slice(name).start], [tolerance.get(name, 0.0)])
+    # forms of curves that no vehicle set states: the tyre's near its peak and at the side, the roll of the body
+    add("tyre_curve", [layout.slice("tyre_lex").start], [1.5])
+    add("tyre_shape", [layout.slice("tyre_lcx").start], [0.1])
+    add("tyre_stiffness_load", [layout.slice("tyre_pkx3").start], [0.3])
+    add("tyre_friction_load", [layout.slice("tyre_pdx2").start], [0.04])
+    add("tyre_relaxation_load", [layout.slice("tyre_ptx2").start], [1.5])
+    add("wheel_brake_windup_time_s", [layout.slice("wheel_brake_windup_time_s").start], [0.006])
+    add("tyre_lsgal", [layout.slice("tyre_lsgal").start], [0.3])
+    add("tyre_lmuy", [layout.slice("tyre_lmuy").start], [0.15])
+    lift = layout.slice("vehicle_lift_coefficient")
+    for k, axle in enumerate(("front", "rear")):
+        add(
+            f"vehicle_lift_coefficient_{axle}",
+            [lift.start + k],
+            [max(tolerance.get("vehicle_lift_coefficient", 0.0), _LIFT)],
+        )
+        found[-1] = replace(found[-1], kind="signed")
+    # the same for suspension and discs: a vehicle set states dive and roll at best, never the curves behind them
+    for name, share in (_SUSPENSION | (_THERMAL if thermal else {})).items():
+        at, size = layout.slice(name).start, layout.sizes[name]
+        for k in range(size):
+            half = max(tolerance.get(name, 0.0), share * float(p[at + k]))
+            add(name if size == 1 else f"{name}_{('front', 'rear')[k]}", [at + k], [half])
+            if name in _SIGNED:
+                found[-1] = replace(found[-1], kind="signed")
+    return found

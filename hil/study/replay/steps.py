@@ -1,0 +1,35 @@
+"""How finely each row of a drive is stepped through."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.study.logs.case import ROW_S, Drive
+from plant.vectors import INPUT
+
+STEPS = 4
+"""Steps in a row where a torque changes quickly; elsewhere they are made as one."""
+_QUICK_NM, _RINGS_ROWS = 3.0, 12
+_QUICK_PA, _FOLLOWS_ROWS = 2e4, 20
+_OF_NOISE = 4.0
+_HARD_MPS2, _CREEPS_MPS = 5.0, 3.0
+
+
+def at_once(drive: Drive) -> NDArray[np.int64]:
+    """How many steps each row of a drive makes as one.
+
+    A step of a motor's torque makes wheel and tyre swing against each other, at 20 to 25 Hz and within some 0.1 s; the
+    pressure follows its demand in 0.2 s; standing still and the tyres' limit are stiff. The rest follows any step.
+    """
+
+    def changes(part: str, much: float, rows: int) -> NDArray[np.bool_]:
+        values = drive.inputs[:, INPUT.slice(part)]
+        apart = np.abs(np.diff(values, axis=0, append=values[-1:])).max(axis=1)
+        quick = apart > max(much, _OF_NOISE * float(np.median(apart)))
+        after = np.convolve(quick, np.ones(rows))[: len(quick)] > 0.5
+        after[:-1] |= quick[1:]
+        return np.asarray(after)
+
+    slope = np.gradient(drive.speed_mps, drive.stride * ROW_S) if drive.samples > 1 else drive.speed_mps
+    stiff = np.repeat((np.abs(slope) > _HARD_MPS2) | (drive.speed_mps < _CREEPS_MPS), drive.stride)
+    quick = changes("motor_torque_nm", _QUICK_NM, _RINGS_ROWS) | changes("pressure_demand_pa", _QUICK_PA, _FOLLOWS_ROWS)
+    return np.where(quick, 1, np.where(stiff, STEPS // 2, STEPS))

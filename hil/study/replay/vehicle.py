@@ -1,0 +1,247 @@
+"""The vehicle as handed in: files and mappings into a parameter vector and its tolerances."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hil.parameters import is_number, load_set, override
+from hil.study.logs.table import Floats, UnusableError
+from hil.study.replay.nuisances import BRAKE_K, CONSTANT_EPSILON_W, Nuisance, guessed, listed
+from hil.study.replay.vehicle_keys import ALIASES, DERIVED, OF_SECTION, SPECIAL, UNLIMITED, WIDE
+from plant.friction import mu_equilibrium
+from plant.model import pack
+from plant.parameters.plant import PlantParameters
+from plant.vectors import PARAMETER
+
+_CONSTANT_B_1_J = 2e-6
+_STATED = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Vehicle:
+    """A vehicle for the study.
+
+    Attributes
+    ----------
+    parameters : as the plant wants them.  p : the same, flat.
+    nuisances : what may be off, by tolerance.
+    pad_temperature_matters : False where the brake has one gain and no friction model.
+    remarks : unknown keys and defaults taken, for the report.
+    unstated : sections that the set says nothing of (keys of `hil.study.replay.vehicle_keys.OF_SECTION`).
+    """
+
+    parameters: PlantParameters
+    p: Floats
+    nuisances: tuple[Nuisance, ...]
+    pad_temperature_matters: bool
+    remarks: tuple[str, ...] = ()
+    unstated: tuple[str, ...] = ()
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """Effects on sections that are not stated, so that no deviation can be told."""
+        return tuple(effect for section in self.unstated for effect in OF_SECTION[section])
+
+
+def paper_car() -> Vehicle:
+    """The shipped set with its own tolerances."""
+    source = resources.files("plant") / "parameters" / "paper_car.toml"
+    parameters = load_set(source, PlantParameters)
+    return _vehicle(parameters, _tolerances(tomllib.loads(source.read_text(encoding="utf-8"))), True, ())
+
+
+def load_vehicle(source: Path | Mapping[str, Any] | None) -> Vehicle:
+    """A flat TOML of SI numbers (or such a mapping); None is the shipped set. See `hil.study.replay.vehicle_keys`.
+
+    Raises
+    ------
+    UnusableError
+        Not TOML, or a value that is no number or that no car has.
+    """
+    if source is None:
+        return paper_car()
+    where = str(source) if isinstance(source, Path) else "vehicle"
+    table = _read(source) if isinstance(source, Path) else dict(source)
+    if "vehicle" in table and isinstance(table["vehicle"], Mapping) and "mass_kg" in table["vehicle"]:
+        table = dict(table["vehicle"])
+    return _from_flat(table, where)
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise UnusableError(f"{path}: not a vehicle set: {error}") from error
+
+
+def _tolerances(table: Mapping[str, Any]) -> dict[str, float]:
+    return {
+        f"{section}_{name}": float(entry["tolerance"])
+        for section, entries in table.items()
+        for name, entry in entries.items()
+        if isinstance(entry, Mapping)
+    }
+
+
+def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
+    remarks: list[str] = []
+    numbers: dict[str, Any] = {}
+    tolerances: dict[str, float] = {}
+    base = paper_car().parameters
+    for key, value in table.items():
+        stem = key.removesuffix("_tolerance")
+        if stem in DERIVED and isinstance(value, int | float):
+            _derive(stem, float(value), key != stem, base, numbers, tolerances)
+            continue
+        name = ALIASES.get(stem, stem)
+        if name not in SPECIAL and name not in PARAMETER.sizes:
+            if not isinstance(value, str):
+                remarks.append(f"{where}: unknown key {key!r} is left out")
+            continue
+        if key != stem and isinstance(value, int | float):
+            tolerances[name] = float(value)
+        elif key == stem:
+            numbers[name] = _number(value, f"{where}: {key}")
+    source = resources.files("plant") / "parameters" / "paper_car.toml"
+    shipped = _tolerances(tomllib.loads(source.read_text(encoding="utf-8")))
+    changes, gains = _changes(numbers, base, where)
+    unlimited = [section for section in UNLIMITED if section not in changes]
+    for section in unlimited:
+        if UNLIMITED[section]:
+            changes[section] = dict(UNLIMITED[section])
+        for name in UNLIMITED[section]:
+            shipped.pop(f"{section}_{name}", None)
+    if unlimited:
+        remarks.append(
+            f"{where}: nothing said of {', '.join(unlimited)}, so no limits of theirs are simulated "
+            "and no demand is compared"
+        )
+    parameters = override(base, changes, where)
+    friction = any(name.startswith("pad_") for name in numbers)
+    if gains and not friction:
+        parameters = replace(parameters, pad=_constant_pad(parameters))
+    if gains:
+        parameters = _with_gains(parameters, gains)
+    tolerance = {name: shipped.get(name, 0.0) for name in PARAMETER.sizes}
+    given = {name.removesuffix("_front").removesuffix("_rear") for name in numbers}
+    for name in given & set(PARAMETER.sizes):  # stated, but not how well: to a hundredth
+        if name not in tolerances:
+            tolerance[name] = min(
+                tolerance[name], _STATED * float(np.max(np.abs(np.asarray(_value(parameters, name)))))
+            )
+    missing = []
+    for name, share in WIDE.items():
+        if name not in given:
+            missing.append(name)
+            value = float(np.max(np.abs(np.asarray(_value(parameters, name)))))
+            tolerance[name] = max(tolerance[name], share * value)
+    if missing:
+        remarks.append(f"{where}: not given, so a usual value with wide uncertainty: {', '.join(missing)}")
+    tolerance |= {n: max(t, shipped.get(n, 0.0)) if n.startswith("suspension") else t for n, t in tolerances.items()}
+    vehicle = _vehicle(parameters, tolerance, friction or not gains, tuple(remarks))
+    nuisances = tuple(
+        guessed(one, vehicle.p) if one.name.removesuffix("_front").removesuffix("_rear") in missing else one
+        for one in vehicle.nuisances
+    )
+    return replace(vehicle, nuisances=nuisances, unstated=tuple(unlimited))
+
+
+def _derive(
+    key: str,
+    value: float,
+    is_tolerance: bool,
+    base: PlantParameters,
+    numbers: dict[str, Any],
+    tolerances: dict[str, float],
+) -> None:
+    """A number that is one of a pair, or a multiple, of one of the plant's."""
+    name, place, factor = DERIVED[key]
+    if is_tolerance:
+        tolerances[name] = max(tolerances.get(name, 0.0), value * factor)
+    elif place is not None:
+        now = numbers.get(name, _value(base, name))
+        changed = list(now) if isinstance(now, list | tuple) else [now]
+        changed[place] = value * factor
+        numbers[name] = changed if isinstance(now, list | tuple) else changed[0]
+
+
+def _number(value: Any, where: str) -> Any:
+    numbers = value if isinstance(value, list) else [value]
+    if not numbers or not all(map(is_number, numbers)):
+        raise UnusableError(f"{where}: expected a number, got {value!r}")
+    return value
+
+
+def _value(parameters: PlantParameters, flat: str) -> Any:
+    section = next(s for s in ("friction_brake", "vehicle", "suspension", "wheel", "tyre", "ehb", "pad", "motor",
+                               "battery", "sensor") if flat.startswith(s + "_"))  # fmt: skip
+    return getattr(getattr(parameters, section), flat.removeprefix(section + "_"))
+
+
+def _changes(numbers: Mapping[str, Any], base: PlantParameters, where: str) -> tuple[dict[str, Any], dict[str, float]]:
+    """Nested changes of the set, and the brake gains (N m per Pa and wheel)."""
+    numbers = dict(numbers)
+    gains = {
+        axle: float(numbers.pop(f"brake_gain_{axle}")) for axle in ("front", "rear") if f"brake_gain_{axle}" in numbers
+    }
+    wheelbase = float(numbers.pop("wheelbase_m", sum(base.vehicle.cog_to_axle_m)))
+    front = numbers.pop("cog_to_front_axle_m", None)
+    rear = numbers.pop("cog_to_rear_axle_m", None)
+    share = numbers.pop("front_weight_share", None)
+    if front is None:
+        usual = base.vehicle.cog_to_axle_m[0] / sum(base.vehicle.cog_to_axle_m)
+        front = wheelbase - rear if rear is not None else wheelbase * (1.0 - share if share is not None else usual)
+    if not 0.0 < front < wheelbase:
+        raise UnusableError(f"{where}: the centre of gravity lies {front:g} m behind the front axle of {wheelbase:g} m")
+    flat = {"vehicle_cog_to_axle_m": [float(front), wheelbase - float(front)]} | {
+        name: value for name, value in numbers.items() if name in PARAMETER.sizes
+    }
+    changes: dict[str, Any] = {}
+    for name, value in flat.items():
+        now = _value(base, name)
+        if isinstance(now, tuple) and not isinstance(value, list):
+            value = [float(value)] * len(now)
+        section = next(s for s in ("friction_brake", "vehicle", "suspension", "wheel", "tyre", "ehb", "pad", "motor",
+                                   "battery", "sensor") if name.startswith(s + "_"))  # fmt: skip
+        changes.setdefault(section, {})[name.removeprefix(section + "_")] = value
+    return changes, gains
+
+
+def _constant_pad(parameters: PlantParameters) -> Any:
+    """Ostermeyer's equation with a rest value so stiff that the friction is one number."""
+    mu, ambient = 0.38, parameters.friction_brake.ambient_k
+    a = mu * _CONSTANT_B_1_J * CONSTANT_EPSILON_W / ambient
+    return replace(
+        parameters.pad, a_1_ks=a, b_1_j=_CONSTANT_B_1_J, c_1_s=0.0, gamma_k_w=(0.0, 0.0),
+        epsilon_w=CONSTANT_EPSILON_W, heating_with_mu=0.0, temperature_of_disc=0.0,
+    )  # fmt: skip
+
+
+def rest_friction(parameters: PlantParameters, temperature_k: float) -> float:
+    """Pad friction at rest."""
+    pad = parameters.pad
+    return mu_equilibrium(0.0, temperature_k, pad.a_1_ks, pad.b_1_j, pad.epsilon_w)
+
+
+def _with_gains(parameters: PlantParameters, gains: Mapping[str, float]) -> PlantParameters:
+    """Piston areas for torque per pressure and wheel: gain = 2 mu eta A r."""
+    brake = parameters.friction_brake
+    constant = parameters.pad.epsilon_w >= CONSTANT_EPSILON_W
+    mu = rest_friction(parameters, brake.ambient_k if constant else BRAKE_K)
+    areas = list(brake.piston_area_m2)
+    for k, axle in enumerate(("front", "rear")):
+        if axle in gains:
+            areas[k] = gains[axle] / (2.0 * mu * brake.efficiency * brake.effective_radius_m[k])
+    return replace(parameters, friction_brake=replace(brake, piston_area_m2=(areas[0], areas[1])))
+
+
+def _vehicle(
+    parameters: PlantParameters, tolerance: Mapping[str, float], thermal: bool, remarks: tuple[str, ...]
+) -> Vehicle:
+    p = pack(parameters)
+    return Vehicle(parameters, p, tuple(listed(p, tolerance, thermal, PARAMETER)), thermal, remarks)

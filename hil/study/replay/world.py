@@ -1,0 +1,132 @@
+"""One car of the study: its numbers, effects and latencies; how numbers of the vehicle move it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hil.study.logs.case import Drive
+from hil.study.logs.table import Floats
+from hil.study.replay import acting
+from hil.study.replay.acting import Acting
+from hil.study.replay.nuisances import Nuisance, factor_of
+from hil.study.replay.sensing import SENSORS
+from hil.study.replay.vehicle import Vehicle
+from plant.effects.bank import NO_TERMS
+from plant.effects.theta import THETA
+
+_OF_THE_ROAD = (("road_grade", "grade"), ("headwind", "wind_mps"))
+LATE = ("imu", "pressure", "motor", "demand", "steering")
+"""Nodes whose frames may come later than the wheel speeds'; demands, and the steering wheel, may act later than they
+are logged."""
+DISC_TOLD_K, DISC_GUESSED_K = 5.0, 15.0
+"""Standard deviations of the discs' temperature at the start: as a thermocouple tells it, and as we guess."""
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """One car: flat parameters, theta, basis terms (rows as in `plant.effects.bank`), discs at the start, latencies.
+
+    ``onsets`` names effects that begin in the middle: number of the drive, and s in it.
+    ``tooth_share`` multiplies the lag of a toothed wheel, half the time between two teeth: the speed is told when a
+    tooth has passed; ``window_rows2`` is the square of the time over which it is a mean, in rows.
+    """
+
+    p: Floats
+    theta: Floats
+    terms: Floats = field(default_factory=NO_TERMS.copy)
+    disc_offset_k: float = 0.0
+    late_s: tuple[float, ...] = (0.0,) * len(LATE)
+    tooth_share: float = 1.0
+    window_rows2: float = 0.0
+    onsets: tuple[tuple[str, int, float], ...] = ()
+
+    def theta_in(self, drive: Drive) -> Floats:
+        """Theta of one drive: direction along the road, and what begins later or within it."""
+        theta = _along(self.theta, drive.log.direction)
+        if self.onsets:
+            theta = theta.copy()
+        for name, number, since_s in self.onsets:
+            if drive.number < number:
+                for parameter in THETA.effect(name).strengths:
+                    theta[THETA.slice(name, parameter.name)] = 0.0
+            elif drive.number == number:
+                theta[THETA.slice(name, "onset_s")] = since_s
+        return theta
+
+    def shifted(self, nuisances: Sequence[Nuisance], z: Floats) -> "World":
+        """With nuisances ``z`` standard deviations off."""
+        p, disc, late, tooth = self.p.copy(), self.disc_offset_k, list(self.late_s), self.tooth_share
+        window = self.window_rows2
+        for nuisance, amount in zip(nuisances, z, strict=True):
+            for at, step in zip(nuisance.at, nuisance.step, strict=True):
+                if nuisance.kind == "disc":
+                    disc += amount * step
+                elif nuisance.kind in ("late", "held"):
+                    late[at] += amount * step
+                elif nuisance.kind == "tooth":
+                    tooth += amount * step
+                elif nuisance.kind == "window":
+                    window += amount * step
+                elif nuisance.kind == "signed":
+                    p[at] += amount * step
+                else:
+                    p[at] = _positive(p[at], amount, step)
+        return replace(self, p=p, disc_offset_k=disc, late_s=tuple(late), tooth_share=tooth, window_rows2=window)
+
+
+def start_nuisances(disc_told: bool) -> list[Nuisance]:
+    """What the logs, not the vehicle, leave open: temperature of the discs, latency of the nodes.
+
+    ``disc_told``: all logs tell the discs' temperature at the start.
+    """
+    found = [
+        Nuisance(f"late_{node}", (k,), (2e-3,), "held" if node == "demand" else "late") for k, node in enumerate(LATE)
+    ]
+    return [
+        Nuisance("disc_temperature_k", (0,), (DISC_TOLD_K if disc_told else DISC_GUESSED_K,), "disc"),
+        Nuisance("tooth_lag", (0,), (0.5,), "tooth"),
+        Nuisance("tooth_window", (0,), (1.0,), "window"), *found,
+    ]  # fmt: skip
+
+
+def _positive(now: float, z: float, step: float) -> float:
+    """A positive number ``z`` standard deviations off: it never goes through zero."""
+    factor = factor_of(now, step)
+    return float(now * factor ** (z * np.sign(step))) if factor > 1.0 else now + z * step
+
+
+def nominal(vehicle: Vehicle) -> World:
+    """The car as handed in."""
+    return World(vehicle.p, THETA.neutral())
+
+
+def _along(theta: Floats, direction: int) -> Floats:
+    """Theta as met when driving along the road (+1) or back (-1)."""
+    if direction > 0:
+        return theta
+    turned = theta.copy()
+    for effect, parameter in _OF_THE_ROAD:
+        turned[THETA.slice(effect, parameter)] *= -1.0
+    return turned
+
+
+def apart(one: World, other: World, drive: Drive) -> Acting:
+    """What must be going on in a drive for two worlds to move differently in it."""
+    thetas = (one.theta_in(drive), other.theta_in(drive)) if one.onsets or other.onsets else (one.theta, other.theta)
+    found = acting.of_effects(*thetas) | acting.of_terms(one.terms, other.terms)
+    if one.p is not other.p:
+        found |= acting.of_parameters(one.p, other.p)
+    if one.disc_offset_k != other.disc_offset_k:
+        found |= Acting.BRAKES
+    for late, also, of in zip(one.late_s, other.late_s, acting.LATE, strict=True):
+        if late != also:
+            found |= of
+    return found
+
+
+def told_alike(one: World, other: World) -> bool:
+    """Whether sensors, clocks and frames of two worlds are alike: the same motion is told in the same way."""
+    same = one.late_s == other.late_s and one.onsets == other.onsets
+    same = same and (one.tooth_share, one.window_rows2) == (other.tooth_share, other.window_rows2)
+    return same and bool((one.theta[SENSORS] == other.theta[SENSORS]).all())

@@ -1,0 +1,1 @@
+"""The search for causes: screen, contest, laws in no list, what is beyond doubt."""

@@ -1,0 +1,336 @@
+"""The diagnosis: noise first, then nuisances, then one cause at a time, fitted non-linearly before it is believed."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hil.study.fitting.fit import Fitter, Model
+from hil.study.fitting.numbers import STRAINED, Numbers, strain
+from hil.study.fitting.own_error import variance_of, variance_of_law
+from hil.study.fitting.same_number import restated
+from hil.study.likelihood.noise import Frame, Noise
+from hil.study.logs.case import Case
+from hil.study.logs.table import Floats
+from hil.study.replay.rig import Rig
+from hil.study.replay.vehicle import Vehicle
+from hil.study.replay.world import World
+from hil.study.search.basis import LAWS, Piece
+from hil.study.search.contest import Contender, Contest, elsewhere, odds, refitted, worth
+from hil.study.search.diagnosis import Diagnosis, Say, Settings, causes_in
+from hil.study.search.doubt import backward, stands_beside, strained, with_gain
+from hil.study.search.field import Field, number_of
+from hil.study.search.handed_in import Refitted, from_handed_in
+from hil.study.search.left_over import FORM, LeftOver
+from hil.study.search.onset import with_onsets
+from hil.study.search.race import LawRace, best_of_each, least_gain, with_law
+from hil.study.search.screen import Score, beside_best, inflation, leaders, not_testable, threshold
+
+LEADERS = 5
+_CLEARER = 5.0
+"""By how much more than the best listed cause a law in no list must explain, log of the odds."""
+_TRIED, _LAWS_TRIED = 10, 2
+"""Leaders, and laws in no list, where the vehicle's numbers go far, places of one effect among them."""
+_NEAR = 0.2
+"""Share of what the best explains, by one step or fitted, below which no other is fitted from the car as handed in, nor
+the best at another place."""
+_MISLED = 1.0 / 3.0
+"""Share of what a cause explains, by which the fit without any must have been worse than it can be, for the search to
+begin again from a better one."""
+_LED_ANEW = 3
+"""Leaders that get sensitivities of their own, when they are fitted from the car as handed in."""
+_DATED = 2
+"""Contenders for which it is asked when they begin before they are compared."""
+_LAWS_BESIDE = 4
+"""Laws that are looked at with noise of their own."""
+_HOPELESS, _POOR = 0.1, 0.4
+"""Shares of the gain asked: below the one no candidate is looked at with noise of its own, below the other none is
+fitted."""
+Accepted = tuple[Model, Noise, list[Contender]]
+"""A model with one cause more, the noise beside it, and all that were fitted in its place, best first."""
+
+
+def diagnose(
+    case: Case, vehicle: Vehicle, base: World, settings: Settings | None = None, say: Say | None = None
+) -> Diagnosis:
+    """Diagnose a case; see the module."""
+    return _Search(case, vehicle, base, settings or Settings(), say or (lambda _: None)).run()
+
+
+class _Search:
+    def __init__(self, case: Case, vehicle: Vehicle, base: World, settings: Settings, say: Say) -> None:
+        self.settings, self.say = settings, say
+        self.rig = Rig(case, vehicle).quieted(base)
+        self.frame = Frame.of(self.rig.case)
+        self.numbers = Numbers(self.rig, self.frame, vehicle, base, settings.relinearise)
+        self.field = Field(self.rig, self.frame, vehicle.untold)
+        self.race: LawRace | None = None
+        self.told = float(len(self.numbers.nuisances))
+        self.began_again = False
+
+    @property
+    def fitter(self) -> Fitter:
+        """With the sensitivities to the vehicle's numbers last taken."""
+        return self.numbers.fitter
+
+    def run(self) -> Diagnosis:
+        """All of it."""
+        self.say("replaying the car as handed in")
+        self.numbers.anew(np.zeros(len(self.numbers.nuisances)))
+        nominal, noise = self.fitter.start(self.settings.noise_model)
+        self.say("noise, and the vehicle's numbers within their tolerance")
+        model, noise = self.numbers.fitted(nominal, noise)
+        found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, noise, noise, nominal, model, model)
+        self._screened(found)
+        around = model.z
+        while causes_in(model) < self.settings.most_causes:
+            accepted = self._next(found, model, noise)
+            if accepted is None:
+                break
+            before, (model, noise, list_of) = len(model.terms), accepted
+            if not list_of:
+                model, noise = self._again(found, model, noise)
+                around = model.z
+                continue
+            found.contenders += [list_of] * (len(model.terms) - before)
+            self.say(f"accepted {model.terms[-1].candidate.name} = {model.terms[-1].value:.4g}; when it begins")
+            model = with_onsets(self.fitter, model, noise)
+            model = self._quieter(model, noise)
+            model, noise, around = self._bent_back(model, noise, around)
+            bent, model = model, restated(model, self.numbers.nuisances, self.fitter.base)
+            around = around + model.z - bent.z
+        if model.terms:
+            bare = found.fitter
+            found.final, found.noise, found.fitter = model, noise, self.fitter
+            backward(found, bare, self.told, self.say)
+        return found
+
+    def _screened(self, found: Diagnosis) -> None:
+        """What each candidate explains where the numbers alone explain all they can, and so what is asked of one."""
+        self.say(f"sensitivities of {len(self.field.candidates)} candidates")
+        self._shown_at(found.base)
+        self.told = self.fitter.told(found.first_noise)
+        found.sums = self.fitter.screen(found.base, self.field.tracks, found.first_noise)
+        found.screened = self.field.scores(self.fitter, found.sums, found.base, found.first_noise)
+        found.untestable = sorted({*not_testable(found.screened), *self.rig.vehicle.untold})
+        found.looks = _independent(found.screened)
+        held = self.fitter.at_their_end(found.base.z)
+        found.inflation = inflation(beside_best(found.screened, found.sums, found.base.z, held))
+        found.least_gain = threshold(found.looks, self.settings.alpha) * found.inflation
+
+    def _shown_at(self, model: Model) -> None:
+        """What candidates, and laws in no list, show is that at this model."""
+        self.field.taken_at(self.fitter, model)
+        self.race = None
+
+    def _again(self, found: Diagnosis, model: Model, noise: Noise) -> tuple[Model, Noise]:
+        """From numbers with which the causes of a model, or none, explain more than those the search went on from."""
+        self.say("once more, from numbers that explain more")
+        self.numbers.anew(model.z, model.terms)
+        model, noise = self.numbers.fitted(self.fitter.at(model.z, model.terms, noise), noise)
+        if model.terms:
+            self._shown_at(model)
+        else:
+            found.fitter, found.noise, found.first_noise = self.fitter, noise, noise
+            found.base = found.final = model
+            self._screened(found)
+        return model, noise
+
+    def _bent(self, model: Model) -> bool:
+        """Whether something may have bent the vehicle's numbers."""
+        return self.settings.relinearise and not model.terms and strain(model.z) >= STRAINED
+
+    def _from_handed_in(
+        self, model: Model, fitted: Sequence[Contender], with_fit: Refitted, reference: float, anew: int
+    ) -> tuple[list[Contender], tuple[Model, Noise]]:
+        """Contenders for a cause of a model fitted from the car as handed in, too; see there."""
+        self.say("once more from the car as handed in")
+        found, without = from_handed_in(self.numbers, fitted, model.terms, with_fit, reference, anew)
+        self.rig.quieten(self.fitter.world(model.z, model.terms))
+        return found, without
+
+    def _quieter(self, model: Model, noise: Noise) -> Model:
+        """The model where what drives the car is made by it: a cause may move the steps of pressures and torques."""
+        if not self.settings.relinearise:
+            return model
+        self.rig.quieten(self.fitter.world(model.z, model.terms))
+        return self.fitter.fit(self.fitter.at(model.z, model.terms, noise), noise, 2)
+
+    def _bent_back(self, model: Model, noise: Noise, around: Floats) -> tuple[Model, Noise, Floats]:
+        """The model with sensitivities to the numbers taken anew where a cause let them go back far.
+
+        Numbers that had stood in for the cause bend what all others seem to explain.
+        """
+        if not self.numbers.went_far(model, around):
+            return model, noise, around
+        self.say("sensitivities anew beside it")
+        self.numbers.anew(model.z, model.terms)
+        model, noise = self.fitter.settle(self.fitter.at(model.z, model.terms, noise), noise, 2)
+        return model, noise, model.z
+
+    def _next(self, found: Diagnosis, model: Model, noise: Noise) -> Accepted | None:
+        """The next cause, if one is beyond doubt; no contender where the numbers explain more without a further one."""
+        left = LeftOver(found.explained, self.fitter, model, noise, self.field.tracks)
+        least, leading = found.least_gain, self._leading(found, model, noise, left)
+        if leading is None:
+            return None
+        contest, top, fitted = leading
+        reference = contest.reference
+
+        def gained() -> list[Contender]:
+            return [with_gain(c, reference - left.of(c.term.candidate), self.fitter, self.told) for c in fitted]
+
+        if self.settings.relinearise and (self._bent(model) or max(one.gained for one in gained()) >= least):
+            fitted, without = self._fitted_again(model, fitted, top, reference)
+            bare = without[0].cost
+            worse, more = reference - bare, bare - min(c.cost for c in fitted)
+            if not self.began_again and worse > max(least, _MISLED * more):
+                self.began_again = True
+                return *without, []
+            reference = min(reference, bare)
+        fitted = self._since_when(fitted)
+        tighter = min(fitted, key=odds).noise
+        reference = min(reference, self.fitter.fit(model, tighter, 3).cost)
+        law = self._unlisted(found, contest, model, tighter, reference, min(fitted, key=odds), left)
+        fitted = gained()
+        clear = sorted((c for c in fitted if c.gained >= least and worth(c) > 0.0), key=odds)
+        if law is not None:
+            found.explained += reference - law.cost
+            polished, tighter = self.fitter.settle(law.model, law.noise, 1)
+            return polished, tighter, [replace(law, model=polished), *clear]
+        best = self._standing(fitted, clear, least)
+        if best is None:
+            return None
+        best, clear = self._placed(found, best, clear)
+        found.explained += reference - best.cost
+        polished = self.fitter.fit(best.model, best.noise, 4, self.settings.relinearise)
+        polished, tighter = self.fitter.settle(polished, best.noise, 2)
+        rest = sorted(
+            (c for c in {*fitted, *clear} if c is not best and (c in clear or odds(c) >= odds(best))), key=odds
+        )
+        return polished, tighter, [replace(best, model=polished, term=polished.terms[-1]), *rest]
+
+    def _leading(
+        self, found: Diagnosis, model: Model, noise: Noise, left: LeftOver
+    ) -> tuple[Contest, list[Score], list[Contender]] | None:
+        """The race for the next cause, its leaders and their fits; None where none can be beyond doubt."""
+        bent, least = self._bent(model), found.least_gain
+        plausible = self.field.plausible(self.fitter, found, model, noise, bent)
+        if _most(plausible, left) < _HOPELESS * least:
+            return None
+        self.say(f"noise beside {len(plausible)} candidates")
+        contest = Contest(self.fitter, self.field.tracks, model, noise, self.settings.relinearise)
+        seen = contest.at_once(contest.profiled, plausible)
+        beside = {id(item): quieter for item, quieter in seen}
+        looked = [item for item, _ in seen]
+        top = sorted(looked, key=lambda s: -s.evidence)[:_TRIED] if bent else leaders(looked, LEADERS)
+        if _most(top, left) < _POOR * least:
+            return None
+        self.say(f"fitting {len(top)} leaders")
+        return contest, top, contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
+
+    def _fitted_again(
+        self, model: Model, fitted: list[Contender], top: list[Score], reference: float
+    ) -> tuple[list[Contender], tuple[Model, Noise]]:
+        """Contenders, those that explain much fitted from the car as handed in too, and the best fit without any."""
+        explain = [max(item.raw, reference - c.cost) for c, item in zip(fitted, top, strict=True)]
+        least = 0.0 if self._bent(model) else _NEAR * max(explain)
+        near = [c for c, much in zip(fitted, explain, strict=True) if much >= least]
+        refound, without = self._from_handed_in(model, near, refitted, reference, _LED_ANEW)
+        better = dict(zip(map(id, near), refound, strict=True))
+        return [better.get(id(c), c) for c in fitted], without
+
+    def _standing(self, fitted: list[Contender], clear: list[Contender], least: float) -> Contender | None:
+        """The best that is beyond doubt, beside one that explains more and is not, too."""
+        if not clear:
+            most = max(fitted, key=lambda c: c.gained)
+            self.say(f"{most.term.candidate.name} gains {most.gained:.1f}, {least:.1f} is asked")
+            return None
+        better = min(fitted, key=odds)
+        how = (least, self.fitter, self.told, self.settings.relinearise)
+        best = next((c for c in clear if c is better or stands_beside(c, better, *how)), None)
+        if best is None:
+            self.say(f"{better.term.candidate.name} explains more, and the model errs there; nothing stands beside it")
+        return best
+
+    def _placed(self, found: Diagnosis, best: Contender, clear: list[Contender]) -> tuple[Contender, list[Contender]]:
+        """The best where it fits best: the screen knows the places only as well as the numbers stood."""
+        name = number_of(best.term.candidate)
+        like = [item for item in found.screened if number_of(item.candidate)[:2] == name[:2]]
+        least = _NEAR * max((item.raw for item in like if item.candidate is best.term.candidate), default=np.inf)
+        places = [item.candidate for item in like if item.candidate is not best.term.candidate and item.raw >= least]
+        if not self.settings.relinearise or not places:
+            return best, clear
+        self.say(f"{best.term.candidate.name} at other places")
+        placed = [*clear, *elsewhere(self.fitter, best, places, True)]
+        better = [one for one in placed if number_of(one.term.candidate)[:2] == name[:2] and odds(one) < odds(best)]
+        return min(better, key=odds, default=best), placed
+
+    def _since_when(self, fitted: list[Contender]) -> list[Contender]:
+        """The best with the time they begin at: a law by time would explain more than a cause that was always there."""
+        best = sorted(fitted, key=odds)[:_DATED]
+        dated = {id(one): with_onsets(self.fitter, one.model, one.noise) for one in best}
+        found = []
+        for one in fitted:
+            model = dated.get(id(one), one.model)
+            found.append(
+                one if model is one.model else replace(one, model=model, term=model.terms[-1], cost=model.cost)
+            )
+        return found
+
+    def _unlisted(
+        self, found: Diagnosis, contest: Contest, model: Model, noise: Noise, reference: float, listed: Contender,
+        left: LeftOver,
+    ) -> Contender | None:  # fmt: skip
+        """A law in no list that explains more than the best listed cause, beyond noise and the model's own error."""
+        if not self.settings.dictionary or any(isinstance(term.candidate, Piece) for term in model.terms):
+            return None
+        if self.race is None:
+            self.say("curves in no list")
+            self.race = LawRace(self.fitter, self.fitter.world(model.z, model.terms))
+        race, leading = self.race, best_of_each(self.race.entries(self.fitter, model, noise), _LAWS_BESIDE)
+        beside = contest.at_once(lambda entry: contest.foreseen(entry.begun, race.columns(entry)), leading)
+        seen = [with_law(entry, *one, contest.reference) for entry, one in zip(leading, beside, strict=True)]
+        entries = {law.term.candidate.name: entry for law, entry in zip(seen, leading, strict=True)}
+
+        def refitted_law(one: Contender, model: Model, noise: Noise) -> Contender:
+            return with_law(entries[one.term.candidate.name], model, noise, reference)
+
+        if self._bent(model):
+            seen, without = self._from_handed_in(
+                model, sorted(seen, key=odds)[:_LAWS_TRIED], refitted_law, reference, 1
+            )
+            reference = min(reference, without[0].cost)
+        law = min(seen, key=odds)
+        best = entries[law.term.candidate.name]
+        self.say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
+        least = least_gain(found.looks + len(LAWS), self.settings.alpha) * found.inflation
+        signature = {name: columns @ best.values[:, None] for name, columns in race.columns(best).items()}
+        left_there = left.of_signature(best.curve.pieces[0].effect, signature)
+        least = least * variance_of_law(best.curve.law.name, best.curve.place) + left_there
+
+        def ahead() -> bool:
+            gained = min(listed.cost, reference) - law.cost
+            rival = (1.0 + FORM**2) * max(0.5 * (reference - odds(listed)), 0.0)
+            asked = least * strained(self.fitter, law.model.z, self.told)
+            return gained >= asked and 0.5 * (reference - odds(law)) >= rival + _CLEARER
+
+        if ahead() and self.settings.relinearise and not self._bent(model):
+            (law,), without = self._from_handed_in(model, [law], refitted_law, reference, 1)
+            reference = min(reference, without[0].cost)
+        if not ahead():
+            return None
+        fitted = self.fitter.fit(self.fitter.at(law.model.z, law.model.terms, law.noise), law.noise, 3)
+        law = refitted_law(law, fitted, law.noise)
+        return law if ahead() else None
+
+
+def _most(listed: Sequence[Score], left: LeftOver) -> float:
+    """Most that a candidate gains by one step, beyond what the causes in the model may leave."""
+    return max((item.gain - left.of(item.candidate) / variance_of(item.candidate) for item in listed), default=0.0)
+
+
+def _independent(found: Sequence[Score]) -> int:
+    """How many looks: candidates that can show at all, places of one effect counted as one and a half."""
+    names = {(s.candidate.effect.name, s.candidate.parameter.name) for s in found if s.reach > 1.0}
+    return max(1, round(1.5 * len(names)))

@@ -1,0 +1,75 @@
+"""What is beyond doubt: a gain beyond noise and the model's own error, and a value that is away from nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hil.study.fitting.fit import Fitter
+from hil.study.fitting.numbers import strain
+from hil.study.fitting.own_error import shared_out, variance_of
+from hil.study.fitting.same_number import restated
+from hil.study.logs.table import Floats
+from hil.study.search.basis import Piece
+from hil.study.search.contest import Contender, odds
+from hil.study.search.diagnosis import TIED, Diagnosis, Say, causes_in
+from hil.study.search.intervals import deviations
+from hil.study.search.onset import price
+from hil.study.search.screen import threshold
+
+_SURE = 0.05
+"""Chance that noise takes any of all values so far from nothing as is asked of one, in its own deviations, which know
+how far manoeuvres disagree: a second question beside what a cause explains (decision 0078)."""
+
+
+def strained(fitter: Fitter, z: Floats, told: float) -> float:
+    """What a gain is divided by where the vehicle's numbers ``z``, of which the data tell ``told``, lie far off."""
+    return shared_out(strain(z, fitter.farthest, told))
+
+
+def with_gain(contender: Contender, reference: float, fitter: Fitter, told: float) -> Contender:
+    """With its gain against ``reference``, shared out over the model's own error and less what a chosen beginning
+    takes."""
+    gained = (reference - contender.cost) / variance_of(contender.term.candidate)
+    chosen = 0.0 if contender.term.onset is None else price(fitter.frame)
+    return replace(contender, gained=gained / strained(fitter, contender.model.z, told) - chosen)
+
+
+def stands_beside(
+    clear: Contender, better: Contender, least: float, fitter: Fitter, told: float, relinearise: bool
+) -> bool:
+    """Whether a cause that is beyond doubt is so even when a better one, which is not, is let in as an error."""
+    if odds(clear) - odds(better) < TIED:
+        return True
+    joint = fitter.at(better.model.z, (*better.model.terms, clear.term), better.noise)
+    both = fitter.fit(joint, better.noise, 2, relinearise)
+    return (better.cost - both.cost) / variance_of(clear.term.candidate) >= least * strained(fitter, both.z, told)
+
+
+def backward(found: Diagnosis, bare: Fitter, told: float, say: Say) -> None:
+    """Take out each cause in turn; what is not missed, or may as well be nothing, stays out.
+
+    ``bare`` is the fitter of the model without any.
+    """
+    fitter, asked = found.fitter, float(np.sqrt(threshold(found.looks, _SURE)))
+    for k in reversed(range(len(found.final.terms))):
+        model, term = found.final, found.final.terms[k]
+        if isinstance(term.candidate, Piece):
+            continue
+        error = variance_of(term.candidate)
+        away = abs(term.value) / (float(deviations(found)[k]) * float(np.sqrt(error)))
+        sure = away >= asked
+        if sure and causes_in(model) == 1:
+            return
+        rest = tuple(other for j, other in enumerate(model.terms) if j != k)
+        without = fitter.fit(fitter.at(model.z, rest, found.noise), found.noise, 5)
+        if not sure or without.cost - model.cost < found.least_gain * error * strained(fitter, model.z, told):
+            why = "not needed beside the others" if sure else f"{away:.1f} deviations from nothing, asked {asked:.1f}"
+            found.remarks.append(f"{term.candidate.name} = {term.value:.3g} is not told: {why}")
+            say(found.remarks[-1])
+            found.final = without
+            del found.contenders[k]
+    if found.final.terms:
+        found.final = restated(found.final, fitter.nuisances, fitter.base)
+        return
+    found.final, found.noise, found.fitter = found.base, found.first_noise, bare
+    bare.rig.quieten(bare.world(found.base.z, found.base.terms))

@@ -1,0 +1,69 @@
+"""The field of a race: what every candidate shows at a model, how much it explains there, and who is worth a look."""
+
+from collections.abc import Sequence
+
+from hil.study.fitting.candidates import Candidate, candidates, columns
+from hil.study.fitting.fit import Fitter, Model, Tracks
+from hil.study.fitting.linear import Sums, project, track_columns
+from hil.study.likelihood.noise import Frame, Noise
+from hil.study.replay.rig import Rig
+from hil.study.search.behind import replayed, silent
+from hil.study.search.contest import Contest
+from hil.study.search.diagnosis import Diagnosis
+from hil.study.search.onset import begins, price
+from hil.study.search.screen import Score, leaders, scores
+from hil.study.search.since import with_beginnings
+
+_PLAUSIBLE = 12
+
+
+class Field:
+    """All candidates of a case; ``tracks`` are their sensitivities where they were last taken."""
+
+    def __init__(self, rig: Rig, frame: Frame, untold: Sequence[str]) -> None:
+        self._rig, self._frame = rig, frame
+        self._columns = columns(untold)
+        self.candidates: list[Candidate] = candidates(self._columns)
+        self.tracks: Tracks = {}
+
+    def taken_at(self, fitter: Fitter, model: Model) -> None:
+        """Take the sensitivities at a model."""
+        world = fitter.world(model.z, model.terms)
+        self._rig.keep(world)
+        worlds = [column.stepped(world) for column in self._columns]
+        steps = [column.step for column in self._columns]
+        self.tracks = track_columns(self._rig, self._frame, model.stack, worlds, steps)
+
+    def scores(self, fitter: Fitter, sums: Sums, model: Model, noise: Noise) -> list[Score]:
+        """What each explains beside a model by one step; what does nothing at first, by a replay at full size."""
+        accepted = len(model.terms)
+        projected = project(sums.total(), sums.nuisances, range(accepted), model.z, fitter.at_their_end(model.z))
+        in_use = {id(term.candidate): term.value for term in model.terms}
+        now = [in_use.get(id(candidate), 0.0) for candidate in self.candidates]
+        found = scores(self.candidates, projected, accepted, now)
+        self._rig.keep(fitter.world(model.z, model.terms))
+        hidden = [item for item in found if silent(item)]
+        shown = Contest.at_once(lambda item: replayed(fitter, model, noise, item), hidden)
+        met = dict(zip(map(id, hidden), shown, strict=True))
+        return [met.get(id(item), item) for item in found]
+
+    def plausible(self, fitter: Fitter, found: Diagnosis, model: Model, noise: Noise, bent: bool) -> list[Score]:
+        """Those that explain most by one step and are not in the model yet; of all places, where numbers are bent."""
+        listed, sums = found.screened, found.sums
+        if model.terms:
+            sums = fitter.screen(model, self.tracks, noise)
+            listed = self.scores(fitter, sums, model, noise)
+        assert sums is not None  # screened before any cause is looked for
+        held, starts = fitter.at_their_end(model.z), begins(self._rig.case)
+        listed = with_beginnings(listed, sums, len(model.terms), model.z, held, starts, price(self._frame))
+        used = {number_of(term.candidate) for term in model.terms}
+        listed = [item for item in listed if number_of(item.candidate) not in used]
+        best = leaders(listed, _PLAUSIBLE)
+        if bent:  # and which place is first is bent too
+            best = list(dict.fromkeys([*sorted(listed, key=lambda s: -s.evidence)[:_PLAUSIBLE], *best]))
+        return best
+
+
+def number_of(candidate: Candidate) -> tuple[str, str, str]:
+    """What tells a candidate from others."""
+    return candidate.effect.name, candidate.parameter.name, candidate.place

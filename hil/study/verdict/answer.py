@@ -1,0 +1,207 @@
+"""The answer as one plain object: verdict, causes, rivals, what to drive, what was wrong, what is gained."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hil.study.fitting.fit import Term
+from hil.study.fitting.linear import project
+from hil.study.fitting.own_error import UNLISTED, variance_of_law
+from hil.study.search.basis import Piece, shown
+from hil.study.search.contest import Contender, odds
+from hil.study.search.diagnosis import TIED, Diagnosis
+from hil.study.search.intervals import half_width, intervals
+from hil.study.verdict.decide import decide_with, write
+from hil.study.verdict.measure import Gain, probabilities
+from hil.study.verdict.patterns import WORDS, Wrong
+from hil.study.verdict.tied import Tied, tied_set
+
+_MOST_TIED = 5
+_SILENT = 0.5
+"""Share of the effects that the manoeuvres would not show, beyond which finding nothing says nothing."""
+_CERTAIN = 4.6
+"""Difference in chi2 (ten to one) below which a cause of another name is not told apart."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What `explain` returns: ``json`` as printed, and all that the report shows."""
+
+    json: dict[str, Any]
+    found: Diagnosis
+    gains: list[Gain]
+    wrongs: list[Wrong]
+
+
+def answer(
+    found: Diagnosis, gains: list[Gain], wrongs: list[Wrong], extension: str | None, remarks: list[str],
+    out: Path | None = None,
+) -> Answer:  # fmt: skip
+    """Put the answer together; manoeuvres to drive next are written into ``out``."""
+    causes, tied = _causes(found), _tied(found)
+    fitted = _rivals(found)
+    rivals = [_rival(c, p) for c, p in fitted]
+    known = {c["effect"] for c in (*causes, *rivals)}
+    rivals += [entry for entry in _imitations(found, tied) if entry["effect"] not in known]
+    verdict = _verdict(found, causes, tied)
+    content = {
+        "verdict": verdict,
+        "causes": causes,
+        "rivals": rivals,
+        "not_testable": found.untestable,
+        "decide_with": _decide_with(found, tied, fitted, out) if verdict == "cannot_tell_apart" else [],
+        "wrong": [
+            {"channel": w.channel, "rms": w.rms, "noise": w.noise, "unit": w.unit, "pattern": w.pattern} for w in wrongs
+        ],
+        "gain": {
+            WORDS[g.channel]: {
+                "before": g.before, "after": g.after, "ci95": [g.low, g.high], "tuned": g.tuned,
+                "best_wrong": g.best_wrong,
+            }
+            for g in gains
+        },
+        "extension": extension,
+        "missing": list(found.case.missing),
+        "remarks": remarks,
+    }  # fmt: skip
+    return Answer(content, found, gains, wrongs)
+
+
+def _verdict(found: Diagnosis, causes: list[dict[str, Any]], tied: Tied | None) -> str:
+    if not causes:
+        effects = {item.candidate.effect.name for item in found.screened}
+        return "not_testable" if len(effects.intersection(found.untestable)) > _SILENT * len(effects) else "none"
+    if any(isinstance(term.candidate, Piece) for term in found.final.terms):
+        return "unlisted"
+    if tied is not None and tied.indices:
+        return "cannot_tell_apart"
+    for listed in found.races:
+        best = listed[0]
+        for other in listed[1:]:
+            another = other.term.candidate.effect.name != best.term.candidate.effect.name
+            if another and odds(other) - odds(best) < _CERTAIN:
+                return "cannot_tell_apart"
+    return "named"
+
+
+def _causes(found: Diagnosis) -> list[dict[str, Any]]:
+    """One entry an effect: its numbers together."""
+    merged: dict[str, dict[str, Any]] = {}
+    for term, interval, listed in zip(found.final.terms, intervals(found), found.contenders, strict=True):
+        effect, candidate = term.candidate.effect, term.candidate
+        if isinstance(candidate, Piece):
+            merged.setdefault(effect.name, _unlisted(found, candidate, listed))
+            continue
+        chances = probabilities(listed)
+        own = sum(
+            p for c, p in zip(listed, chances, strict=True) if c.term.candidate.effect.name == effect.name
+        )  # fmt: skip
+        entry = merged.setdefault(
+            effect.name,
+            {
+                "effect": effect.name, "title": effect.title, "joint": effect.joints[0] if effect.joints else "",
+                "wheel": candidate.place, "parameters": {}, "probability": own, **_onset(found, term),
+                "variables": [], "curve": [],
+            },
+        )  # fmt: skip
+        entry["parameters"][candidate.parameter.name] = {
+            "value": term.value, "unit": candidate.parameter.unit, "ci95": list(interval),
+        }  # fmt: skip
+        entry["probability"] = max(entry["probability"], own)
+    return list(merged.values())
+
+
+def _onset(found: Diagnosis, term: Term) -> dict[str, Any]:
+    """Where a cause begins, in its log and in the session: the logs in a row."""
+    if term.onset is None:
+        return {"onset": None, "onset_s": None}
+    number, since_s = term.onset
+    logs = [drive.log for drive in found.case.drives]
+    before = sum(float(log.t_s[-1] - log.t_s[0]) for log in logs[:number])
+    begin = {"log": logs[number].name, "t_s": float(logs[number].t_s[0]) + since_s}
+    return {"onset": begin, "onset_s": before + since_s}
+
+
+def _unlisted(found: Diagnosis, piece: Piece, listed: list[Contender]) -> dict[str, Any]:
+    """The entry of a law in no list: where, on what, and the curve with its band."""
+    terms, covariance = found.final.terms, found.final.covariance
+    own = [k for k, term in enumerate(terms) if isinstance(term.candidate, Piece)]
+    pieces = [term.candidate for term in terms if isinstance(term.candidate, Piece)]
+    error = variance_of_law(piece.law.name, piece.place)
+    return {
+        "effect": UNLISTED, "title": piece.effect.title, "joint": piece.law.joint, "wheel": piece.place,
+        "parameters": {}, "probability": probabilities(listed)[0], "onset": None, "onset_s": None,
+        "variables": [piece.variable], "adds": piece.law.adds,
+        "curve": shown(pieces, [terms[k].value for k in own], error * covariance[np.ix_(own, own)]),
+    }  # fmt: skip
+
+
+def _rivals(found: Diagnosis) -> list[tuple[Contender, float]]:
+    """Contenders of other effects that fit nearly as well, with their probability."""
+    rivals = []
+    named = {term.candidate.effect.name for term in found.final.terms}
+    for listed in found.races:
+        for contender, chance in list(zip(listed, probabilities(listed), strict=True))[1:]:
+            near = contender.cost - listed[0].cost < TIED
+            if near and contender.term.candidate.effect.name not in named:
+                rivals.append((contender, chance))
+    return rivals
+
+
+def _rival(contender: Contender, chance: float) -> dict[str, Any]:
+    candidate, value = contender.term.candidate, contender.term.value
+    half = half_width(candidate, value, max(contender.information, 1e-30) ** -0.5)
+    return {
+        "effect": candidate.effect.name, "title": candidate.effect.title, "wheel": candidate.place,
+        "joint": candidate.effect.joints[0] if candidate.effect.joints else "",
+        "parameters": {
+            candidate.parameter.name: {
+                "value": value, "unit": candidate.parameter.unit, "ci95": [value - half, value + half],
+            }
+        },
+        "probability": chance, "onset": None, "onset_s": None, "variables": [], "curve": [],
+    }  # fmt: skip
+
+
+def _tied(found: Diagnosis) -> Tied | None:
+    """What imitates the first cause within the noise, from the joint information of the data."""
+    if not found.final.terms or found.sums is None or isinstance(found.final.terms[0].candidate, Piece):
+        return None
+    term, listed = found.final.terms[0], [score.candidate for score in found.screened]
+    projected = project(
+        found.sums.total(), found.sums.nuisances, (), found.base.z, found.fitter.at_their_end(found.base.z)
+    )
+    return tied_set(projected.q, listed, listed.index(term.candidate), term.value)
+
+
+def _imitations(found: Diagnosis, tied: Tied | None) -> list[dict[str, Any]]:
+    """Tied causes as rivals, with the values that imitate, one entry an effect."""
+    if tied is None:
+        return []
+    together = dict(zip(tied.members, tied.values, strict=True))
+    apart = {**dict.fromkeys(tied.members, tied.apart), **dict(tied.pairs)}
+    entries: dict[str, dict[str, Any]] = {}
+    for index in tied.indices:
+        score = found.screened[index]
+        value = together.get(index, score.value)
+        contender = Contender(Term(score.candidate, value), found.base, 0.0, 0.0, score.information, found.noise)
+        odds_against = float(np.exp(-0.5 * apart[index] ** 2))
+        entries.setdefault(score.candidate.effect.name, _rival(contender, odds_against / (1.0 + odds_against)))
+    return list(entries.values())
+
+
+def _decide_with(
+    found: Diagnosis, tied: Tied | None, fitted: list[tuple[Contender, float]], out: Path | None
+) -> list[dict[str, Any]]:
+    """Scenarios that tell the tied causes apart, the best first."""
+    names = [term.candidate.name for term in found.final.terms[:1]]
+    names += [contender.term.candidate.name for contender, _ in fitted]
+    names += [found.screened[k].candidate.name for k in (() if tied is None else tied.indices)]
+    unique = {name.split("@")[0].split(".")[0]: name for name in reversed(names)}  # the first of each effect
+    if len(unique) < 2:
+        return []
+    advice = decide_with(list(unique.values())[::-1][:_MOST_TIED])
+    paths = write(advice, out) if out is not None else [None] * len(advice)
+    return [one.as_json(path) for one, path in zip(advice, paths, strict=True)]

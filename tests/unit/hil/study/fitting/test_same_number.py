@@ -1,0 +1,71 @@
+"""Causes that are a number of the vehicle: the same car, told at its most likely."""
+
+import numpy as np
+import pytest
+
+from hil.study.fitting.candidates import candidates, columns
+from hil.study.fitting.fit import Model, Term
+from hil.study.fitting.same_number import restated, same_number
+from hil.study.replay.vehicle import paper_car
+from hil.study.replay.world import nominal
+
+VEHICLE = paper_car()
+BASE = nominal(VEHICLE)
+CANDIDATES = {candidate.name: candidate for candidate in candidates(columns())}
+
+
+def _model(name: str, value: float, z: float, number: str) -> tuple[Model, int]:
+    at = next(k for k, nuisance in enumerate(VEHICLE.nuisances) if nuisance.name == number)
+    moved = np.zeros(len(VEHICLE.nuisances))
+    moved[at] = z
+    return Model(moved, (Term(CANDIDATES[name], value),), {}, 100.0 + z * z, np.zeros((0, 0))), at
+
+
+def _number(model: Model, at: int) -> float:
+    return float(BASE.shifted(VEHICLE.nuisances, model.z).p[VEHICLE.nuisances[at].at[0]])
+
+
+@pytest.mark.parametrize(("name", "number", "slope"), [
+    ("mass_offset@car", "vehicle_mass_kg", 1.0),
+    ("ehb_dead_time@car", "ehb_dead_time_s", 1.0),
+    ("motor_tau@car", "motor_time_constant_s", 1.0),
+    ("rotating_inertia@car", "wheel_inertia_kg_m2", 1.0),
+    ("ehb_bandwidth.frequency@car", "ehb_natural_frequency_hz", VEHICLE.parameters.ehb.natural_frequency_hz),
+])  # fmt: skip
+def test_a_cause_is_found_to_be_a_number_of_the_vehicle(name, number, slope):
+    candidate = CANDIDATES[name]
+    same = same_number(Term(candidate, 0.2 * candidate.parameter.typical), VEHICLE.nuisances, BASE)
+    assert same is not None
+    nuisance = VEHICLE.nuisances[same.nuisance]
+    assert nuisance.name == number
+    assert same.slope == pytest.approx(slope)
+    assert same.deviation(VEHICLE.nuisances) == pytest.approx(abs(nuisance.step[0] / slope))
+
+
+@pytest.mark.parametrize("name", ["pad_mu_gain@fl", "road_grade@car", "imu_bias.ax_mps2@car", "slip_stiffness@car"])
+def test_other_causes_are_none(name):
+    candidate = CANDIDATES[name]
+    assert same_number(Term(candidate, 0.2 * candidate.parameter.typical), VEHICLE.nuisances, BASE) is None
+
+
+def test_the_car_stays_and_the_number_goes_back_to_what_is_stated():
+    """6 ms beside a dead time that three standard deviations have made longer: most of both is the cause."""
+    model, at = _model("ehb_dead_time@car", 0.006, 3.0, "ehb_dead_time_s")
+    told = restated(model, VEHICLE.nuisances, BASE)
+    assert abs(told.z[at]) < 0.3
+    assert told.terms[0].value + _number(told, at) == pytest.approx(0.006 + _number(model, at))
+    assert told.cost == pytest.approx(100.0 + told.z[at] ** 2)
+    again = restated(told, VEHICLE.nuisances, BASE)
+    assert again.terms[0].value == pytest.approx(told.terms[0].value)
+
+
+def test_a_share_is_of_what_the_number_is_now():
+    model, at = _model("ehb_bandwidth.frequency@car", -0.2, 2.0, "ehb_natural_frequency_hz")
+    told = restated(model, VEHICLE.nuisances, BASE)
+    assert _number(told, at) * (1.0 + told.terms[0].value) == pytest.approx(_number(model, at) * 0.8)
+
+
+def test_what_no_value_of_the_cause_can_make_stays_as_it_is():
+    low = CANDIDATES["rotating_inertia@car"].parameter.low
+    model, _ = _model("rotating_inertia@car", low, -3.0, "wheel_inertia_kg_m2")
+    assert restated(model, VEHICLE.nuisances, BASE) is model

@@ -1,0 +1,79 @@
+"""Vehicle sets: six numbers are enough, unknown keys are told, tolerances become standard deviations."""
+
+import numpy as np
+import pytest
+
+from hil.study.logs.table import UnusableError
+from hil.study.replay.nuisances import HALF_WIDTH_TO_SIGMA
+from hil.study.replay.vehicle import load_vehicle, paper_car, rest_friction
+
+SIX = {
+    "mass_kg": 1800.0,
+    "wheelbase_m": 2.8,
+    "cog_to_front_axle_m": 1.3,
+    "rolling_radius_m": 0.33,
+    "brake_gain_front_nm_pa": 2.5e-4,
+    "brake_gain_rear_nm_pa": 1.2e-4,
+}
+
+
+def test_six_numbers_make_a_car_with_a_constant_brake_gain() -> None:
+    car = load_vehicle(SIX)
+    brake, p = car.parameters.friction_brake, car.parameters
+    assert p.vehicle.mass_kg == 1800.0
+    assert p.vehicle.cog_to_axle_m == pytest.approx((1.3, 1.5))
+    for temperature in (280.0, 293.15):
+        mu = rest_friction(p, 293.15)
+        gain = 2.0 * mu * brake.efficiency * brake.piston_area_m2[0] * brake.effective_radius_m[0]
+        assert gain == pytest.approx(2.5e-4)
+        assert temperature > 0.0
+    assert not car.pad_temperature_matters
+    assert any("wide uncertainty" in text for text in car.remarks)
+
+
+def test_an_unknown_key_is_told_not_refused() -> None:
+    assert any("'colour'" in text for text in load_vehicle({**SIX, "colour": 3.0}).remarks)
+
+
+def test_a_tolerance_is_two_standard_deviations() -> None:
+    car = load_vehicle({**SIX, "mass_kg_tolerance": 60.0, "brake_gain_front_nm_pa_tolerance": 2.5e-5})
+    found = {n.name: (n.step[0], car.p[n.at[0]]) for n in car.nuisances}
+    assert found["vehicle_mass_kg"][0] == pytest.approx(HALF_WIDTH_TO_SIGMA * 60.0)
+    step, area = found["brake_gain_front"]
+    assert step == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.1 * area, rel=1e-3)
+
+
+def test_a_stated_tolerance_is_kept_to_as_far_as_an_equation_is_that_good() -> None:
+    told = {**SIX, "cog_height_m": 0.5, "cog_height_m_tolerance": 0.03}
+    step = {n.name: n.step[0] for n in load_vehicle(told).nuisances}
+    assert step["vehicle_cog_height_m"] == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.03)
+    step = {n.name: n.step[0] for n in load_vehicle({**told, "cog_height_m_tolerance": 0.001}).nuisances}
+    assert step["vehicle_cog_height_m"] == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.04 * 0.5)
+    step = {n.name: n.step[0] for n in load_vehicle(SIX).nuisances}
+    assert step["vehicle_cog_height_m"] > 0.03
+
+
+def test_the_shipped_car_keeps_its_own_numbers() -> None:
+    car = paper_car()
+    assert car.parameters.vehicle.mass_kg == 1463.0
+    assert np.isfinite(car.p).all()
+
+
+@pytest.mark.parametrize("value", ["heavy", True, [], float("nan"), 10**400])
+def test_what_is_no_number_is_refused(value: object) -> None:
+    if isinstance(value, str):
+        assert load_vehicle({**SIX, "colour": value})
+        return
+    with pytest.raises(UnusableError, match="expected a number"):
+        load_vehicle({**SIX, "mass_kg": value})
+
+
+def test_what_a_set_says_nothing_of_is_not_judged() -> None:
+    car = load_vehicle(SIX)
+    assert {"ehb_dead_time", "motor_tau", "battery_soc"} <= set(car.untold)
+    assert car.parameters.motor.peak_torque_nm > 2000.0
+    assert any("nothing said of ehb, motor, battery" in text for text in car.remarks)
+    told = load_vehicle({**SIX, "ehb_dead_time_s": 0.02, "motor_peak_torque_nm": 400.0, "tyre_lkx": 1.0})
+    assert set(told.untold) == {"battery_soc"}
+    assert told.parameters.motor.peak_torque_nm == 400.0
+    assert paper_car().unstated == ()

@@ -1,0 +1,35 @@
+"""Worlds: the vehicle's numbers move without corners, and stay what they are."""
+
+import numpy as np
+import pytest
+
+from hil.study.replay.vehicle import load_vehicle, paper_car
+from hil.study.replay.world import nominal
+
+SIX = {
+    "mass_kg": 1650.0, "wheelbase_m": 2.72, "cog_to_front_axle_m": 1.3, "rolling_radius_m": 0.318,
+    "brake_gain_front_nm_pa": 2.9e-4, "brake_gain_rear_nm_pa": 1.7e-4,
+}  # fmt: skip
+STEPS = np.linspace(-1.0, 1.0, 25)  # of how far each may be off
+
+
+@pytest.mark.parametrize("vehicle", [paper_car(), load_vehicle(SIX)], ids=["own numbers", "six numbers"])
+def test_every_number_of_the_vehicle_moves_without_a_corner(vehicle):
+    """A number that stands still for part of its range has no sensitivity there, and the fit would go to and fro."""
+    base = nominal(vehicle)
+    for nuisance in vehicle.nuisances:
+        for at, step in zip(nuisance.at, nuisance.step, strict=True):
+            values = np.array([base.shifted([nuisance], np.array([z])).p[at] for z in nuisance.farthest * STEPS])
+            moved = np.diff(values) * np.sign(step)
+            assert (moved > 0.0).all(), nuisance.name
+            assert moved.max() < 30.0 * moved.min(), nuisance.name  # from a fifth to five times
+            if nuisance.kind == "vehicle" and base.p[at] > 0.0:
+                assert values.min() > 0.0, nuisance.name
+                assert values.max() < 5.001 * base.p[at], nuisance.name
+
+
+def test_one_standard_deviation_is_what_the_set_says():
+    vehicle = paper_car()
+    mass = next(nuisance for nuisance in vehicle.nuisances if nuisance.name == "vehicle_mass_kg")
+    base = nominal(vehicle)
+    assert base.shifted([mass], np.array([1.0])).p[mass.at[0]] == pytest.approx(base.p[mass.at[0]] + mass.step[0])

@@ -1,0 +1,45 @@
+"""Causes that the vehicle's numbers stood in for."""
+
+import numpy as np
+import pytest
+from outsider import VEHICLE
+from pulses import log_as_driven
+
+from hil.study.fitting.candidates import candidates, columns
+from hil.study.fitting.fit import Term
+from hil.study.fitting.numbers import Numbers
+from hil.study.likelihood.noise import Frame
+from hil.study.logs.prepare import prepare
+from hil.study.replay.rig import Rig
+from hil.study.replay.vehicle import load_vehicle
+from hil.study.replay.world import nominal
+from hil.study.search.contest import Contender, odds, refitted
+from hil.study.search.handed_in import from_handed_in
+
+WEAKER = -0.2
+DEVIATIONS = {"wheel": 0.02, "ax": 0.02, "gps": 0.03, "pressure": 1e4, "motor": 0.5}
+
+
+@pytest.mark.slow
+def test_pads_that_brake_gains_stood_in_for_are_found():
+    vehicle = load_vehicle(VEHICLE)
+    case = prepare([log_as_driven(vehicle, 0.318)], 0.318)
+    rig, base = Rig(case, vehicle), nominal(vehicle)
+    numbers = Numbers(rig, Frame.of(case), vehicle, base, relinearise=True)
+    (pads,) = [one for one in candidates(columns()) if one.name == "pad_mu_gain@car"]
+    rng = np.random.default_rng(2)
+    (drive,) = case.drives
+    for group, told in rig.run(pads.applied(base, WEAKER)).items():
+        drive.measured[group][:] = told + DEVIATIONS.get(group, 0.02) * rng.standard_normal(told.shape)
+    numbers.anew(np.zeros(len(numbers.nuisances)))
+    bent, noise = numbers.fitted(*numbers.fitter.start())
+    gains = [k for k, one in enumerate(numbers.nuisances) if one.name.startswith("brake_gain")]
+    assert (bent.z[gains] < -2.0).any()
+    begun = numbers.fitter.at(bent.z, (Term(pads, 0.0),), noise)
+    stuck = refitted(Contender(begun.terms[0], begun, begun.cost, 0.0, 1.0, noise), begun, noise)
+    fitter = numbers.fitter
+    (found,), (without, _) = from_handed_in(numbers, [stuck], (), refitted, stuck.cost, anew=1)
+    assert numbers.fitter is fitter
+    assert found.term.value == pytest.approx(WEAKER, abs=0.02)
+    assert odds(found) < odds(stuck)
+    assert found.cost + 100.0 < min(without.cost, fitter.cost(bent.residual, bent.z, noise))

@@ -1,0 +1,51 @@
+"""When a cause begins, from what each manoeuvre says of it."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hil.study.likelihood.noise import Frame
+from hil.study.logs.case import Segment
+from hil.study.search.onset import begin_of, moments_of, price
+
+
+def _products(value: float, begin: int, strength: list[float], seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Manoeuvres that see a cause with ``strength`` standard deviations each, there from ``begin`` on."""
+    q = np.square(strength) / value**2
+    there = np.arange(len(q)) >= begin
+    noise = np.random.default_rng(seed).standard_normal(len(q))
+    return q * value * there + np.sqrt(q) * noise, q
+
+
+@given(begin=st.integers(2, 8), seed=st.integers(0, 200), value=st.sampled_from([-3.0, 0.02, 40.0]))
+def test_a_clear_beginning_is_found(begin, seed, value):
+    b, q = _products(value, begin, [8.0] * 10, seed)
+    assert begin_of(b, q) == begin
+
+
+def test_what_was_always_there_has_none():
+    found = [begin_of(*_products(1.0, 0, [5.0] * 10, seed)) for seed in range(300)]
+    assert sum(one is not None for one in found) <= 5
+
+
+def test_manoeuvres_that_do_not_show_it_prove_no_beginning():
+    assert begin_of(*_products(1.0, 0, [0.1, 0.1, 0.1, 9.0, 9.0], 1)) is None
+    assert begin_of(*_products(1.0, 3, [0.1, 0.1, 0.1, 9.0, 9.0], 1)) is None
+
+
+def test_a_time_costs_what_its_choice_among_many_is_worth():
+    samples = np.zeros(9000)
+    frame = Frame(samples, samples, samples, samples, samples, 0.02, {}, ())
+    assert price(frame) == pytest.approx(2.0 * np.log(720.0))
+
+
+def test_a_beginning_is_looked_for_in_both_manoeuvres_it_may_lie_in():
+    """That before the first one that shows it, and that one: it may show the last second of it alone."""
+    before, after, elsewhere = Segment(0, 800, 0.0, 9.0), Segment(800, 1500, 0.0, 9.0), Segment(0, 600, 0.0, 9.0)
+    same = moments_of((2, before), (2, after))
+    assert {drive for drive, _ in same} == {2}
+    assert (same[0][1], same[-1][1]) == (0.0, 15.0)
+    apart = moments_of((0, before), (1, elsewhere))
+    assert [max(t for drive, t in apart if drive == k) for k in (0, 1)] == [8.0, 6.0]
+    assert [min(t for drive, t in apart if drive == k) for k in (0, 1)] == [0.0, 0.0]
