@@ -69,9 +69,10 @@ def _numbers(answer: Answer) -> list[Number]:
     for cause in answer.json["causes"]:
         for name, entry in cause["parameters"].items():
             low, high = entry["ci95"]
-            label = f"{cause['effect']} {name}, {cause['wheel']}"
+            which = f" {name}" if len(cause["parameters"]) > 1 else ""
+            label = f"{cause['effect']}{which}, {cause['wheel']}"
             numbers.append(Number(label, entry["value"], entry["unit"], note=f"95 %: {low:.4g} to {high:.4g}"))
-        numbers.append(Number(f"Probability of {cause['effect']}", 100.0 * cause["probability"], "%"))
+        numbers.append(Number("its probability", 100.0 * cause["probability"], "%"))
     best = _most_gained(answer.gains)
     if best is not None and best.before > 0.0:
         note = f"{WORDS[best.channel]}, on manoeuvres no fit saw"
