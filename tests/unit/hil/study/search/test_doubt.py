@@ -1,0 +1,61 @@
+"""A cause is told only where its value is away from nothing."""
+
+import numpy as np
+import pytest
+from outsider import VEHICLE
+from pulses import log_as_driven
+
+from hil.study.fitting.candidates import candidates, columns
+from hil.study.fitting.fit import Term
+from hil.study.fitting.numbers import Numbers
+from hil.study.likelihood.noise import Frame
+from hil.study.logs.prepare import prepare
+from hil.study.replay.rig import Rig
+from hil.study.replay.vehicle import load_vehicle
+from hil.study.replay.world import nominal
+from hil.study.search.contest import Contender, refitted
+from hil.study.search.diagnosis import Diagnosis
+from hil.study.search.doubt import backward
+
+DEVIATIONS = {"wheel": 0.02, "ax": 0.02, "gps": 0.03, "pressure": 1e4, "motor": 0.5}
+
+
+def _accepted(hidden: float) -> Diagnosis:
+    """A diagnosis that has accepted a headwind, of which there is as much as hidden."""
+    vehicle = load_vehicle(VEHICLE)
+    case = prepare([log_as_driven(vehicle, 0.318)], 0.318)
+    rig, base = Rig(case, vehicle), nominal(vehicle)
+    numbers = Numbers(rig, Frame.of(case), vehicle, base, relinearise=True)
+    (wind,) = [one for one in candidates(columns()) if one.name == "headwind.wind_mps@car"]
+    rng = np.random.default_rng(2)
+    (drive,) = case.drives
+    for group, told in rig.run(wind.applied(base, hidden)).items():
+        drive.measured[group][:] = told + DEVIATIONS.get(group, 0.02) * rng.standard_normal(told.shape)
+    numbers.anew(np.zeros(len(numbers.nuisances)))
+    fitter = numbers.fitter
+    bare, noise = numbers.fitted(*fitter.start())
+    begun = fitter.at(bare.z, (Term(wind, 0.5 * hidden),), noise)
+    final = fitter.fit(begun, noise, 5)
+    one = refitted(Contender(final.terms[0], final, final.cost, 0.0, 1.0, noise), final, noise)
+    return Diagnosis(
+        case, vehicle, fitter, noise, noise, bare, bare, final, contenders=[[one]], looks=126, least_gain=20.0
+    )
+
+
+def test_a_cause_that_is_there_stays():
+    found = _accepted(12.0)
+    final = found.final
+    backward(found, found.fitter, 20.0, lambda _: None)
+    assert found.final is final
+    assert found.remarks == []
+
+
+@pytest.mark.parametrize("hidden", [0.0, 0.5])
+def test_a_cause_that_may_be_nothing_goes_and_the_remarks_name_it(hidden):
+    found, said = _accepted(hidden), []
+    backward(found, found.fitter, 20.0, said.append)
+    assert found.final is found.base
+    assert found.contenders == []
+    assert found.remarks == said
+    assert "headwind" in said[0]
+    assert "deviations from nothing, asked 3.5" in said[0]
