@@ -12,6 +12,7 @@ from hil.study.consistency.check import Consistency, check, unforced
 from hil.study.logs.channel_map import load_map
 from hil.study.logs.prepare import prepare, without_unstated
 from hil.study.logs.read import from_frame, read_logs
+from hil.study.logs.straight import kept_straight
 from hil.study.logs.table import Log
 from hil.study.replay.vehicle import Vehicle, load_vehicle
 from hil.study.replay.world import nominal
@@ -52,6 +53,7 @@ def explain(
     why = unforced(read, float(car.parameters.wheel.rolling_radius_m))
     if why:
         return check(read, car, why, extend, out, say or (lambda _: None))
+    car = car.held_straight() if kept_straight(read) else car
     case = prepare(without_unstated(read, car.unstated), float(car.parameters.wheel.rolling_radius_m))
     handed_in = nominal(car)
     base = handed_in if extend is None else load_extension(Path(extend)).applied(handed_in)

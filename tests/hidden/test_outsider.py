@@ -1,8 +1,9 @@
-"""Logs of a car nobody here modelled, told by six numbers: nothing in nothing, and a law in no list by its joint."""
+"""Logs of cars nobody here modelled, told by six numbers: nothing in nothing, and a law in no list by its joint."""
 
 from pathlib import Path
 
 import numpy as np
+import one_log
 import pytest
 from outsider import VEHICLE, drive, logs
 
@@ -67,3 +68,52 @@ def test_a_law_in_no_list_is_shown_with_joint_variable_and_curve(tmp_path: Path)
 def test_without_the_dictionary_a_listed_effect_takes_a_wrong_name() -> None:
     found = explain(logs(_bump), vehicle=VEHICLE, settings=Settings(dictionary=False)).json
     assert found["verdict"] == "named"
+
+
+def _rear_left_by_speed(speed_mps: float, t_s: float) -> np.ndarray:
+    return np.array([1.0, 1.0, 1.0 - 0.35 * np.exp(-(((speed_mps - 15.0) / 5.0) ** 2)), 1.0])
+
+
+def _weak_from_80_s(wheels: tuple[int, ...], loss: float) -> one_log.Law:
+    def law(speed_mps: float, t_s: float) -> np.ndarray:
+        return np.array([1.0 - loss if k in wheels and t_s > 80.0 else 1.0 for k in range(4)])
+
+    return law
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_law_of_one_wheel_is_shown_from_one_csv(tmp_path: Path) -> None:
+    """It was ``none``: the numbers of a car without load transfer were strained too far."""
+    csv, car = one_log.write(tmp_path, _rear_left_by_speed)
+    found = explain(csv, vehicle=car).json
+    assert found["verdict"] == "unlisted"
+    (cause,) = found["causes"]
+    assert (cause["joint"], cause["wheel"], cause["variables"]) == ("friction.mu", "rl", ["speed"])
+    lowest = min(cause["curve"], key=lambda point: point["y"])
+    assert lowest["x"] == pytest.approx(15.0, abs=3.0)
+    assert lowest["y"] == pytest.approx(-0.35, abs=0.07)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.long
+def test_pads_of_one_wheel_that_fail_in_the_middle_of_one_log_are_told_with_wheel_and_time(tmp_path: Path) -> None:
+    csv, car = one_log.write(tmp_path, _weak_from_80_s((3,), 0.3))
+    found = explain(csv, vehicle=car).json
+    (cause,) = found["causes"]
+    told = {one["effect"] for one in (cause, *found["rivals"])}
+    assert {"pad_mu_gain", "stuck_corner"} <= told
+    assert cause["wheel"] == "rr"
+    assert cause["onset_s"] == pytest.approx(80.0, abs=0.1)
+    (value,) = (number["value"] for number in cause["parameters"].values())
+    assert abs(value) == pytest.approx(0.3, abs=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_nothing_is_named_in_one_log_of_a_car_without_load_transfer(tmp_path: Path, seed: int) -> None:
+    csv, car = one_log.write(tmp_path, lambda speed_mps, t_s: np.ones(4), seed)
+    assert explain(csv, vehicle=car).json["verdict"] == "none"

@@ -16,10 +16,14 @@ from hil.study.replay.vehicle_keys import ALIASES, DERIVED, OF_SECTION, SPECIAL,
 from plant.friction import mu_equilibrium
 from plant.model import pack
 from plant.parameters.plant import PlantParameters
-from plant.vectors import PARAMETER
+from plant.vectors import PARAMETER, P
 
 _CONSTANT_B_1_J = 2e-6
 _STATED = 0.01
+_HELD_KG_M2 = 1e12
+"""Yaw inertia of a car that cannot turn."""
+_TURNING = ("vehicle_yaw_inertia_kg_m2", "vehicle_steering_ratio", "tyre_lky")
+_OF_STEERING = ("steer_lateral",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +37,7 @@ class Vehicle:
     pad_temperature_matters : False where the brake has one gain and no friction model.
     remarks : unknown keys and defaults taken, for the report.
     unstated : sections that the set says nothing of (keys of `hil.study.replay.vehicle_keys.OF_SECTION`).
+    straight : whether it is held on its line.
     """
 
     parameters: PlantParameters
@@ -41,11 +46,21 @@ class Vehicle:
     pad_temperature_matters: bool
     remarks: tuple[str, ...] = ()
     unstated: tuple[str, ...] = ()
+    straight: bool = False
 
     @property
     def untold(self) -> tuple[str, ...]:
-        """Effects on sections that are not stated, so that no deviation can be told."""
-        return tuple(effect for section in self.unstated for effect in OF_SECTION[section])
+        """Effects on sections that are not stated, or on a steering that holds against them: none can be told."""
+        unstated = tuple(effect for section in self.unstated for effect in OF_SECTION[section])
+        return (*unstated, *_OF_STEERING) if self.straight else unstated
+
+    def held_straight(self) -> "Vehicle":
+        """The same car kept on its line by a driver who is not seen: without lateral motion, whatever pulls."""
+        p = self.p.copy()
+        p[P.vehicle_yaw_inertia_kg_m2] = _HELD_KG_M2
+        nuisances = tuple(one for one in self.nuisances if one.name not in _TURNING)
+        said = "no log tells the steering wheel, nor that the car turned: it is held straight against whatever pulls"
+        return replace(self, p=p, nuisances=nuisances, straight=True, remarks=(*self.remarks, said))
 
 
 def paper_car() -> Vehicle:
@@ -134,6 +149,7 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
             tolerance[name] = min(
                 tolerance[name], _STATED * float(np.max(np.abs(np.asarray(_value(parameters, name)))))
             )
+    tolerance |= {f"brake_gain_{axle}": _STATED * gain for axle, gain in gains.items()}
     missing = []
     for name, share in WIDE.items():
         if name not in given:

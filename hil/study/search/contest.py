@@ -25,7 +25,7 @@ class Contender:
     """A model that explains the data with one cause in a certain place: its term, cost and log of the odds.
 
     ``noise`` is what is left beside it; ``gained`` is what it takes off chi-squared, shared out over the model's own
-    error.
+    error, ``error`` what that was divided by beside the table's, ``price`` what the choice of its beginning takes off.
     """
 
     term: Term
@@ -35,11 +35,13 @@ class Contender:
     information: float
     noise: Noise
     gained: float = 0.0
+    error: float = np.inf
+    price: float = 0.0
 
 
 def odds(contender: Contender) -> float:
     """Twice the negative log of the odds, the smaller the better."""
-    return contender.cost - 2.0 * contender.evidence
+    return contender.cost + contender.price - 2.0 * contender.evidence
 
 
 def worth(contender: Contender) -> float:
@@ -61,15 +63,19 @@ def refitted(contender: Contender, model: Model, noise: Noise) -> Contender:
     )
 
 
-def elsewhere(fitter: Fitter, best: Contender, places: Sequence[Candidate], relinearise: bool) -> list[Contender]:
-    """A cause at other places, each fitted from where the best ended, with its noise."""
+def instead(
+    fitter: Fitter, best: Contender, others: Sequence[tuple[Candidate, float]], relinearise: bool
+) -> list[Contender]:
+    """Other causes, or places, with values to begin at, each fitted from where the best ended, from its beginning on,
+    with its noise."""
 
-    def placed(candidate: Candidate) -> Contender:
-        terms = (*best.model.terms[:-1], replace(best.term, candidate=candidate))
+    def placed(other: tuple[Candidate, float]) -> Contender:
+        candidate, value = other
+        terms = (*best.model.terms[:-1], replace(best.term, candidate=candidate, value=value))
         model = fitter.at(best.model.z, terms, best.noise)
         return refitted(best, fitter.fit(model, best.noise, 3, relinearise), best.noise)
 
-    return Contest.at_once(placed, places)
+    return Contest.at_once(placed, others)
 
 
 class Contest:
@@ -156,5 +162,5 @@ class Contest:
             fitted = self._fitter.fit(fitted, noise, 2, self._relinearise)
             if before - fitted.cost < _SETTLED:
                 break
-        begun_with = Contender(fitted.terms[-1], fitted, fitted.cost, 0.0, item.information, noise)
+        begun_with = Contender(fitted.terms[-1], fitted, fitted.cost, 0.0, item.information, noise, price=item.price)
         return refitted(begun_with, fitted, noise)

@@ -1,6 +1,6 @@
 """The diagnosis: noise first, then nuisances, then one cause at a time, fitted non-linearly before it is believed."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,13 +16,13 @@ from hil.study.replay.rig import Rig
 from hil.study.replay.vehicle import Vehicle
 from hil.study.replay.world import World
 from hil.study.search.basis import LAWS, Piece
-from hil.study.search.contest import Contender, Contest, elsewhere, odds, refitted, worth
-from hil.study.search.diagnosis import Diagnosis, Say, Settings, causes_in
-from hil.study.search.doubt import backward, stands_beside, strained, with_gain
+from hil.study.search.contest import Contender, Contest, instead, odds, refitted, worth
+from hil.study.search.diagnosis import TIED, Diagnosis, Say, Settings, causes_in
+from hil.study.search.doubt import backward, erring, form_differs, stands_beside, strained, with_gain
 from hil.study.search.field import Field, number_of
 from hil.study.search.handed_in import Refitted, from_handed_in
 from hil.study.search.left_over import FORM, LeftOver
-from hil.study.search.onset import with_onsets
+from hil.study.search.onset import dated_anew, price, with_onsets
 from hil.study.search.race import LawRace, best_of_each, least_gain, with_law
 from hil.study.search.screen import Score, beside_best, inflation, leaders, not_testable, threshold
 
@@ -41,6 +41,8 @@ _LED_ANEW = 3
 """Leaders that get sensitivities of their own, when they are fitted from the car as handed in."""
 _DATED = 2
 """Contenders for which it is asked when they begin before they are compared."""
+_LIKELY = 4.0 * TIED
+"""Twice the log of the odds, within which what begins when the best does is dated by itself."""
 _LAWS_BESIDE = 4
 """Laws that are looked at with noise of their own."""
 _HOPELESS, _POOR = 0.1, 0.4
@@ -178,7 +180,8 @@ class _Search:
         reference = contest.reference
 
         def gained() -> list[Contender]:
-            return [with_gain(c, reference - left.of(c.term.candidate), self.fitter, self.told) for c in fitted]
+            error, best = self._errors(found), min(fitted, key=odds)
+            return [with_gain(c, reference - left.of(c.term.candidate), error(c, best)) for c in fitted]
 
         if self.settings.relinearise and (self._bent(model) or max(one.gained for one in gained()) >= least):
             fitted, without = self._fitted_again(model, fitted, top, reference)
@@ -188,7 +191,7 @@ class _Search:
                 self.began_again = True
                 return *without, []
             reference = min(reference, bare)
-        fitted = self._since_when(fitted)
+        fitted = self._with_its_like(model, self._since_when(fitted))
         tighter = min(fitted, key=odds).noise
         reference = min(reference, self.fitter.fit(model, tighter, 3).cost)
         law = self._unlisted(found, contest, model, tighter, reference, min(fitted, key=odds), left)
@@ -209,6 +212,21 @@ class _Search:
             (c for c in {*fitted, *clear} if c is not best and (c in clear or odds(c) >= odds(best))), key=odds
         )
         return polished, tighter, [replace(best, model=polished, term=polished.terms[-1]), *rest]
+
+    def _errors(self, found: Diagnosis) -> Callable[[Contender, Contender], float]:
+        """What the gain of a contender is divided by for what the model gets wrong here, seen beside the best one."""
+        known: dict[Model, float] = {}
+
+        def error(one: Contender, best: Contender) -> float:
+            strain = strained(self.fitter, one.model.z, self.told)
+            if not form_differs(strain):
+                return strain
+            if best.model not in known:
+                most = self.field.most_beside(self.fitter, best.model, best.noise)
+                known[best.model] = erring(most, found)
+            return min(strain, known[best.model])
+
+        return error
 
     def _leading(
         self, found: Diagnosis, model: Model, noise: Noise, left: LeftOver
@@ -262,7 +280,7 @@ class _Search:
         if not self.settings.relinearise or not places:
             return best, clear
         self.say(f"{best.term.candidate.name} at other places")
-        placed = [*clear, *elsewhere(self.fitter, best, places, True)]
+        placed = [*clear, *instead(self.fitter, best, [(place, best.term.value) for place in places], True)]
         better = [one for one in placed if number_of(one.term.candidate)[:2] == name[:2] and odds(one) < odds(best)]
         return min(better, key=odds, default=best), placed
 
@@ -270,13 +288,33 @@ class _Search:
         """The best with the time they begin at: a law by time would explain more than a cause that was always there."""
         best = sorted(fitted, key=odds)[:_DATED]
         dated = {id(one): with_onsets(self.fitter, one.model, one.noise) for one in best}
-        found = []
-        for one in fitted:
-            model = dated.get(id(one), one.model)
-            found.append(
-                one if model is one.model else replace(one, model=model, term=model.terms[-1], cost=model.cost)
-            )
-        return found
+        return [self._dated(one, dated.get(id(one), one.model)) for one in fitted]
+
+    def _dated(self, one: Contender, model: Model) -> Contender:
+        """A contender with a model whose last cause may begin later."""
+        if model is one.model:
+            return one
+        paid = 0.0 if model.terms[-1].onset is None else price(self.frame)
+        return replace(one, model=model, term=model.terms[-1], cost=model.cost, price=paid)
+
+    def _with_its_like(self, model: Model, fitted: list[Contender]) -> list[Contender]:
+        """Beside a best that begins in the middle, others that begin when it does.
+
+        As if always there they explained too little to be looked at.
+        """
+        best = min(fitted, key=odds)
+        if best.term.onset is None or not self.settings.relinearise:
+            return fitted
+        self.say(f"others that begin when {best.term.candidate.name} does")
+        bare = self.fitter.at(best.model.z, model.terms, best.noise)
+        tried = {number_of(c.term.candidate) for c in fitted if c.term.onset == best.term.onset}
+        tried |= {number_of(term.candidate) for term in model.terms}
+        listed = self.field.begun_at(self.fitter, bare, best.noise, best.term.onset)
+        top = leaders([item for item in listed if number_of(item.candidate) not in tried], LEADERS)
+        found = instead(self.fitter, best, [(item.candidate, item.value) for item in top], True)
+        near = [one for one in found if odds(one) - odds(best) < _LIKELY]
+        dated = {id(one): dated_anew(self.fitter, one.model, one.noise) for one in near}
+        return [*fitted, *(self._dated(one, dated.get(id(one), one.model)) for one in found)]
 
     def _unlisted(
         self, found: Diagnosis, contest: Contest, model: Model, noise: Noise, reference: float, listed: Contender,
@@ -296,10 +334,13 @@ class _Search:
         def refitted_law(one: Contender, model: Model, noise: Noise) -> Contender:
             return with_law(entries[one.term.candidate.name], model, noise, reference)
 
+        def replayed(one: Contender) -> Contender:
+            met = self.fitter.at(one.model.z, one.model.terms, one.noise)
+            return refitted_law(one, replace(met, covariance=one.model.covariance), one.noise)
+
         if self._bent(model):
-            seen, without = self._from_handed_in(
-                model, sorted(seen, key=odds)[:_LAWS_TRIED], refitted_law, reference, 1
-            )
+            tried = [replayed(one) for one in sorted(seen, key=odds)[:_LAWS_TRIED]]
+            seen, without = self._from_handed_in(model, tried, refitted_law, reference, 1)
             reference = min(reference, without[0].cost)
         law = min(seen, key=odds)
         best = entries[law.term.candidate.name]
@@ -309,14 +350,16 @@ class _Search:
         left_there = left.of_signature(best.curve.pieces[0].effect, signature)
         least = least * variance_of_law(best.curve.law.name, best.curve.place) + left_there
 
+        error = self._errors(found)
+
         def ahead() -> bool:
             gained = min(listed.cost, reference) - law.cost
             rival = (1.0 + FORM**2) * max(0.5 * (reference - odds(listed)), 0.0)
-            asked = least * strained(self.fitter, law.model.z, self.told)
+            asked = least * error(law, law)
             return gained >= asked and 0.5 * (reference - odds(law)) >= rival + _CLEARER
 
         if ahead() and self.settings.relinearise and not self._bent(model):
-            (law,), without = self._from_handed_in(model, [law], refitted_law, reference, 1)
+            (law,), without = self._from_handed_in(model, [replayed(law)], refitted_law, reference, 1)
             reference = min(reference, without[0].cost)
         if not ahead():
             return None

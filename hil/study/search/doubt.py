@@ -3,19 +3,22 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from hil.study.fitting.fit import Fitter
 from hil.study.fitting.numbers import strain
-from hil.study.fitting.own_error import shared_out, variance_of
+from hil.study.fitting.own_error import UNSURE, shared_out, variance_of
 from hil.study.fitting.same_number import restated
 from hil.study.logs.table import Floats
 from hil.study.search.basis import Piece
 from hil.study.search.contest import Contender, odds
 from hil.study.search.diagnosis import TIED, Diagnosis, Say, causes_in
 from hil.study.search.intervals import deviations
-from hil.study.search.onset import price
 from hil.study.search.screen import threshold
 
+_FORM_DIFFERS = UNSURE**2
+"""Strain beyond which the car of the logs is another than the model's, as one of a page is: numbers that nobody stated
+went as far as they may."""
 _SURE = 0.05
 """Chance that noise takes any of all values so far from nothing as is asked of one, in its own deviations, which know
 how far manoeuvres disagree: a second question beside what a cause explains (decision 0078)."""
@@ -26,12 +29,24 @@ def strained(fitter: Fitter, z: Floats, told: float) -> float:
     return shared_out(strain(z, fitter.farthest, told))
 
 
-def with_gain(contender: Contender, reference: float, fitter: Fitter, told: float) -> Contender:
-    """With its gain against ``reference``, shared out over the model's own error and less what a chosen beginning
-    takes."""
+def form_differs(strain: float) -> bool:
+    """Whether the car of the logs is another than the model's, by what its numbers are ``strained``."""
+    return strain > _FORM_DIFFERS
+
+
+def erring(most_left: float, found: Diagnosis) -> float:
+    """How much more than noise a model explains falsely, by the ``most_left`` for any other cause beside one.
+
+    Were that one all there is, this would be what the largest of so many looks at noise reaches every second time. The
+    inflation by the bulk is asked for anyway.
+    """
+    return max(most_left / float(chi2.isf(0.5 / found.looks, 1)) / found.inflation, 1.0)
+
+
+def with_gain(contender: Contender, reference: float, error: float) -> Contender:
+    """With its gain against ``reference``, shared out over the model's own error and that here, less its price."""
     gained = (reference - contender.cost) / variance_of(contender.term.candidate)
-    chosen = 0.0 if contender.term.onset is None else price(fitter.frame)
-    return replace(contender, gained=gained / strained(fitter, contender.model.z, told) - chosen)
+    return replace(contender, gained=gained / error - contender.price, error=error)
 
 
 def stands_beside(
@@ -42,7 +57,14 @@ def stands_beside(
         return True
     joint = fitter.at(better.model.z, (*better.model.terms, clear.term), better.noise)
     both = fitter.fit(joint, better.noise, 2, relinearise)
-    return (better.cost - both.cost) / variance_of(clear.term.candidate) >= least * strained(fitter, both.z, told)
+    return (better.cost - both.cost) / variance_of(clear.term.candidate) >= least * _no_more(
+        clear, strained(fitter, both.z, told)
+    )
+
+
+def _no_more(contender: Contender, strain: float) -> float:
+    """What a gain is divided by where numbers are strained: no more than when the contender was accepted."""
+    return min(strain, contender.error) if form_differs(strain) else strain
 
 
 def backward(found: Diagnosis, bare: Fitter, told: float, say: Say) -> None:
@@ -62,7 +84,8 @@ def backward(found: Diagnosis, bare: Fitter, told: float, say: Say) -> None:
             return
         rest = tuple(other for j, other in enumerate(model.terms) if j != k)
         without = fitter.fit(fitter.at(model.z, rest, found.noise), found.noise, 5)
-        if not sure or without.cost - model.cost < found.least_gain * error * strained(fitter, model.z, told):
+        asked_of_gain = found.least_gain * error * _no_more(found.contenders[k][0], strained(fitter, model.z, told))
+        if not sure or without.cost - model.cost < asked_of_gain:
             why = "not needed beside the others" if sure else f"{away:.1f} deviations from nothing, asked {asked:.1f}"
             found.remarks.append(f"{term.candidate.name} = {term.value:.3g} is not told: {why}")
             say(found.remarks[-1])

@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 from hil.study.fitting.candidates import Candidate, candidates, columns
 from hil.study.fitting.fit import Fitter, Model, Tracks
-from hil.study.fitting.linear import Sums, project, track_columns
+from hil.study.fitting.linear import Sums, project, project_later, track_columns
 from hil.study.likelihood.noise import Frame, Noise
 from hil.study.replay.rig import Rig
 from hil.study.search.behind import replayed, silent
 from hil.study.search.contest import Contest
 from hil.study.search.diagnosis import Diagnosis
-from hil.study.search.onset import begins, price
-from hil.study.search.screen import Score, leaders, scores
+from hil.study.search.onset import Moment, begins, price
+from hil.study.search.screen import Score, leaders, score, scores
 from hil.study.search.since import with_beginnings
 
 _PLAUSIBLE = 12
@@ -62,6 +62,28 @@ class Field:
         if bent:  # and which place is first is bent too
             best = list(dict.fromkeys([*sorted(listed, key=lambda s: -s.evidence)[:_PLAUSIBLE], *best]))
         return best
+
+    def most_beside(self, fitter: Fitter, model: Model, noise: Noise) -> float:
+        """Most that any other effect explains beside those of a model, by one step, shared out over its own error."""
+        sums, accepted = fitter.screen(model, self.tracks, noise), len(model.terms)
+        projected = project(sums.total(), sums.nuisances, range(accepted), model.z, fitter.at_their_end(model.z))
+        used = {number_of(term.candidate)[:2] for term in model.terms}
+        listed = scores(self.candidates, projected, accepted, [0.0] * len(self.candidates))
+        return max((item.gain for item in listed if number_of(item.candidate)[:2] not in used), default=0.0)
+
+    def begun_at(self, fitter: Fitter, model: Model, noise: Noise, moment: Moment) -> list[Score]:
+        """What each explains that begins in the manoeuvre of that moment, or in the next one."""
+        sums, accepted = fitter.screen(model, self.tracks, noise), len(model.terms)
+        columns = [[accepted + k for k in candidate.columns] for candidate in self.candidates]
+        b, q = project_later(sums, columns, range(accepted), model.z, fitter.at_their_end(model.z))
+        starts = begins(self._rig.case)
+        first = max(k for k, start in enumerate(starts) if start <= moment)
+        found = []
+        for k, candidate in enumerate(self.candidates):
+            blocks = range(first, min(first + 2, len(starts)))
+            looks = [score(candidate, float(b[block, k]), float(q[block, k])) for block in blocks]
+            found.append(max(looks, key=lambda look: look.evidence))
+        return found
 
 
 def number_of(candidate: Candidate) -> tuple[str, str, str]:

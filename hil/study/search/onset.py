@@ -40,6 +40,16 @@ def with_onsets(fitter: Fitter, model: Model, noise: Noise) -> Model:
     return model
 
 
+def dated_anew(fitter: Fitter, model: Model, noise: Noise) -> Model:
+    """The model with the beginning of its last cause where it fits best, near the one it has."""
+    term = model.terms[-1]
+    assert term.onset is not None
+    drive, since_s = term.onset
+    about = np.arange(max(since_s - _COARSE_S, 0.0), since_s + _COARSE_S, _FINER[0])
+    moments = [(drive, float(t)) for t in about]
+    return min(model, _begun(fitter, model, noise, len(model.terms) - 1, moments, term.value), key=_cost)
+
+
 def price(frame: Frame) -> float:
     """What of a gain goes to the choice of a time to begin at: twice the log of how many were offered."""
     return 2.0 * float(np.log(len(frame.fresh) * frame.sample_s / _COARSE_S))

@@ -40,14 +40,16 @@ def _later(item: Score, b: Floats, q: Floats, begins: Sequence[Moment], price: f
     before = max(float(q[0] - q[block]), 0.0)
     if block == 0 or abs(from_there.value) * before**0.5 < LEAST_BEFORE:
         return item
-    if _beside_the_best_log(from_there.value * -np.diff(b, append=0.0)[block:], begins[block:]) < LEAST_BEFORE**2:
+    drives = [drive for drive, _ in begins]
+    logs = drives if len(set(drives)) > 1 else range(len(drives))
+    if _beside_the_best_log(from_there.value * -np.diff(b, append=0.0)[block:], logs[block:]) < LEAST_BEFORE**2:
         return item  # what a model gets wrong in one manoeuvre is no beginning
     begun = replace(item, since=begins[block], price=price)
     begun = rescored(begun, from_there.value, from_there.raw, from_there.information)
     return begun if begun.gain > item.gain and begun.evidence > item.evidence else item
 
 
-def _beside_the_best_log(gains: Floats, begins: Sequence[Moment]) -> float:
-    """Gain of manoeuvres in all logs but the one that gains most."""
-    logs = np.array([drive for drive, _ in begins])
+def _beside_the_best_log(gains: Floats, drives: Sequence[int]) -> float:
+    """Gain of manoeuvres in all logs but the one that gains most; of a single log, in all but that manoeuvre."""
+    logs = np.array(drives)
     return float(gains.sum()) - max(float(gains[logs == log].sum()) for log in set(logs.tolist()))

@@ -228,3 +228,15 @@ def test_a_wheel_speed_that_is_a_mean_over_a_window_swings_less():
     step = slice(100, 110)
     assert np.ptp(np.diff(mean[step], 2)) < 0.97 * np.ptp(np.diff(sharp[step], 2))
     assert mean[130:145] == pytest.approx(sharp[130:145], abs=1e-3)
+
+
+def test_a_car_held_straight_goes_on_in_its_line_with_a_weak_brake(rig):
+    weak = np.array([-0.3, 0.0, 0.0, 0.0])
+    held = Rig(rig.case, rig.vehicle.held_straight())
+
+    def yaw_rate(of: Rig) -> np.ndarray:
+        return of.states(_with(nominal(of.vehicle), "pad_mu_gain", "gain", weak), ["state.yaw_rate_rad_s"])
+
+    assert np.abs(yaw_rate(rig)).max() > 1e-3
+    assert np.abs(yaw_rate(held)).max() < 1e-9
+    assert "steer_lateral" in held.vehicle.untold

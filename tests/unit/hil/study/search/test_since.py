@@ -1,5 +1,6 @@
 """Candidates that begin in the middle: seen from the manoeuvre on that shows them, never for nothing."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -7,15 +8,19 @@ import pytest
 
 from hil.study.fitting.candidates import candidates, columns
 from hil.study.fitting.linear import Sums, project
+from hil.study.search.onset import Moment
 from hil.study.search.screen import Score, scores
 from hil.study.search.since import with_beginnings
 
 PRICE = 13.0
 SAMPLES, MANOEUVRES = 200, 8
 BEGINS = [(k // 2, 10.0 * (k % 2)) for k in range(MANOEUVRES)]
+ONE_LOG = [(0, 10.0 * k) for k in range(MANOEUVRES)]
 
 
-def _screened(begin: int | None, strength: float, seed: int = 1, price: float = PRICE) -> tuple[Score, Score]:
+def _screened(
+    begin: int | None, strength: float, seed: int = 1, price: float = PRICE, begins: Sequence[Moment] = BEGINS
+) -> tuple[Score, Score]:
     """A drag that begins with a manoeuvre, ``strength`` standard deviations in all, as told, and as screened."""
     (drag,) = [replace(one, columns=(0,)) for one in candidates(columns()) if one.name == "residual_drag@car"]
     rng = np.random.default_rng(seed)
@@ -29,7 +34,7 @@ def _screened(begin: int | None, strength: float, seed: int = 1, price: float = 
     sums = Sums(np.einsum("msi,msj->mij", rows, rows), 1, SAMPLES * MANOEUVRES, 0.0)
     z = np.zeros(1)
     listed = scores([drag], project(sums.total(), 1, (), z), 0, [0.0])
-    return listed[0], with_beginnings(listed, sums, 0, z, [], BEGINS, price)[0]
+    return listed[0], with_beginnings(listed, sums, 0, z, [], begins, price)[0]
 
 
 @pytest.mark.parametrize("begin", [2, 3, 5])
@@ -47,6 +52,11 @@ def test_what_was_always_there_or_is_nothing_begins_nowhere() -> None:
 
 def test_what_one_log_alone_shows_may_be_the_model_that_errs_there() -> None:
     assert _screened(6, 12.0)[1].since is None
+
+
+def test_in_a_single_log_more_than_one_manoeuvre_has_to_show_it() -> None:
+    assert _screened(4, 12.0, begins=ONE_LOG)[1].since == ONE_LOG[4]
+    assert _screened(7, 12.0, begins=ONE_LOG)[1].since is None
 
 
 def test_the_choice_of_a_time_has_its_price() -> None:
