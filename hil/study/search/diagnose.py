@@ -7,7 +7,7 @@ import numpy as np
 
 from hil.study.fitting.fit import Fitter, Model
 from hil.study.fitting.numbers import STRAINED, Numbers, strain
-from hil.study.fitting.own_error import variance_of, variance_of_law
+from hil.study.fitting.own_error import variance_of
 from hil.study.fitting.same_number import restated
 from hil.study.likelihood.noise import Frame, Noise
 from hil.study.logs.case import Case
@@ -15,22 +15,19 @@ from hil.study.logs.table import Floats
 from hil.study.replay.rig import Rig
 from hil.study.replay.vehicle import Vehicle
 from hil.study.replay.world import World
-from hil.study.search.basis import LAWS, Piece
+from hil.study.search.begun import since_when, with_its_like
 from hil.study.search.contest import Contender, Contest, instead, odds, refitted, worth
-from hil.study.search.diagnosis import TIED, Diagnosis, Say, Settings, causes_in
+from hil.study.search.diagnosis import Diagnosis, Say, Settings, causes_in
 from hil.study.search.doubt import backward, erring, form_differs, stands_beside, strained, with_gain
 from hil.study.search.field import Field, number_of
 from hil.study.search.handed_in import Refitted, from_handed_in
-from hil.study.search.left_over import FORM, LeftOver
-from hil.study.search.onset import dated_anew, price, with_onsets
-from hil.study.search.race import LawRace, best_of_each, least_gain, with_law
-from hil.study.search.screen import Score, beside_best, inflation, leaders, not_testable, threshold
+from hil.study.search.left_over import LeftOver
+from hil.study.search.onset import with_onsets
+from hil.study.search.screen import LEADERS, Score, beside_best, inflation, leaders, not_testable, threshold
+from hil.study.search.unlisted import Round, Unlisted
 
-LEADERS = 5
-_CLEARER = 5.0
-"""By how much more than the best listed cause a law in no list must explain, log of the odds."""
-_TRIED, _LAWS_TRIED = 10, 2
-"""Leaders, and laws in no list, where the vehicle's numbers go far, places of one effect among them."""
+_TRIED = 10
+"""Leaders where the vehicle's numbers go far, places of one effect among them."""
 _NEAR = 0.2
 """Share of what the best explains, by one step or fitted, below which no other is fitted from the car as handed in, nor
 the best at another place."""
@@ -39,12 +36,6 @@ _MISLED = 1.0 / 3.0
 begin again from a better one."""
 _LED_ANEW = 3
 """Leaders that get sensitivities of their own, when they are fitted from the car as handed in."""
-_DATED = 2
-"""Contenders for which it is asked when they begin before they are compared."""
-_LIKELY = 4.0 * TIED
-"""Twice the log of the odds, within which what begins when the best does is dated by itself."""
-_LAWS_BESIDE = 4
-"""Laws that are looked at with noise of their own."""
 _HOPELESS, _POOR = 0.1, 0.4
 """Shares of the gain asked: below the one no candidate is looked at with noise of its own, below the other none is
 fitted."""
@@ -66,7 +57,7 @@ class _Search:
         self.frame = Frame.of(self.rig.case)
         self.numbers = Numbers(self.rig, self.frame, vehicle, base, settings.relinearise)
         self.field = Field(self.rig, self.frame, vehicle.untold)
-        self.race: LawRace | None = None
+        self.unlisted = Unlisted(self.numbers, self._from_handed_in, settings, say)
         self.told = float(len(self.numbers.nuisances))
         self.began_again = False
 
@@ -123,7 +114,7 @@ class _Search:
     def _shown_at(self, model: Model) -> None:
         """What candidates, and laws in no list, show is that at this model."""
         self.field.taken_at(self.fitter, model)
-        self.race = None
+        self.unlisted.elsewhere()
 
     def _again(self, found: Diagnosis, model: Model, noise: Noise) -> tuple[Model, Noise]:
         """From numbers with which the causes of a model, or none, explain more than those the search went on from."""
@@ -177,10 +168,10 @@ class _Search:
         if leading is None:
             return None
         contest, top, fitted = leading
-        reference = contest.reference
+        reference, error = contest.reference, self._errors(found)
 
         def gained() -> list[Contender]:
-            error, best = self._errors(found), min(fitted, key=odds)
+            best = min(fitted, key=odds)
             return [with_gain(c, reference - left.of(c.term.candidate), error(c, best)) for c in fitted]
 
         if self.settings.relinearise and (self._bent(model) or max(one.gained for one in gained()) >= least):
@@ -191,10 +182,13 @@ class _Search:
                 self.began_again = True
                 return *without, []
             reference = min(reference, bare)
-        fitted = self._with_its_like(model, self._since_when(fitted))
+        fitted = since_when(self.fitter, fitted)
+        if self.settings.relinearise:
+            fitted = with_its_like(self.fitter, self.field, model, fitted)
         tighter = min(fitted, key=odds).noise
         reference = min(reference, self.fitter.fit(model, tighter, 3).cost)
-        law = self._unlisted(found, contest, model, tighter, reference, min(fitted, key=odds), left)
+        now = Round(contest, model, tighter, reference, min(fitted, key=odds), left, error, self._bent(model))
+        law = self.unlisted.best(found, now)
         fitted = gained()
         clear = sorted((c for c in fitted if c.gained >= least and worth(c) > 0.0), key=odds)
         if law is not None:
@@ -283,89 +277,6 @@ class _Search:
         placed = [*clear, *instead(self.fitter, best, [(place, best.term.value) for place in places], True)]
         better = [one for one in placed if number_of(one.term.candidate)[:2] == name[:2] and odds(one) < odds(best)]
         return min(better, key=odds, default=best), placed
-
-    def _since_when(self, fitted: list[Contender]) -> list[Contender]:
-        """The best with the time they begin at: a law by time would explain more than a cause that was always there."""
-        best = sorted(fitted, key=odds)[:_DATED]
-        dated = {id(one): with_onsets(self.fitter, one.model, one.noise) for one in best}
-        return [self._dated(one, dated.get(id(one), one.model)) for one in fitted]
-
-    def _dated(self, one: Contender, model: Model) -> Contender:
-        """A contender with a model whose last cause may begin later."""
-        if model is one.model:
-            return one
-        paid = 0.0 if model.terms[-1].onset is None else price(self.frame)
-        return replace(one, model=model, term=model.terms[-1], cost=model.cost, price=paid)
-
-    def _with_its_like(self, model: Model, fitted: list[Contender]) -> list[Contender]:
-        """Beside a best that begins in the middle, others that begin when it does.
-
-        As if always there they explained too little to be looked at.
-        """
-        best = min(fitted, key=odds)
-        if best.term.onset is None or not self.settings.relinearise:
-            return fitted
-        self.say(f"others that begin when {best.term.candidate.name} does")
-        bare = self.fitter.at(best.model.z, model.terms, best.noise)
-        tried = {number_of(c.term.candidate) for c in fitted if c.term.onset == best.term.onset}
-        tried |= {number_of(term.candidate) for term in model.terms}
-        listed = self.field.begun_at(self.fitter, bare, best.noise, best.term.onset)
-        top = leaders([item for item in listed if number_of(item.candidate) not in tried], LEADERS)
-        found = instead(self.fitter, best, [(item.candidate, item.value) for item in top], True)
-        near = [one for one in found if odds(one) - odds(best) < _LIKELY]
-        dated = {id(one): dated_anew(self.fitter, one.model, one.noise) for one in near}
-        return [*fitted, *(self._dated(one, dated.get(id(one), one.model)) for one in found)]
-
-    def _unlisted(
-        self, found: Diagnosis, contest: Contest, model: Model, noise: Noise, reference: float, listed: Contender,
-        left: LeftOver,
-    ) -> Contender | None:  # fmt: skip
-        """A law in no list that explains more than the best listed cause, beyond noise and the model's own error."""
-        if not self.settings.dictionary or any(isinstance(term.candidate, Piece) for term in model.terms):
-            return None
-        if self.race is None:
-            self.say("curves in no list")
-            self.race = LawRace(self.fitter, self.fitter.world(model.z, model.terms))
-        race, leading = self.race, best_of_each(self.race.entries(self.fitter, model, noise), _LAWS_BESIDE)
-        beside = contest.at_once(lambda entry: contest.foreseen(entry.begun, race.columns(entry)), leading)
-        seen = [with_law(entry, *one, contest.reference) for entry, one in zip(leading, beside, strict=True)]
-        entries = {law.term.candidate.name: entry for law, entry in zip(seen, leading, strict=True)}
-
-        def refitted_law(one: Contender, model: Model, noise: Noise) -> Contender:
-            return with_law(entries[one.term.candidate.name], model, noise, reference)
-
-        def replayed(one: Contender) -> Contender:
-            met = self.fitter.at(one.model.z, one.model.terms, one.noise)
-            return refitted_law(one, replace(met, covariance=one.model.covariance), one.noise)
-
-        if self._bent(model):
-            tried = [replayed(one) for one in sorted(seen, key=odds)[:_LAWS_TRIED]]
-            seen, without = self._from_handed_in(model, tried, refitted_law, reference, 1)
-            reference = min(reference, without[0].cost)
-        law = min(seen, key=odds)
-        best = entries[law.term.candidate.name]
-        self.say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
-        least = least_gain(found.looks + len(LAWS), self.settings.alpha) * found.inflation
-        signature = {name: columns @ best.values[:, None] for name, columns in race.columns(best).items()}
-        left_there = left.of_signature(best.curve.pieces[0].effect, signature)
-        least = least * variance_of_law(best.curve.law.name, best.curve.place) + left_there
-
-        error = self._errors(found)
-
-        def ahead() -> bool:
-            gained = min(listed.cost, reference) - law.cost
-            rival = (1.0 + FORM**2) * max(0.5 * (reference - odds(listed)), 0.0)
-            asked = least * error(law, law)
-            return gained >= asked and 0.5 * (reference - odds(law)) >= rival + _CLEARER
-
-        if ahead() and self.settings.relinearise and not self._bent(model):
-            (law,), without = self._from_handed_in(model, [replayed(law)], refitted_law, reference, 1)
-            reference = min(reference, without[0].cost)
-        if not ahead():
-            return None
-        fitted = self.fitter.fit(self.fitter.at(law.model.z, law.model.terms, law.noise), law.noise, 3)
-        law = refitted_law(law, fitted, law.noise)
-        return law if ahead() else None
 
 
 def _most(listed: Sequence[Score], left: LeftOver) -> float:

@@ -12,6 +12,8 @@ from hil.study.fitting.own_error import variance_of
 from hil.study.logs.table import Floats
 
 SEEN = 3.0
+LEADERS = 5
+"""How many of the best candidates are fitted, at least."""
 _MEDIAN_CHI2 = 0.455
 _MOST_INFLATION = 6.0
 

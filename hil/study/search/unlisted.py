@@ -1,0 +1,109 @@
+"""Laws in no list, in the race for a cause: one that is ahead of all that is listed, beyond doubt."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from hil.study.fitting.fit import Model
+from hil.study.fitting.numbers import Numbers
+from hil.study.fitting.own_error import variance_of_law
+from hil.study.likelihood.noise import Noise
+from hil.study.search.basis import LAWS, Piece
+from hil.study.search.contest import Contender, Contest, odds
+from hil.study.search.diagnosis import Diagnosis, Say, Settings
+from hil.study.search.handed_in import Refitted
+from hil.study.search.left_over import FORM, LeftOver
+from hil.study.search.race import Entry, LawRace, best_of_each, least_gain, with_law
+
+_CLEARER = 5.0
+"""By how much more than the best listed cause a law in no list must explain, log of the odds."""
+_BESIDE, _TRIED = 4, 2
+"""Laws that are looked at with noise of their own; and fitted, where the vehicle's numbers go far."""
+Again = Callable[[Model, Sequence[Contender], Refitted, float, int], tuple[list[Contender], tuple[Model, Noise]]]
+"""Fits contenders from the car as handed in, too (`hil.study.search.handed_in`)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """One round of the search: the model so far, the best ``listed`` cause beside it and what that ``left``.
+
+    ``reference`` is the cost without a cause more, with the ``noise`` beside one; ``error`` says what a contender's
+    gain is divided by; ``bent``, whether something may have bent the vehicle's numbers.
+    """
+
+    contest: Contest
+    model: Model
+    noise: Noise
+    reference: float
+    listed: Contender
+    left: LeftOver
+    error: Callable[[Contender, Contender], float]
+    bent: bool
+
+
+class Unlisted:
+    """The laws at a model, simulated once."""
+
+    def __init__(self, numbers: Numbers, again: Again, settings: Settings, say: Say) -> None:
+        self._numbers, self._again, self._settings, self._say = numbers, again, settings, say
+        self._race: LawRace | None = None
+
+    def elsewhere(self) -> None:
+        """What laws show is asked for at another model from now on."""
+        self._race = None
+
+    def best(self, found: Diagnosis, now: Round) -> Contender | None:
+        """The best law where it is ahead of the best listed cause, beyond noise and the model's own error."""
+        model, reference = now.model, now.reference
+        if not self._settings.dictionary or any(isinstance(term.candidate, Piece) for term in model.terms):
+            return None
+        fitter = self._numbers.fitter
+        if self._race is None:
+            self._say("curves in no list")
+            self._race = LawRace(fitter, fitter.world(model.z, model.terms))
+        race = self._race
+        entries, seen = self._seen(race, now)
+
+        def refitted_law(one: Contender, model: Model, noise: Noise) -> Contender:
+            return with_law(entries[one.term.candidate.name], model, noise, reference)
+
+        def replayed(one: Contender) -> Contender:
+            met = fitter.at(one.model.z, one.model.terms, one.noise)
+            return refitted_law(one, replace(met, covariance=one.model.covariance), one.noise)
+
+        if now.bent:
+            tried = [replayed(one) for one in sorted(seen, key=odds)[:_TRIED]]
+            seen, without = self._again(model, tried, refitted_law, reference, 1)
+            reference = min(reference, without[0].cost)
+        law = min(seen, key=odds)
+        best = entries[law.term.candidate.name]
+        self._say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
+        least = self._asked(found, race, best, now.left)
+
+        def ahead() -> bool:
+            gained = min(now.listed.cost, reference) - law.cost
+            rival = (1.0 + FORM**2) * max(0.5 * (reference - odds(now.listed)), 0.0)
+            return gained >= least * now.error(law, law) and 0.5 * (reference - odds(law)) >= rival + _CLEARER
+
+        if ahead() and self._settings.relinearise and not now.bent:
+            (law,), without = self._again(model, [replayed(law)], refitted_law, reference, 1)
+            reference = min(reference, without[0].cost)
+        if not ahead():
+            return None
+        fitted = fitter.fit(fitter.at(law.model.z, law.model.terms, law.noise), law.noise, 3)
+        law = refitted_law(law, fitted, law.noise)
+        return law if ahead() else None
+
+    def _seen(self, race: LawRace, now: Round) -> tuple[dict[str, Entry], list[Contender]]:
+        """The best laws, by name, and by one linear step with the noise beside each."""
+        leading = best_of_each(race.entries(self._numbers.fitter, now.model, now.noise), _BESIDE)
+        contest = now.contest
+        beside = contest.at_once(lambda entry: contest.foreseen(entry.begun, race.columns(entry)), leading)
+        seen = [with_law(entry, *one, contest.reference) for entry, one in zip(leading, beside, strict=True)]
+        return {law.term.candidate.name: entry for law, entry in zip(seen, leading, strict=True)}, seen
+
+    def _asked(self, found: Diagnosis, race: LawRace, best: Entry, left: LeftOver) -> float:
+        """Gain that is asked of a law: beyond noise, the model's own error, and what the causes so far leave."""
+        least = least_gain(found.looks + len(LAWS), self._settings.alpha) * found.inflation
+        signature = {name: columns @ best.values[:, None] for name, columns in race.columns(best).items()}
+        left_there = left.of_signature(best.curve.pieces[0].effect, signature)
+        return least * variance_of_law(best.curve.law.name, best.curve.place) + left_there
