@@ -5,7 +5,7 @@ import pytest
 
 from hil.study.logs.table import UnusableError
 from hil.study.replay.nuisances import HALF_WIDTH_TO_SIGMA
-from hil.study.replay.vehicle import load_vehicle, paper_car, rest_friction
+from hil.study.replay.vehicle import Vehicle, load_vehicle, paper_car, rest_friction
 
 SIX = {
     "mass_kg": 1800.0,
@@ -77,3 +77,15 @@ def test_what_a_set_says_nothing_of_is_not_judged() -> None:
     assert set(told.untold) == {"battery_soc"}
     assert told.parameters.motor.peak_torque_nm == 400.0
     assert paper_car().unstated == ()
+
+
+def test_a_brake_gain_without_tolerance_is_known_to_a_hundredth() -> None:
+    """It was known to what the shipped car's piston, radius and efficiency are, some 15 %."""
+
+    def share(car: Vehicle) -> float:
+        (gain,) = (one for one in car.nuisances if one.name == "brake_gain_front")
+        return gain.step[0] / float(car.p[gain.at[0]]) / HALF_WIDTH_TO_SIGMA
+
+    assert share(load_vehicle(SIX)) == pytest.approx(0.01, rel=0.02)
+    told = load_vehicle({**SIX, "brake_gain_front_nm_pa_tolerance": 2.5e-5})
+    assert share(told) == pytest.approx(0.1, rel=0.02)

@@ -1,5 +1,7 @@
 """A cause is told only where its value is away from nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from outsider import VEHICLE
@@ -13,9 +15,9 @@ from hil.study.logs.prepare import prepare
 from hil.study.replay.rig import Rig
 from hil.study.replay.vehicle import load_vehicle
 from hil.study.replay.world import nominal
-from hil.study.search.contest import Contender, refitted
+from hil.study.search.contest import Contender, odds, refitted
 from hil.study.search.diagnosis import Diagnosis
-from hil.study.search.doubt import backward
+from hil.study.search.doubt import backward, erring, with_gain
 
 DEVIATIONS = {"wheel": 0.02, "ax": 0.02, "gps": 0.03, "pressure": 1e4, "motor": 0.5}
 
@@ -59,3 +61,20 @@ def test_a_cause_that_may_be_nothing_goes_and_the_remarks_name_it(hidden):
     assert found.remarks == said
     assert "headwind" in said[0]
     assert "deviations from nothing, asked 3.5" in said[0]
+
+
+@pytest.mark.parametrize(("most_left", "inflation", "error"), [(2.0, 1.0, 1.0), (75.0, 1.0, 10.0), (75.0, 2.0, 5.0)])
+def test_what_is_left_beside_a_cause_says_how_much_the_model_errs(most_left, inflation, error):
+    """The largest of 85 looks at noise alone reaches 7.5 every second time."""
+    found = _accepted(12.0)
+    found.looks, found.inflation = 85, inflation
+    assert erring(most_left, found) == pytest.approx(error, rel=0.02)
+
+
+def test_a_chosen_beginning_is_paid_in_the_odds_and_in_the_gain():
+    ((one,),) = _accepted(12.0).contenders
+    begun = replace(one, price=13.0)
+    assert odds(begun) - odds(one) == pytest.approx(13.0)
+    always, later = (with_gain(c, one.cost + 100.0, 2.0) for c in (one, begun))
+    assert always.gained - later.gained == pytest.approx(13.0)
+    assert always.error == 2.0
