@@ -1,4 +1,4 @@
-"""Whether a car was kept straight: nobody logged the steering wheel, and nothing says that it turned."""
+"""Whether a car was kept straight: no log tells the steering wheel, and none that it turned."""
 
 from collections.abc import Sequence
 
@@ -14,12 +14,15 @@ _OVER_S, _TURNS_RAD_S = 0.5, 0.003
 def kept_straight(logs: Sequence[Log]) -> bool:
     """Whether a driver who is not seen held the car on its line, against whatever pulls to one side.
 
-    A steering wheel that is in no log was not held still: brakes that pull are steered against. Where the yaw rate
-    tells of turning the car is left free.
+    A steering wheel that is in no log, or in all of them one number, was not held still: brakes that pull are steered
+    against. Where the yaw rate tells of turning the car is left free.
     """
-    if any("steer_rad" in log.channels for log in logs):
-        return False
-    return not any(_turns(log) for log in logs)
+    return not any(_steered(log) or _turns(log) for log in logs)
+
+
+def _steered(log: Log) -> bool:
+    angle = log.channels.get("steer_rad")
+    return angle is not None and bool(np.isfinite(angle).any()) and float(np.nanmax(angle) - np.nanmin(angle)) > 0.0
 
 
 def _turns(log: Log) -> bool:

@@ -59,7 +59,7 @@ class Vehicle:
         p = self.p.copy()
         p[P.vehicle_yaw_inertia_kg_m2] = _HELD_KG_M2
         nuisances = tuple(one for one in self.nuisances if one.name not in _TURNING)
-        said = "no log tells the steering wheel, nor that the car turned: it is held straight against whatever pulls"
+        said = "no log tells how it was steered, nor that it turned: the car is held straight against whatever pulls"
         return replace(self, p=p, nuisances=nuisances, straight=True, remarks=(*self.remarks, said))
 
 

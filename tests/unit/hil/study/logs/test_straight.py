@@ -23,7 +23,12 @@ def test_without_steering_and_yaw_rate_it_is_held() -> None:
 
 
 def test_a_steering_wheel_in_one_log_leaves_it_free() -> None:
-    assert not kept_straight([_log(), _log(steer_rad=np.zeros(len(T_S)))])
+    assert not kept_straight([_log(), _log(steer_rad=1e-3 * np.sin(T_S))])
+
+
+def test_a_steering_wheel_that_is_one_number_tells_nothing() -> None:
+    assert kept_straight([_log(steer_rad=np.zeros(len(T_S)))])
+    assert kept_straight([_log(steer_rad=np.full(len(T_S), np.nan))])
 
 
 @pytest.mark.parametrize("zero_rad_s", [0.0, 0.01])
