@@ -87,8 +87,10 @@ def test_a_cause_that_begins_in_the_middle_is_named(index: int, effect: str) -> 
 
 
 def test_rolling_resistance_of_an_axle_is_told_or_tied_with_what_acts_alike() -> None:
-    """A drag of the axle was told alone, by a beginning that cost nothing. Which is told first is not asked: they cannot
-    be told apart (`hil.trials.separable`)."""
+    """A drag of the axle was told alone, by a beginning that cost nothing.
+
+    Which is told first is not asked: they cannot be told apart (`hil.trials.separable`).
+    """
     assert in_set(run_case(draw("single", SINGLES.index("rolling_resistance"), 68, 15.0), 68, 15.0))
 
 
