@@ -15,10 +15,11 @@ STEPS_OF = {
 
 
 def sense(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
-    """s' = q round(s/q)."""
+    """s' = q round(s/q); a step finer than a float resolves leaves the value."""
     step = np.column_stack([number[name][:, 0] for name in STEPS_OF[node]])
-    size = np.where(step > 0.0, step, 1.0)
-    return np.where(step > 0.0, size * np.round(values / size), values)
+    coarse = step > np.finfo(float).eps * np.abs(values)
+    size = np.where(coarse, step, 1.0)
+    return np.where(coarse, size * np.round(values / size), values)
 
 
 EFFECT = Effect(

@@ -77,3 +77,13 @@ def test_nothing_on_nothing_touched():
     chain, values = Chain(THETA.neutral()), signal("wheel")
     assert chain.sense("wheel", TIME_S, values) is values
     assert not chain.touches("wheel")
+
+
+@pytest.mark.parametrize("step", [5e-324, 1e-300, 1e-18])
+def test_a_step_finer_than_a_float_leaves_the_value(step):
+    """The quotient overflowed."""
+    theta = THETA.neutral()
+    for parameter in THETA.effect("quantisation").parameters:
+        theta[THETA.slice("quantisation", parameter.name)] = step
+    told = signal("imu")
+    assert np.array_equal(Chain(theta).sense("imu", TIME_S, told), told)
