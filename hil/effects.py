@@ -135,6 +135,7 @@ def read_effects(tables: Mapping[str, Any], where: str) -> Effects:
         except (KeyError, ValueError, TypeError) as error:
             raise EffectError(f"{where}.{name}: {error.args[0] if error.args else error}") from error
     _refuse_early(effects, theta, where)
+    _refuse_unseen(theta[effects.slice("speed_scale", "gain")][0], f"{where}.speed_scale")
     return Effects(tuple(tables), theta, effects, terms, plugin_table(effects))
 
 
@@ -147,6 +148,14 @@ def _refuse_early(effects: Theta, theta: Vector, where: str) -> None:
                 f"{where}.{name}.{number}: expected 0 or more, got {values.min():g} ({node}): a running node cannot "
                 "send a sample before it is taken; leave it out, or make the other nodes late by as much"
             )
+
+
+def _refuse_unseen(gain: float, where: str) -> None:
+    if gain:
+        raise EffectError(
+            f"{where}.gain: expected 0, got {gain:g}: no bus of the bench has a sensor of the speed over ground; leave "
+            "it out, it changes nothing that a car does"
+        )
 
 
 def read_laws(laws: Any, where: str) -> Vector:

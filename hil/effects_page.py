@@ -19,6 +19,7 @@ PARTS = (
     (range(22, 41), "Friction brake"),
     (range(41, 55), "Electro-hydraulic brake and motors"),
     (range(55, 72), "Sensors, clocks, bus"),
+    (range(76, 77), "Beyond the catalogue"),
 )
 
 

@@ -16,7 +16,7 @@ from plant.effects.signals import CHANNELS, NAMES
 LEAST, MOST = 0.1, 100.0  # sigma; smaller is left white, larger saturates
 GROUPS = {
     "wheel": "wheel speeds", "imu": "IMU", "pressure": "pressures", "motor": "motor torques", "driver": "pedal",
-    "speed": "GPS",
+    "ground": "GPS",
 }  # fmt: skip
 _SHORT = ("fl", "fr", "rl", "rr", "ax", "ay", "yaw rate", *("fl", "fr", "rl", "rr") * 2, "travel", "speed")
 
@@ -46,7 +46,7 @@ def draw(title: str, found: list[Signature], path: Path) -> None:
     for spine in axes.spines.values():
         spine.set_visible(False)
     at = 0
-    for node, names in [*CHANNELS.items(), ("speed", ("speed_mps",))]:
+    for node, names in CHANNELS.items():
         middle = at + (len(names) - 1) / 2
         axes.text(middle, -0.5 - 44.0 / 12.4, GROUPS[node], ha="center", va="bottom", fontsize=7.5, color=NEUTRAL)
         at += len(names)

@@ -154,7 +154,7 @@ TWINS: tuple[tuple[str, str], ...] = (
 """Physical effect and the sensor effect it is taken for."""
 
 SENSOR_ONLY = (Hideable("speed_scale", "gain", "", 0.01, -0.1, 0.1),)
-"""Effects of a channel that no row of the catalogue names: the satellite speed's scale."""
+"""Effects of a channel that the families above do not draw: the scale of the speed over ground."""
 
 HIDEABLE = {effect.name: effect for effect in (*LISTED, *UNLISTED, *SENSOR_ONLY)}
 

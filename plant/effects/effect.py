@@ -8,6 +8,8 @@ from typing import Any
 from plant.layout import constants
 
 NODES = ("wheel", "imu", "pressure", "motor", "driver")
+GROUND = "ground"
+"""What measures the speed over ground: a logger's own receiver or optical sensor, on no vehicle bus."""
 
 
 class Scope(StrEnum):
@@ -80,7 +82,7 @@ class Effect:
         ``q``, joints in ``y``.
     sense : of a sensing effect, which acts on measured arrays and not in the model (`plant.effects.sensing.chain`).
     undo : its inverse on arrays, where it has one.
-    nodes : of `NODES`, whose signals a sensing effect changes.
+    nodes : of `NODES`, or `GROUND`, whose signals a sensing effect changes.
     """
 
     name: str

@@ -3,6 +3,7 @@
 import numpy as np
 
 from plant.effects.bank import NO_TERMS
+from plant.effects.effect import GROUND
 from plant.effects.manoeuvres import Drive
 from plant.effects.plugin import NO_PLUGINS
 from plant.effects.sensing.chain import Chain
@@ -17,6 +18,7 @@ CHANNELS: dict[str, tuple[str, ...]] = {  # node: its signals
     "pressure": tuple(f"pressure_{w}_pa" for w in WHEELS),
     "motor": tuple(f"motor_torque_{w}_nm" for w in WHEELS),
     "driver": ("pedal",),
+    GROUND: ("speed_mps",),
 }
 _COLUMNS = (
     *(f"sensed_wheel_speed_rad_s_{w}" for w in WHEELS),
@@ -25,7 +27,7 @@ _COLUMNS = (
     *(f"sensed_motor_nm_{w}" for w in WHEELS),
     "speed_mps",
 )  # fmt: skip
-NAMES = (*(name for names in CHANNELS.values() for name in names), "speed_mps")
+NAMES = tuple(name for names in CHANNELS.values() for name in names)
 
 
 def simulate(drive: Drive, theta: Vector = NEUTRAL, terms: Vector = NO_TERMS, plugins: Vector = NO_PLUGINS) -> Vector:

@@ -86,6 +86,7 @@ def _of_theta() -> NDArray[np.int64]:
                 if effect.name != _MOVES_START:
                     found[where.start + NODES.index("wheel")] = Acting.NOTHING
     found[WATCHING] = Acting.NOTHING
+    found[THETA.slice("speed_scale", "gain")] = Acting.DRIVING  # where no wheel tells how fast a segment begins
     return found
 
 

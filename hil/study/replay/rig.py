@@ -15,7 +15,7 @@ from hil.study.logs.prepare import averaged
 from hil.study.logs.table import Floats
 from hil.study.replay import acting
 from hil.study.replay.latency import in_time
-from hil.study.replay.sensing import inverted, wheel_speed_before
+from hil.study.replay.sensing import ground_speed_before, inverted, wheel_speed_before
 from hil.study.replay.steps import STEPS, at_once
 from hil.study.replay.telling import SOURCE, Stack, Telling, powers
 from hil.study.replay.vehicle import Vehicle
@@ -257,7 +257,7 @@ class Rig:
     def _speed(self, drive: Drive, segment: Segment, world: World) -> float:
         """Speed a segment starts with: what the sensors told, less what the world's sensors add."""
         if segment.start_speed_mps is not None:
-            return max(segment.start_speed_mps, 0.0)
+            return max(ground_speed_before(segment.start_speed_mps, world.theta_in(drive)), 0.0)
         told = wheel_speed_before(segment.start_wheel_rad_s, world.theta_in(drive))
         return max(told, 0.0) * float(np.median(_radius_m(world)))
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from hil.study.logs.table import Floats
-from plant.effects.effect import NODES
+from plant.effects.effect import GROUND, NODES
 from plant.effects.sensing.catalogue import SENSING
 from plant.effects.sensing.chain import Chain
 from plant.effects.theta import THETA
@@ -13,6 +13,7 @@ from plant.vectors import INPUT
 
 Stack = Mapping[str, Floats]
 _IMU = ("ax", "ay", "yaw")
+_NODE = {"wheel": "wheel", "pressure": "pressure", "motor": "motor", "gps": GROUND}
 _INPUT = {"pressure": "pressure_pa", "motor": "motor_torque_nm"}
 WATCHING = np.concatenate(
     [
@@ -31,6 +32,7 @@ SENSORS = np.concatenate(
     ]
 )
 """Places in theta of all that says what sensors and clocks do."""
+_GROUND_SCALE = THETA.slice("speed_scale", "gain").start
 _WHEEL_SCALE = THETA.slice("wrong_scale", "factor").start + NODES.index("wheel")
 
 
@@ -56,9 +58,9 @@ def sensed(stack: Stack, theta: Floats, row_s: float) -> dict[str, Floats]:
     found = dict(stack)
     chain = Chain(theta)
     time_s: Floats = np.arange(len(next(iter(stack.values())))) * row_s
-    for node in ("wheel", "pressure", "motor"):
-        if node in found and chain.touches(node):
-            found[node] = chain.sense(node, time_s, found[node])
+    for group, node in _NODE.items():
+        if group in found and chain.touches(node):
+            found[group] = chain.sense(node, time_s, found[group])
     if chain.touches("imu") and any(name in found for name in _IMU):
         rest = np.zeros((len(time_s), 1))
         body = chain.sense("imu", time_s, np.hstack([found.get(name, rest) for name in _IMU]))
@@ -69,3 +71,8 @@ def sensed(stack: Stack, theta: Floats, row_s: float) -> dict[str, Floats]:
 def wheel_speed_before(told_rad_s: float, theta: Floats) -> float:
     """Middle wheel speed before a wrong scale of the wheel node; other wheel effects move no start."""
     return told_rad_s / (1.0 + float(theta[_WHEEL_SCALE]))
+
+
+def ground_speed_before(told_mps: float, theta: Floats) -> float:
+    """Speed over ground before a wrong scale of what tells it."""
+    return told_mps / (1.0 + float(theta[_GROUND_SCALE]))

@@ -30,7 +30,7 @@ from hil.study.replay.telling import Stack
 from hil.study.replay.vehicle import Vehicle, paper_car
 from hil.study.replay.world import World, nominal
 from hil.study.verdict.tied import APART, remaining, summed
-from plant.effects.effect import Scope
+from plant.effects.effect import GROUND, Scope
 from plant.effects.manoeuvres import MANOEUVRES, ROW_S, Drive, Show, drive
 from plant.effects.signals import NAMES, noise, simulate
 from plant.model import pack
@@ -214,8 +214,9 @@ class _Ground:
 
 
 @cache
-def _ground(name: str, both_ways: bool) -> _Ground:
-    """A scenario as logs of our own car with nothing hidden, prepared as measured ones are."""
+def _ground(name: str, both_ways: bool, to_ground: bool) -> _Ground:
+    """A scenario as logs of our own car with nothing hidden, prepared as measured ones are; ``to_ground``: with the
+    speed over ground."""
     car = _car()
     if name == STRAIGHT_STOP:
         show = MANOEUVRES[name]
@@ -224,7 +225,7 @@ def _ground(name: str, both_ways: bool) -> _Ground:
         scenario = _scenario(name)
         driven, disc_k = _driven(scenario), scenario.manoeuvre.initial_disc_temperature_k
     radius = float(car.parameters.wheel.rolling_radius_m)
-    logs = [_log(name, driven, disc_k, direction) for direction in ((1, -1) if both_ways else (1,))]
+    logs = [_log(name, driven, disc_k, direction, to_ground) for direction in ((1, -1) if both_ways else (1,))]
     world = nominal(car)
     rig = Rig(prepare(logs, radius), car).quieted(world)
     rig.keep(world)
@@ -247,11 +248,12 @@ def _car() -> Vehicle:
     return paper_car()
 
 
-def _log(name: str, driven: Drive, disc_k: float, direction: int) -> Log:
-    """A recording of the bus: the model's signals with the noise of their sensors."""
+def _log(name: str, driven: Drive, disc_k: float, direction: int, to_ground: bool) -> Log:
+    """A recording of the bus, and of the speed ``to_ground``: the model's signals with the noise of their sensors."""
+    left_out = {"pedal"} if to_ground else {"pedal", "speed_mps"}
     signals = simulate(driven)[0]
     signals += noise(signals) * np.random.default_rng([1, direction + 1]).standard_normal(signals.shape)
-    channels = {n: signals[:, k] for k, n in enumerate(NAMES) if n in CHANNELS and n not in ("pedal", "speed_mps")}
+    channels = {n: signals[:, k] for k, n in enumerate(NAMES) if n in CHANNELS and n not in left_out}
     for part, names in (("pressure_demand_pa", PRESSURE_DEMAND), ("motor_demand_nm", MOTOR_DEMAND)):
         channels |= dict(zip(names, driven.rows[:, INPUT.slice(part)].T, strict=True))
     channels["steer_rad"] = driven.rows[:, INPUT.slice("steering_wheel_rad")][:, 0]
@@ -272,7 +274,8 @@ def _separation(name: str, items: Sequence[Candidate], both_ways: bool) -> float
 
 def _products(name: str, items: Sequence[Candidate], both_ways: bool) -> Floats:
     """Products of the whitened signatures of the items, (items, items)."""
-    ground, of = _ground(name, both_ways), _all()[0]
+    to_ground = any(GROUND in c.effect.nodes for c in items)
+    ground, of = _ground(name, both_ways, to_ground), _all()[0]
     needed = sorted({k for candidate in items for k in candidate.columns})
     worlds = [of[k].stepped(ground.world) for k in needed]
     tracks = track_columns(ground.rig, ground.frame, ground.base, worlds, [of[k].step for k in needed])

@@ -72,6 +72,7 @@ def test_none_is_none():
         ({"road_grade": {"grade": 2.0}}, "expected -0.2 to 0.2"),
         ({"timestamp_offset": {"delay_s": {"imu": -0.004}}}, r"delay_s: expected 0 or more, got -0.004 \(imu\)"),
         ({"clock_drift": {"share": {"motor": -1e-4}}}, r"share: expected 0 or more, got -0.0001 \(motor\)"),
+        ({"speed_scale": {"gain": 0.01}}, r"speed_scale.gain: expected 0, got 0.01: no bus of the bench has a sensor"),
     ],
 )
 def test_refusals_say_where_and_what(tables, error):

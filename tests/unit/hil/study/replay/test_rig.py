@@ -94,6 +94,19 @@ def test_a_sensor_that_tells_too_much_does_not_press_the_pads_at_the_start():
     assert pressure[:100] == pytest.approx(offset, abs=1.0)
 
 
+def test_a_ground_speed_that_tells_too_much_starts_a_car_as_slow_as_it_was():
+    """No wheel tells how fast it was: what is told at the start is what is told."""
+    log = _log()
+    ground = log.channels["wheel_speed_fl_rad_s"] * 0.308
+    channels = {name: values for name, values in log.channels.items() if not name.startswith("wheel_speed")}
+    rig = Rig(prepare([make_log("log", log.t_s, {**channels, "speed_mps": ground})], 0.308), paper_car())
+    level = nominal(rig.vehicle)
+    rig.keep(level)
+    right, wrong = (rig.run(world)["gps"] for world in (level, _with(level, "speed_scale", "gain", 0.05)))
+    assert wrong[:20] == pytest.approx(right[:20], rel=1e-3)
+    assert np.abs(wrong - right).max() > 0.05  # the drag of a slower car is less
+
+
 def test_brakes_change_nothing_before_they_are_applied(rig):
     level = nominal(rig.vehicle)
     rig.keep(level)

@@ -18,6 +18,7 @@ TIED = [
     ("road_grade", "imu_bias"),
     ("pressure_offset", "pad_mu_gain"),
     ("tyre_radius", "wrong_scale"),
+    ("tyre_radius", "speed_scale"),
 ]
 
 
