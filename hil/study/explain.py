@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from dbc.database import parse_database
 from hil.study.consistency.check import Consistency, check, unforced
 from hil.study.logs.channel_map import load_map
-from hil.study.logs.prepare import prepare, without_unstated
+from hil.study.logs.prepare import prepare
 from hil.study.logs.read import from_frame, read_logs
 from hil.study.logs.straight import kept_straight
 from hil.study.logs.table import Log
@@ -54,7 +54,7 @@ def explain(
     if why:
         return check(read, car, why, extend, out, say or (lambda _: None))
     car = car.held_straight() if kept_straight(read) else car
-    case = prepare(without_unstated(read, car.unstated), float(car.parameters.wheel.rolling_radius_m))
+    case = prepare(read, float(car.parameters.wheel.rolling_radius_m), car.unstated)
     handed_in = nominal(car)
     base = handed_in if extend is None else load_extension(Path(extend)).applied(handed_in)
     with threadpool_limits(1, "blas"):  # replays fill the processors; linear algebra beside them only waits

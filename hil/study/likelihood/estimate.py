@@ -22,9 +22,10 @@ from hil.study.logs.table import Floats
 
 _FLOOR = {"wheel": 5e-4, "ax": 2e-3, "gps": 2e-3, "ay": 2e-3, "yaw": 2e-4, "pressure": 500.0, "motor": 0.05}
 _SHORTEST_S, _LONGEST_S, _LONGEST_MOVING_S = 0.02, 2.0, 30.0  # what is slower is no noise but wants a cause
-_USUAL = np.array([0.05, 0.03, 0.03, 0.005, 1.0, 3.0, 2.0, 1.0])
-_SPREAD = np.array([1.5, 1.5, 1.5, 1.5, 0.7, 0.7, 0.7, 0.7])
-"""Disturbances that roads, drivers and sensors usually make (sizes, then times), and the spread of their logarithms."""
+_USUAL = ((0.05, 1.0), (0.03, 3.0), (0.03, 2.0), (0.005, 1.0), (0.03, 2.0))
+_SPREAD = (1.5, 0.7)
+"""Disturbances that roads, drivers and sensors usually make (size, time), as in `hil.study.likelihood.noise.Noise`, and
+the spread of their logarithms."""
 _COLOURS, _TIMES_S = (0.1, 0.3, 1.0, 3.0), (0.1, 0.5, 2.0)
 """Offered to begin a search: colour as a share of the white noise, and its time. From too much of it the way down leads
 past what is there to none at all, where nothing points back."""
@@ -43,7 +44,7 @@ def first_guess(tracks: Mapping[str, Floats], frame: Frame, enabled: bool = True
     for name, values in tracks.items():
         a = max(_differences(values[:, 0], frame.present[name]), _floor(name))
         found[name] = Track(a, 1e-6, 3.0 * a, 0.5)
-    return Noise(found, tuple(zip(_USUAL[:4].tolist(), _USUAL[4:].tolist(), strict=True)), enabled)
+    return Noise(found, _USUAL if "gps" in tracks else _USUAL[:-1], enabled)
 
 
 def _floor(track: str) -> float:
@@ -152,7 +153,8 @@ def _of_moving(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> Nois
     there = [name for name in LONG if name in tracks]
     if not there:
         return noise
-    samples, scale = len(frame.fresh), scale_of("long", frame, noise)
+    samples, scale, count = len(frame.fresh), scale_of("long", frame, noise), len(noise.disturbances)
+    usual, spread = np.log(np.array(_USUAL[:count]).T.ravel()), np.repeat(_SPREAD, count)
     share = frame.speed_mps / REFERENCE_MPS
     b = noise.tracks["wheel.front-rear"].b if "wheel.front-rear" in noise.tracks else 0.0
     y, known, white = np.zeros((samples, 3)), np.zeros((samples, 3)), np.zeros((samples, 3))
@@ -165,31 +167,30 @@ def _of_moving(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> Nois
     def costs(points: Floats) -> tuple[Floats, Floats, Floats]:
         sizes = np.exp(points.T)
         sensor = np.zeros((3, len(points)))
-        sensor[[LONG.index(name) for name in there]] = sizes[8:] ** 2
-        keep, colour = np.exp(-frame.sample_s / sizes[4:8]), on * sizes[:4] ** 2 + 1e-12
+        sensor[[LONG.index(name) for name in there]] = sizes[2 * count :] ** 2
+        keep, colour = np.exp(-frame.sample_s / sizes[count : 2 * count]), on * sizes[:count] ** 2 + 1e-12
         off, size = np.zeros((samples, 3, len(points))), np.ones((samples, 3, len(points)))
         found = moving_each(
             y, frame.fresh, frame.restart, frame.moving, known, white, share, frame.sample_s, keep, colour, sensor,
             off, size,
         )  # fmt: skip
         # weak knowledge of sizes and times keeps what the data do not show where roads and cars have it
-        unusual = (points[:, :8] - np.log(_USUAL)) / _SPREAD
+        unusual = (points[:, : 2 * count] - usual) / spread
         cost = -found + 0.5 * np.square(unusual).sum(axis=1)
         return cost, off.reshape(-1, len(points)), size.reshape(-1, len(points))
 
     sizes, taus = zip(*noise.disturbances, strict=True)
     own = np.log([noise.tracks[name].a for name in there])
-    starts = [np.concatenate((np.log([*sizes, *taus]), own)), np.concatenate((np.log(_USUAL), own))]
-    low = np.array([-_FAR] * 4 + [np.log(_SHORTEST_S)] * 4 + [np.log(_floor(name)) for name in there])
-    high = np.array([_FAR] * 4 + [np.log(_LONGEST_MOVING_S)] * 4 + [_FAR] * len(there))
-    before = np.array([*_SPREAD**-2, *np.zeros(len(there))])
+    starts = [np.concatenate((np.log([*sizes, *taus]), own)), np.concatenate((usual, own))]
+    low = np.array([-_FAR] * count + [np.log(_SHORTEST_S)] * count + [np.log(_floor(name)) for name in there])
+    high = np.array([_FAR] * count + [np.log(_LONGEST_MOVING_S)] * count + [_FAR] * len(there))
+    before = np.array([*spread**-2, *np.zeros(len(there))])
     found = np.exp(_smallest(costs, starts, low, high, before)).tolist()
+    disturbances, white_sizes = tuple(zip(found[:count], found[count : 2 * count], strict=True)), found[2 * count :]
     changed = {
-        name: Track(a, b if name == "wheel.mean" else 0.0, 0.0, 1.0) for name, a in zip(there, found[8:], strict=True)
+        name: Track(a, b if name == "wheel.mean" else 0.0, 0.0, 1.0) for name, a in zip(there, white_sizes, strict=True)
     }
-    return replace(
-        noise, tracks={**noise.tracks, **changed}, disturbances=tuple(zip(found[:4], found[4:8], strict=True))
-    )
+    return replace(noise, tracks={**noise.tracks, **changed}, disturbances=disturbances)
 
 
 def _limited(innovations: Floats) -> Floats:

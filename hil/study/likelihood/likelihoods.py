@@ -50,8 +50,9 @@ def _moving_each(
     y: Floats, fresh: Floats, restart: Floats, rolling: Floats, known: Floats, white: Floats, share: Floats,
     step_s: float, keep: Floats, colour: Floats, sensor: Floats, off: Floats, size: Floats,
 ) -> Floats:  # fmt: skip
-    lanes = keep.shape[1]
-    x, cov, h = np.zeros((5, lanes)), np.zeros((5, 5, lanes)), np.zeros((5, lanes))
+    count, lanes = keep.shape
+    states = 1 + count
+    x, cov, h = np.zeros((states, lanes)), np.zeros((states, states, lanes)), np.zeros((states, lanes))
     inverse, innovation = np.zeros(lanes), np.zeros(lanes)
     product, likelihood = np.ones(lanes), np.zeros(lanes)
     for t in range(len(y)):
@@ -59,20 +60,20 @@ def _moving_each(
             x[:] = 0.0
             cov[:] = 0.0
             cov[0, 0] = UNKNOWN
-            for i in range(4):
+            for i in range(count):
                 cov[1 + i, 1 + i] = colour[i]
         else:
             step = step_s * rolling[t]
             for k in range(lanes):
                 x[0, k] += step * (x[1, k] + x[2, k])
-                for j in range(5):
+                for j in range(states):
                     cov[0, j, k] += step * (cov[1, j, k] + cov[2, j, k])
                 cov[0, 0, k] += step * (cov[0, 1, k] + cov[0, 2, k])
-                for j in range(4):
+                for j in range(count):
                     x[1 + j, k] *= keep[j, k]
                     cov[0, 1 + j, k] *= keep[j, k]
                     cov[1 + j, 0, k] = cov[0, 1 + j, k]
-                    for i in range(4):
+                    for i in range(count):
                         cov[1 + i, 1 + j, k] *= keep[i, k] * keep[j, k]
                     cov[1 + j, 1 + j, k] += (1.0 - keep[j, k] * keep[j, k]) * colour[j, k]
             if restart[t] > 0.5:
@@ -83,10 +84,10 @@ def _moving_each(
         for m in range(3):
             if known[t, m] < 0.5:
                 continue
-            first, second = (1, 3) if m == 1 else (0, 4)
+            first, second = (1, 3) if m == 1 else (0, 4 if m == 0 else count)
             one = rolling[t] if m == 1 else 1.0
-            other = 1.0 if m == 1 else (share[t] if m == 0 else 0.0)
-            for i in range(5):
+            other = share[t] if m == 0 else (1.0 if m == 1 or count > 4 else 0.0)
+            for i in range(states):
                 for k in range(lanes):
                     h[i, k] = one * cov[i, first, k] + other * cov[i, second, k]
             for k in range(lanes):
@@ -99,10 +100,10 @@ def _moving_each(
                 far = 2.0 * HUBER * np.sqrt(square) - HUBER * HUBER
                 likelihood[k] -= 0.5 * (far if square > HUBER * HUBER else square)
                 product[k] *= total
-            for i in range(5):
+            for i in range(states):
                 for k in range(lanes):
                     x[i, k] += h[i, k] * innovation[k]
-                for j in range(5):
+                for j in range(states):
                     for k in range(lanes):
                         cov[i, j, k] -= h[i, k] * h[j, k] * inverse[k]
         if t % _TOGETHER == 0:
@@ -134,7 +135,7 @@ coloured_each = compiled(_coloured_each)
 ``off`` (samples, lanes), their variances into ``size``, where the track is compared."""
 moving_each = compiled(_moving_each)
 """The moving car: ``y``, ``known`` and the ``white`` variance that all lanes share are (samples, 3 tracks); ``keep``
-and ``colour`` are (4 disturbances, lanes), ``sensor`` (3 tracks, lanes) is white variance of their own; ``off`` and
+and ``colour`` are (disturbances, lanes), ``sensor`` (3 tracks, lanes) is white variance of their own; ``off`` and
 ``size`` are (samples, 3 tracks, lanes)."""
 
 information_of = compiled(_information_of)

@@ -31,8 +31,8 @@ class Track:
 class Noise:
     """Noise of all tracks.
 
-    ``disturbances``: force, slope, accelerometer (standard deviation m/s2, tau s) and what all wheels tell wrong
-    (m/s at 20 m/s, tau s).
+    ``disturbances``: force, slope, accelerometer (standard deviation m/s2, tau s), what all wheels tell wrong (m/s at
+    20 m/s, tau s), and what the ground speed does (m/s, tau s) where there is one.
 
     ``scales``: by how much a manoeuvre is noisier than the others (one number each), per track; the moving car's
     tracks share those of "long". Where the car is driven hard the model's own error is larger too.

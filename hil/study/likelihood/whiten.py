@@ -45,41 +45,42 @@ def _moving(
     y: Floats, fresh: Floats, restart: Floats, rolling: Floats, white: Floats, share: Floats, step_s: float,
     colours: Floats, out: Floats,
 ) -> float:  # fmt: skip
-    # states: error of the speed, force disturbance, slope disturbance, disturbance of the accelerometer, of the wheels
-    columns = y.shape[2]
-    x = np.zeros((5, columns))
-    cov = np.zeros((5, 5))
-    h = np.zeros(5)
+    # states: error of the speed; disturbances: force, slope, accelerometer, wheels, and ground speed if it is measured
+    columns, count = y.shape[2], colours.shape[0]
+    size = 1 + count
+    x = np.zeros((size, columns))
+    cov = np.zeros((size, size))
+    h = np.zeros(size)
     likelihood = 0.0
-    move = np.zeros((5, 5))
+    move = np.zeros((size, size))
     for t in range(y.shape[0]):
         if fresh[t] > 0.5:
             x[:] = 0.0
             cov[:] = 0.0
-            for i in range(4):
+            for i in range(count):
                 cov[1 + i, 1 + i] = colours[i, 1]
             cov[0, 0] = UNKNOWN
         else:
             step = step_s * rolling[t]
             for k in range(columns):
                 x[0, k] += step * (x[1, k] + x[2, k])
-                for i in range(4):
+                for i in range(count):
                     x[1 + i, k] *= colours[i, 0]
-            for i in range(5):
-                for j in range(5):
+            for i in range(size):
+                for j in range(size):
                     move[i, j] = cov[i, j]
-            for j in range(5):
+            for j in range(size):
                 move[0, j] += step * (cov[1, j] + cov[2, j])
-                for i in range(4):
+                for i in range(count):
                     move[1 + i, j] *= colours[i, 0]
-            for i in range(5):
+            for i in range(size):
                 cov[i, 0] = move[i, 0] + step * (move[i, 1] + move[i, 2])
-                for j in range(4):
+                for j in range(count):
                     cov[i, 1 + j] = move[i, 1 + j] * colours[j, 0]
-            for i in range(4):
+            for i in range(count):
                 cov[1 + i, 1 + i] += (1.0 - colours[i, 0] ** 2) * colours[i, 1]
             if restart[t] > 0.5:
-                for i in range(5):
+                for i in range(size):
                     cov[0, i] = 0.0
                     cov[i, 0] = 0.0
                 cov[0, 0] = UNKNOWN
@@ -91,20 +92,20 @@ def _moving(
                     out[t, m, k] = 0.0
                 continue
             # what is seen: wheels (speed and their own share), acceleration (of a car at rest none), ground speed
-            first, second = (1, 3) if m == 1 else (0, 4)
+            first, second = (1, 3) if m == 1 else (0, 4 if m == 0 else count)
             one = rolling[t] if m == 1 else 1.0
-            other = 1.0 if m == 1 else (share[t] if m == 0 else 0.0)
-            for i in range(5):
+            other = share[t] if m == 0 else (1.0 if m == 1 or count > 4 else 0.0)
+            for i in range(size):
                 h[i] = one * cov[i, first] + other * cov[i, second]
             total = white[t, m] + one * h[first] + other * h[second]
             scale = 1.0 / np.sqrt(total)
             for k in range(columns):
                 innovation = y[t, m, k] - one * x[first, k] - other * x[second, k]
-                for i in range(5):
+                for i in range(size):
                     x[i, k] += h[i] / total * innovation
                 out[t, m, k] = innovation * scale
-            for i in range(5):
-                for j in range(5):
+            for i in range(size):
+                for j in range(size):
                     cov[i, j] -= h[i] * h[j] / total
             far = max(abs(out[t, m, 0]) - HUBER, 0.0)
             likelihood -= 0.5 * (out[t, m, 0] ** 2 - far * far + np.log(total))
@@ -118,5 +119,5 @@ moving = compiled(_moving)
 """The moving car: (samples, 3 tracks, columns) of speed, acceleration, ground speed.
 
 ``colours`` holds rows (factor from sample to sample, variance) of force, slope, accelerometer and wheel disturbance,
-the last one weighted by ``share`` (samples,); ``restart`` forgets the speed's error. Force and slope move the car where
-it is ``rolling`` (samples,); one held at rest feels neither."""
+the last one weighted by ``share`` (samples,), and, where a ground speed is compared, its own; ``restart`` forgets the
+speed's error. Force and slope move the car where it is ``rolling`` (samples,); one held at rest feels neither."""

@@ -55,13 +55,14 @@ class Drive:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """All drives of one diagnosis."""
+    """All drives of one diagnosis; ``followed`` are the groups whose demands the simulation follows."""
 
     drives: tuple[Drive, ...]
     cut: Floats
     groups: tuple[str, ...]
     sample_s: float
     missing: tuple[str, ...]
+    followed: tuple[str, ...] = ("pressure", "motor")
 
     @property
     def segments(self) -> list[tuple[int, Segment]]:

@@ -25,7 +25,11 @@ SETTLE_S = 1.0
 SHORTEST_S, LONGEST_S, TURNING_S = 8.0, 25.0, 3.0
 STRAIGHT_RAD = 0.02  # of the steering wheel
 _RELEASED_PA, _RELEASED_NM = 1e5, 20.0
+_ASKED_PA = 2e4
 _CONTRADICTED = 0.8
+_SPARSE = 1.5
+"""Rows from sample to sample, from which on a log tells less than there was: who asks does so more often, so that a
+demand lies between two samples and was not held from one to the next, and a pressure bends between them."""
 _TRACK = {
     "wheel": WHEEL_SPEED, "pressure": PRESSURE, "motor": MOTOR_TORQUE,
     "ax": ("ax_mps2",), "ay": ("ay_mps2",), "yaw": ("yaw_rate_rad_s",), "gps": ("speed_mps",),
@@ -36,13 +40,10 @@ FILTERED, FILTER_S = ("ax", "ay", "yaw"), 0.2
 """Channels whose simulated sensor has not seen what was before the log, and for how long that shows."""
 
 
-def without_unstated(logs: Sequence[Log], unstated: Collection[str]) -> Sequence[Log]:
-    """Logs without demands that no simulation can follow: the vehicle set says nothing of what acts on them."""
-    dropped: set[str] = set()
-    for section, demands, measured in (("ehb", PRESSURE_DEMAND, PRESSURE), ("motor", MOTOR_DEMAND, MOTOR_TORQUE)):
-        if section in unstated and all(log.has(*measured) for log in logs):
-            dropped |= set(demands)
-    return _without(logs, dropped)
+def _without_unstated(logs: Sequence[Log], unstated: Collection[str]) -> Sequence[Log]:
+    """Logs without demands of motors that no simulation can follow: the vehicle set says nothing of the motors."""
+    measured = all(log.has(*MOTOR_TORQUE) for log in logs)
+    return _without(logs, set(MOTOR_DEMAND) if "motor" in unstated and measured else ())
 
 
 def _without(logs: Sequence[Log], channels: Collection[str], *remarks: str) -> Sequence[Log]:
@@ -58,15 +59,18 @@ def _without(logs: Sequence[Log], channels: Collection[str], *remarks: str) -> S
     ]
 
 
-def prepare(logs: Sequence[Log], radius_m: float) -> Case:
+def prepare(logs: Sequence[Log], radius_m: float, unstated: Collection[str] = ()) -> Case:
     """Cut and grid logs.
+
+    Of sections that are ``unstated`` in the vehicle set no simulation can follow a demand: torques of such motors are
+    not compared, and pressures only where none is asked for.
 
     Raises
     ------
     UnusableError
         Nothing that moves or nothing that drives the brakes is measured.
     """
-    logs = _without_contradicted(logs)
+    logs = _without_contradicted(_without_unstated(logs, unstated))
     there = set.intersection(*(set(log.channels) for log in logs))
     if not (set(WHEEL_SPEED) & there or "speed_mps" in there):
         raise UnusableError("neither wheel speeds nor a speed in every log; nothing says how the car moved")
@@ -92,11 +96,12 @@ def prepare(logs: Sequence[Log], radius_m: float) -> Case:
             groups.remove(name)  # nothing simulates it
     rate = max(float(np.median(np.diff(log.t_s))) for log in logs)
     stride = max(2, int(np.ceil(rate / ROW_S - 0.2)))
-    drives = tuple(replace(_drive(log, groups, stride, radius_m), number=k) for k, log in enumerate(logs))
+    followed = tuple(name for name in ("pressure", "motor") if not (name == "pressure" and "ehb" in unstated))
+    drives = tuple(replace(_drive(log, groups, stride, radius_m, followed), number=k) for k, log in enumerate(logs))
     moving = sum(float(drive.moving.sum()) for drive in drives) * stride * ROW_S
     if moving < 4.0:
         raise UnusableError(f"the car moves for {moving:.1f} s in all; expected 4 s or more above {SLOW_MPS:g} m/s")
-    return Case(drives, cut, tuple(groups), stride * ROW_S, tuple(_costs(there)))
+    return Case(drives, cut, tuple(groups), stride * ROW_S, tuple(_costs(there)), followed)
 
 
 def _without_contradicted(logs: Sequence[Log]) -> Sequence[Log]:
@@ -140,7 +145,7 @@ def _costs(there: set[str]) -> list[str]:
     return costs
 
 
-def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float) -> Drive:
+def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float, followed: Collection[str]) -> Drive:
     begin, end = begin_s(log.t_s), float(log.t_s[-1])
     rows = int((end - begin) / ROW_S) // stride * stride
     grid = begin + ROW_S * np.arange(rows)
@@ -152,11 +157,12 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float) -> Dri
         good = np.isfinite(values)
         if not good.any():
             return np.full(rows, np.nan)
-        if hold:
-            late = 0.4 * float(np.median(np.diff(log.t_s[good]))) if good.sum() > 1 else 0.0  # stamps jitter
+        cycle = float(np.median(np.diff(log.t_s[good]))) if good.sum() > 1 else 0.0
+        if hold and cycle < _SPARSE * ROW_S:
+            late = 0.4 * cycle  # stamps jitter
             at = np.clip(np.searchsorted(log.t_s[good], grid + late, side="right") - 1, 0, None)
             return np.asarray(values[good][at], np.float64)
-        if name in MOTION:
+        if name in MOTION or (name in PRESSURE and cycle >= _SPARSE * ROW_S):
             filled = at_places(values[good], np.interp(grid, log.t_s[good], np.arange(good.sum(), dtype=np.float64)))
         else:
             filled = np.interp(grid, log.t_s[good], values[good])
@@ -207,6 +213,11 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float) -> Dri
             measured[name][~_sampled(log, channel, begin, len(measured[name]), stride), k] = np.nan
         if name in FILTERED:
             measured[name][: int(np.ceil(FILTER_S / (stride * ROW_S)))] = np.nan
+    if "pressure" in measured and "pressure" not in followed:
+        asked = averaged(inputs[:, INPUT.slice("pressure_demand_pa")].max(axis=1)[:, None], stride)[:, 0] > _ASKED_PA
+        asked[0] = True  # the simulated one starts where the measured one does
+        since = np.convolve(asked, np.ones(1 + int(SETTLE_S / (stride * ROW_S))))[: len(asked)]
+        measured["pressure"][since > 0.5] = np.nan
     slow = averaged(speed[:, None], stride)[:, 0]
     after = max(int(SETTLE_S / (stride * ROW_S)), 1)
     near_stop = np.convolve(slow < SLOW_MPS, np.ones(2 * after + 1), mode="same") > 0.5

@@ -129,7 +129,7 @@ class Rig:
         So steps stay sharp, between two samples too, if this world has what makes them. The measured one is taken back
         first: what its node, in this world, scaled or sampled late.
         """
-        wanted = [(group, part) for group, part in _INPUTS if group in self._groups]
+        wanted = [one for one in _INPUTS if one[0] in self._groups and one[0] in self.case.followed]
         self._kept = self._made = None
         drives, told = [], []
         for drive, given in zip(self.case.drives, self._given, strict=True):

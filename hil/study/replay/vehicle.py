@@ -134,7 +134,7 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
     if unlimited:
         remarks.append(
             f"{where}: nothing said of {', '.join(unlimited)}, so no limits of theirs are simulated "
-            "and no demand is compared"
+            "and no demand is compared, but that for no pressure"
         )
     parameters = override(base, changes, where)
     friction = any(name.startswith("pad_") for name in numbers)

@@ -78,6 +78,18 @@ def instead(
     return Contest.at_once(placed, others)
 
 
+def from_the_best(fitter: Fitter, fitted: Sequence[Contender]) -> list[Contender]:
+    """Contenders that begin when the best does, each fitted from where the best ended, too, where that explains more.
+
+    What acts alike ends alike: a fit that stopped on its way would be no rival.
+    """
+    best = min(fitted, key=odds)
+    others = [one for one in fitted if one is not best and one.term.onset == best.term.onset]
+    again = instead(fitter, best, [(one.term.candidate, one.term.value) for one in others], True)
+    better = dict(zip(map(id, others), again, strict=True))
+    return [min(one, better.get(id(one), one), key=odds) for one in fitted]
+
+
 class Contest:
     """One place for a cause in a model.
 

@@ -16,7 +16,7 @@ from hil.study.replay.rig import Rig
 from hil.study.replay.vehicle import Vehicle
 from hil.study.replay.world import World
 from hil.study.search.begun import since_when, with_its_like
-from hil.study.search.contest import Contender, Contest, instead, odds, refitted, worth
+from hil.study.search.contest import Contender, Contest, from_the_best, instead, odds, refitted, worth
 from hil.study.search.diagnosis import Diagnosis, Say, Settings, causes_in
 from hil.study.search.doubt import backward, erring, form_differs, stands_beside, strained, with_gain
 from hil.study.search.field import Field, number_of
@@ -239,7 +239,8 @@ class _Search:
         if _most(top, left) < _POOR * least:
             return None
         self.say(f"fitting {len(top)} leaders")
-        return contest, top, contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
+        fitted = contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
+        return contest, top, from_the_best(self.fitter, fitted) if self.settings.relinearise else fitted
 
     def _fitted_again(
         self, model: Model, fitted: list[Contender], top: list[Score], reference: float
@@ -249,7 +250,7 @@ class _Search:
         least = 0.0 if self._bent(model) else _NEAR * max(explain)
         near = [c for c, much in zip(fitted, explain, strict=True) if much >= least]
         refound, without = self._from_handed_in(model, near, refitted, reference, _LED_ANEW)
-        better = dict(zip(map(id, near), refound, strict=True))
+        better = dict(zip(map(id, near), from_the_best(self.fitter, refound), strict=True))
         return [better.get(id(c), c) for c in fitted], without
 
     def _standing(self, fitted: list[Contender], clear: list[Contender], least: float) -> Contender | None:

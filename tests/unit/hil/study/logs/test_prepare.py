@@ -5,6 +5,7 @@ import pytest
 
 from hil.study.logs.prepare import prepare
 from hil.study.logs.table import Log, make_log
+from plant.vectors import INPUT
 
 WHEELS = ("fl", "fr", "rl", "rr")
 
@@ -31,3 +32,31 @@ def test_demands_that_nobody_followed_are_left_out(asked: float, kept: bool) -> 
 
 def test_released_brakes_contradict_nothing() -> None:
     assert "pressure" in prepare([_log(0.0, 0.0)], 0.3).groups
+
+
+@pytest.mark.parametrize(("step_s", "between"), [(0.01, 1e4), (0.02, 1.5e4)])
+def test_a_demand_is_held_from_row_to_row_and_lies_between_sparse_samples(step_s: float, between: float) -> None:
+    """Of a demand that rises by 0.1 bar every 20 ms: who asked every 10 ms asked for more in between."""
+    t = np.arange(0.0, 10.0, step_s)
+    rising = 1e4 * np.floor(t / 0.02 + 1e-6)
+    channels = {f"wheel_speed_{w}_rad_s": np.full(len(t), 60.0) for w in WHEELS}
+    channels |= {f"pressure_{w}_pa": rising for w in WHEELS} | {f"pressure_demand_{w}_pa": rising for w in WHEELS}
+    (drive,) = prepare([make_log("log", t, channels)], 0.3).drives
+    asked = drive.inputs[:, INPUT.slice("pressure_demand_pa")][:, 0]
+    assert asked[2] == pytest.approx(1e4)
+    assert asked[3] == pytest.approx(between)
+
+
+def test_a_pressure_that_nobody_can_follow_is_compared_where_none_is_asked_for() -> None:
+    """A set that says nothing of the hydraulics: an offset still shows while the brakes are released."""
+    log = _log(20e5, 20e5)
+    case = prepare([log], 0.3, unstated=("ehb", "motor"))
+    (drive,) = case.drives
+    compared = np.isfinite(drive.measured["pressure"]).all(axis=1)
+    t = np.arange(drive.samples) * case.sample_s
+    assert compared[(t > 1.1) & (t < 2.9)].all()
+    assert not compared[(t > 3.0) & (t < 7.0)].any()
+    assert compared[t > 7.1].all()
+    assert "pressure" not in case.followed
+    (drive,) = prepare([log], 0.3).drives
+    assert np.isfinite(drive.measured["pressure"]).all()
