@@ -7,10 +7,12 @@ from hil.study.search.contest import Contender, instead, odds
 from hil.study.search.diagnosis import TIED
 from hil.study.search.field import Field, number_of
 from hil.study.search.onset import dated_anew, price, with_onsets
-from hil.study.search.screen import LEADERS, leaders
+from hil.study.search.screen import leaders
 
 _DATED = 2
 """Contenders for which it is asked when they begin before they are compared."""
+_LIKE = 8
+"""Others that are fitted from its beginning on: several act alike, and must be seen beside it."""
 _LIKELY = 4.0 * TIED
 """Twice the log of the odds, within which what begins when the best does is dated by itself."""
 
@@ -34,7 +36,7 @@ def with_its_like(fitter: Fitter, field: Field, model: Model, fitted: list[Conte
     tried = {number_of(c.term.candidate) for c in fitted if c.term.onset == best.term.onset}
     tried |= {number_of(term.candidate) for term in model.terms}
     listed = field.begun_at(fitter, bare, best.noise, best.term.onset)
-    top = leaders([item for item in listed if number_of(item.candidate) not in tried], LEADERS)
+    top = leaders([item for item in listed if number_of(item.candidate) not in tried], _LIKE)
     found = instead(fitter, best, [(item.candidate, item.value) for item in top], True)
     near = [one for one in found if odds(one) - odds(best) < _LIKELY]
     dated = {id(one): dated_anew(fitter, one.model, one.noise) for one in near}

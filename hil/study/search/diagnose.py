@@ -15,6 +15,7 @@ from hil.study.logs.table import Floats
 from hil.study.replay.rig import Rig
 from hil.study.replay.vehicle import Vehicle
 from hil.study.replay.world import World
+from hil.study.search.basis import Piece
 from hil.study.search.begun import since_when, with_its_like
 from hil.study.search.contest import Contender, Contest, from_the_best, instead, odds, refitted, worth
 from hil.study.search.diagnosis import Diagnosis, Say, Settings, causes_in
@@ -22,6 +23,7 @@ from hil.study.search.doubt import backward, erring, form_differs, stands_beside
 from hil.study.search.field import Field, number_of
 from hil.study.search.handed_in import Refitted, from_handed_in
 from hil.study.search.left_over import LeftOver
+from hil.study.search.one_for_all import one_for_all
 from hil.study.search.onset import with_onsets
 from hil.study.search.screen import LEADERS, Score, beside_best, inflation, leaders, not_testable, threshold
 from hil.study.search.unlisted import Round, Unlisted
@@ -86,6 +88,7 @@ class _Search:
                 around = model.z
                 continue
             found.contenders += [list_of] * (len(model.terms) - before)
+            model, noise = self._one_for_all(found, model, noise)
             self.say(f"accepted {model.terms[-1].candidate.name} = {model.terms[-1].value:.4g}; when it begins")
             model = with_onsets(self.fitter, model, noise)
             model = self._quieter(model, noise)
@@ -206,6 +209,19 @@ class _Search:
             (c for c in {*fitted, *clear} if c is not best and (c in clear or odds(c) >= odds(best))), key=odds
         )
         return polished, tighter, [replace(best, model=polished, term=polished.terms[-1]), *rest]
+
+    def _one_for_all(self, found: Diagnosis, model: Model, noise: Noise) -> tuple[Model, Noise]:
+        """The model, or one of a single cause that explains what all of its together do."""
+        listed = all(not isinstance(term.candidate, Piece) for term in model.terms)
+        if not (self.settings.relinearise and listed and causes_in(model) > 1):
+            return model, noise
+        self.say("one cause instead of all")
+        singles = one_for_all(self.fitter, self.field, found, model, noise)
+        if not singles:
+            return model, noise
+        found.contenders = [singles]
+        found.explained += model.cost - singles[0].cost
+        return self.fitter.settle(singles[0].model, noise, 2)
 
     def _errors(self, found: Diagnosis) -> Callable[[Contender, Contender], float]:
         """What the gain of a contender is divided by for what the model gets wrong here, seen beside the best one."""
