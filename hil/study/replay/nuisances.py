@@ -31,8 +31,8 @@ _LIFT = 0.1
 _THERMAL = {"friction_brake_heat_capacity_j_k": 0.2, "friction_brake_cooling_w_k": 0.3}
 """Heat store of the discs; where the friction does not depend on temperature it does not matter."""
 _MOST_WINDUP = 1.5
-"""Standard deviations that the damping of a standing wheel may be more: steps of 5 ms swing by themselves at twice that,
-and what a number seems to change there is chance (docs/decisions/0084)."""
+"""Standard deviations that the damping of a standing wheel may be more: at twice that steps of 5 ms swing by
+themselves, and what a number seems to change there is chance (docs/decisions/0084)."""
 _SIGNED = ("suspension_progression_n_m3", "suspension_brake_support_tangent", "suspension_roll_centre_height_m")
 """Numbers that a car may have of either sign."""
 
