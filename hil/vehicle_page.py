@@ -41,8 +41,9 @@ brake_gain_rear_nm_pa = 1.7e-4
 
 - A number without tolerance is taken to be known to a hundredth, one that is not given to what the tables say.
 - What stands once for each axle takes one number for both, or a list `[front, rear]`.
-- Of {sections} a set may say nothing at all: then no limit of theirs is simulated, and no demand is
-  compared with what became of it. One key of a section, and the shipped numbers stand for the rest of it.
+- Of {sections} a set may say nothing at all: then no limit of theirs is simulated, torques are not compared
+  with their demands, and pressures only where none has been asked for. One key of a section, and the shipped numbers
+  stand for the rest of it.
 - Without a `pad_` key the friction of the pads is one constant, which the brake gains contain.
 - Unknown keys are told in the remarks and left out.
 """
@@ -73,8 +74,8 @@ def _short(flat: Entries) -> list[str]:
     for short, name in ALIASES.items():
         if name not in SPECIAL:
             shorts.setdefault(name, []).append(short)
-    lines = ["", "## Short names", ""]
-    lines += ["| key | also | unit | shipped | +- where it is not given |", "|---|---|---|---|---|"]
+    lines = ["", "## Short names", "", "| key | also | unit | shipped | +- where it is not given |"]
+    lines.append("|---|---|---|---|---|")
     for name, also in shorts.items():
         first = next((one for one in also if name.endswith(one)), also[0])
         others = ", ".join(f"`{one}`" for one in (*also, name) if one != first)
