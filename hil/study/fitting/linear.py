@@ -33,6 +33,12 @@ class Sums:
             return np.asarray(self.matrix.sum(axis=0))
         return np.asarray(np.tensordot(weights, self.matrix, axes=1))
 
+    def since(self, manoeuvre: int) -> Floats:
+        """Sum over manoeuvres for columns that are nothing before this one; nuisances always are."""
+        total, later, own = self.total(), self.matrix[manoeuvre:].sum(axis=0), 1 + self.nuisances
+        total[own:], total[:, own:] = later[own:], later[:, own:]
+        return total
+
 
 def track_columns(
     rig: Rig, frame: Frame, base: Stack, worlds: Sequence[World], steps: Sequence[float]

@@ -96,7 +96,7 @@ def prepare(logs: Sequence[Log], radius_m: float, unstated: Collection[str] = ()
             groups.remove(name)  # nothing simulates it
     rate = max(float(np.median(np.diff(log.t_s))) for log in logs)
     stride = max(2, int(np.ceil(rate / ROW_S - 0.2)))
-    followed = tuple(name for name in ("pressure", "motor") if not (name == "pressure" and "ehb" in unstated))
+    followed = ("motor",) if "ehb" in unstated else ("pressure", "motor")
     drives = tuple(replace(_drive(log, groups, stride, radius_m, followed), number=k) for k, log in enumerate(logs))
     moving = sum(float(drive.moving.sum()) for drive in drives) * stride * ROW_S
     if moving < 4.0:

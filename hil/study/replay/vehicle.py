@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,12 @@ _HELD_KG_M2 = 1e12
 """Yaw inertia of a car that cannot turn."""
 _TURNING = ("vehicle_yaw_inertia_kg_m2", "vehicle_steering_ratio", "tyre_lky")
 _OF_STEERING = ("steer_lateral",)
+_KNOWN = sorted({*ALIASES, *DERIVED, *SPECIAL, *PARAMETER.sizes})
+_THEN = {
+    "ehb": "pressures are compared only where none has been asked for a while",
+    "motor": "torques of the motors are not compared with what is asked of them",
+}
+"""What follows where a set says nothing of a section."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +123,9 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
         name = ALIASES.get(stem, stem)
         if name not in SPECIAL and name not in PARAMETER.sizes:
             if not isinstance(value, str):
-                remarks.append(f"{where}: unknown key {key!r} is left out")
+                near = get_close_matches(stem, _KNOWN, 1)
+                hint = f"; did you mean {near[0]!r}?" if near else ""
+                remarks.append(f"{where}: unknown key {key!r} is left out{hint}")
             continue
         if key != stem and isinstance(value, int | float):
             tolerances[name] = float(value)
@@ -133,8 +142,8 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
             shipped.pop(f"{section}_{name}", None)
     if unlimited:
         remarks.append(
-            f"{where}: nothing said of {', '.join(unlimited)}, so no limits of theirs are simulated "
-            "and no demand is compared, but that for no pressure"
+            f"{where}: nothing said of {', '.join(unlimited)}, so no limits of theirs are simulated"
+            + "".join(f"; {_THEN[section]}" for section in unlimited if section in _THEN)
         )
     parameters = override(base, changes, where)
     friction = any(name.startswith("pad_") for name in numbers)

@@ -141,7 +141,7 @@ class _Search:
     ) -> tuple[list[Contender], tuple[Model, Noise]]:
         """Contenders for a cause of a model fitted from the car as handed in, too; see there."""
         self.say("once more from the car as handed in")
-        found, without = from_handed_in(self.numbers, fitted, model.terms, with_fit, reference, anew)
+        found, without = from_handed_in(self.numbers, fitted, model, with_fit, reference, anew)
         self.rig.quieten(self.fitter.world(model.z, model.terms))
         return found, without
 

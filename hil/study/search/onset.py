@@ -1,5 +1,6 @@
 """When a cause begins: at the manoeuvre from which on it is seen, then to the time within."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -58,6 +59,12 @@ def price(frame: Frame) -> float:
 def begins(case: Case) -> list[Moment]:
     """When each manoeuvre begins."""
     return [(drive, segment.first * ROW_S) for drive, segment in case.segments]
+
+
+def nearest(starts: Sequence[Moment], moment: Moment) -> int:
+    """Number of the manoeuvre, of the same drive, that begins nearest to a moment."""
+    drive, since_s = moment
+    return min((abs(start - since_s), number) for number, (of, start) in enumerate(starts) if of == drive)[1]
 
 
 def _later(fitter: Fitter, model: Model, noise: Noise, k: int) -> Model | None:

@@ -13,6 +13,7 @@ from hil.study.search.basis import Piece, shown
 from hil.study.search.contest import Contender, odds
 from hil.study.search.diagnosis import TIED, Diagnosis
 from hil.study.search.intervals import half_width, intervals
+from hil.study.search.onset import begins, nearest
 from hil.study.verdict.decide import decide_with, write
 from hil.study.verdict.measure import Gain, probabilities
 from hil.study.verdict.patterns import WORDS, Wrong
@@ -42,7 +43,7 @@ def answer(
     """Put the answer together; manoeuvres to drive next are written into ``out``."""
     causes, tied = _causes(found), _tied(found)
     fitted = _rivals(found)
-    rivals = [_rival(c, p) for c, p in fitted]
+    rivals = [_rival(found, c, p) for c, p in fitted]
     known = {c["effect"] for c in (*causes, *rivals)}
     rivals += [entry for entry in _imitations(found, tied) if entry["effect"] not in known]
     verdict = _verdict(found, causes, tied)
@@ -150,7 +151,7 @@ def _rivals(found: Diagnosis) -> list[tuple[Contender, float]]:
     return rivals
 
 
-def _rival(contender: Contender, chance: float) -> dict[str, Any]:
+def _rival(found: Diagnosis, contender: Contender, chance: float) -> dict[str, Any]:
     candidate, value = contender.term.candidate, contender.term.value
     half = half_width(candidate, value, max(contender.information, 1e-30) ** -0.5)
     return {
@@ -161,18 +162,17 @@ def _rival(contender: Contender, chance: float) -> dict[str, Any]:
                 "value": value, "unit": candidate.parameter.unit, "ci95": [value - half, value + half],
             }
         },
-        "probability": chance, "onset": None, "onset_s": None, "variables": [], "curve": [],
+        "probability": chance, **_onset(found, contender.term), "variables": [], "curve": [],
     }  # fmt: skip
 
 
 def _tied(found: Diagnosis) -> Tied | None:
-    """What imitates the first cause within the noise, from the joint information of the data."""
+    """What imitates the first cause within the noise, from the joint information of the data; begun when it is."""
     if not found.final.terms or found.sums is None or isinstance(found.final.terms[0].candidate, Piece):
         return None
     term, listed = found.final.terms[0], [score.candidate for score in found.screened]
-    projected = project(
-        found.sums.total(), found.sums.nuisances, (), found.base.z, found.fitter.at_their_end(found.base.z)
-    )
+    total = found.sums.total() if term.onset is None else found.sums.since(nearest(begins(found.case), term.onset))
+    projected = project(total, found.sums.nuisances, (), found.base.z, found.fitter.at_their_end(found.base.z))
     return tied_set(projected.q, listed, listed.index(term.candidate), term.value)
 
 
@@ -186,9 +186,11 @@ def _imitations(found: Diagnosis, tied: Tied | None) -> list[dict[str, Any]]:
     for index in tied.indices:
         score = found.screened[index]
         value = together.get(index, score.value)
-        contender = Contender(Term(score.candidate, value), found.base, 0.0, 0.0, score.information, found.noise)
+        term = Term(score.candidate, value, found.final.terms[0].onset)
+        contender = Contender(term, found.base, 0.0, 0.0, score.information, found.noise)
         odds_against = float(np.exp(-0.5 * apart[index] ** 2))
-        entries.setdefault(score.candidate.effect.name, _rival(contender, odds_against / (1.0 + odds_against)))
+        chance = odds_against / (1.0 + odds_against)
+        entries.setdefault(score.candidate.effect.name, _rival(found, contender, chance))
     return list(entries.values())
 
 

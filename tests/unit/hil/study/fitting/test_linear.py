@@ -43,13 +43,17 @@ def test_a_signature_from_a_manoeuvre_on_is_one_that_is_nothing_before(seed, beg
     rng, z = np.random.default_rng(seed), np.array([0.4, 3.0, -0.2])
     manoeuvres = rng.standard_normal((4, 50, 1 + NUISANCES + COLUMNS))
     matrix = np.stack([rows.T @ rows for rows in manoeuvres])
-    b, q = project_later(Sums(matrix, NUISANCES, 200, 0.0), [[0], [1], [0, 1]], (), z, [1])
+    summed = Sums(matrix, NUISANCES, 200, 0.0)
+    b, q = project_later(summed, [[0], [1], [0, 1]], (), z, [1])
     cut = manoeuvres.copy()
     cut[:begin, :, 1 + NUISANCES :] = 0.0
     joined = cut.reshape(200, -1)
     expected = project(joined.T @ joined, NUISANCES, z=z, held=[1])
     assert b[begin] == pytest.approx([*expected.b, expected.b.sum()], rel=1e-6, abs=1e-6)
     assert q[begin] == pytest.approx([*np.diag(expected.q), expected.q.sum()], rel=1e-6, abs=1e-6)
+    together = project(summed.since(begin), NUISANCES, z=z, held=[1])
+    assert together.q == pytest.approx(expected.q, rel=1e-6, abs=1e-6)
+    assert together.b == pytest.approx(expected.b, rel=1e-6, abs=1e-6)
 
 
 @given(seed=st.integers(0, 10_000))

@@ -33,6 +33,9 @@ def test_six_numbers_make_a_car_with_a_constant_brake_gain() -> None:
 
 def test_an_unknown_key_is_told_not_refused() -> None:
     assert any("'colour'" in text for text in load_vehicle({**SIX, "colour": 3.0}).remarks)
+    near = load_vehicle({**SIX, "wheel_inertia_kg_m": 1.0, "cog_hight_m_tolerance": 0.02}).remarks
+    assert any("'wheel_inertia_kg_m' is left out; did you mean 'wheel_inertia_kg_m2'?" in text for text in near)
+    assert any("did you mean 'cog_height_m'?" in text for text in near)
 
 
 def test_a_tolerance_is_two_standard_deviations() -> None:
@@ -72,9 +75,12 @@ def test_what_a_set_says_nothing_of_is_not_judged() -> None:
     car = load_vehicle(SIX)
     assert {"ehb_dead_time", "motor_tau", "battery_soc"} <= set(car.untold)
     assert car.parameters.motor.peak_torque_nm > 2000.0
-    assert any("nothing said of ehb, motor, battery" in text for text in car.remarks)
+    said = next(text for text in car.remarks if "nothing said of ehb, motor, battery" in text)
+    assert "pressures are compared only where none" in said
+    assert "torques of the motors are not compared" in said
     told = load_vehicle({**SIX, "ehb_dead_time_s": 0.02, "motor_peak_torque_nm": 400.0, "tyre_lkx": 1.0})
     assert set(told.untold) == {"battery_soc"}
+    assert not any("compared" in text for text in told.remarks)
     assert told.parameters.motor.peak_torque_nm == 400.0
     assert paper_car().unstated == ()
 

@@ -38,7 +38,7 @@ def test_pads_that_brake_gains_stood_in_for_are_found():
     begun = numbers.fitter.at(bent.z, (Term(pads, 0.0),), noise)
     stuck = refitted(Contender(begun.terms[0], begun, begun.cost, 0.0, 1.0, noise), begun, noise)
     fitter = numbers.fitter
-    (found,), (without, _) = from_handed_in(numbers, [stuck], (), refitted, stuck.cost, anew=1)
+    (found,), (without, _) = from_handed_in(numbers, [stuck], bent, refitted, stuck.cost, anew=1)
     assert numbers.fitter is fitter
     assert found.term.value == pytest.approx(WEAKER, abs=0.02)
     assert odds(found) < odds(stuck)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from hil.study.likelihood.noise import Frame
 from hil.study.logs.case import Segment
-from hil.study.search.onset import begin_of, moments_of, price
+from hil.study.search.onset import begin_of, moments_of, nearest, price
 
 
 def _products(value: float, begin: int, strength: list[float], seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -49,3 +49,9 @@ def test_a_beginning_is_looked_for_in_both_manoeuvres_it_may_lie_in():
     apart = moments_of((0, before), (1, elsewhere))
     assert [max(t for drive, t in apart if drive == k) for k in (0, 1)] == [8.0, 6.0]
     assert [min(t for drive, t in apart if drive == k) for k in (0, 1)] == [0.0, 0.0]
+
+
+def test_the_manoeuvre_nearest_to_a_moment_is_of_its_own_drive():
+    starts = [(0, 0.0), (0, 30.0), (1, 10.0)]
+    moments = [(0, 1.0), (0, 14.0), (0, 16.0), (0, 99.0), (1, 0.0)]
+    assert [nearest(starts, moment) for moment in moments] == [0, 0, 1, 1, 2]
