@@ -9,7 +9,10 @@ from plant.effects.effect import NODES, Effect, Parameter, Scope
 from plant.effects.theta import THETA
 
 _SHARE = 0.05
-_SHARES = {"sus_compliance": 0.5, "regen_fadeout": 0.6, "pressure_hysteresis": 0.5, "stuck_corner": 0.5}
+_SHARES = {
+    ("sus_compliance", "compliance_m_n"): 0.5, ("regen_fadeout", "speed_mps"): 0.6,
+    ("pressure_hysteresis", "half_width_pa"): 0.5, ("stuck_corner", "held_pa"): 0.5,
+}  # fmt: skip
 """Of what is usual, for a finite difference; stiffer hubs would swing too fast for the replay's steps, motors are not
 compared just above the speed where they fade, a play narrower than what is left of noise in the measured pressures
 follows that, and a pressure that is held does nothing below the threshold."""
@@ -52,7 +55,7 @@ class Column:
     @property
     def step(self) -> float:
         """A small share of what is met on real cars, on the side that is allowed: many effects show long before."""
-        share = _SHARES.get(self.effect.name, _SHARE)
+        share = _SHARES.get((self.effect.name, self.parameter.name), _SHARE)
         return self.parameter.typical * share if self.parameter.typical else 0.3 * share * self.parameter.high
 
     def stepped(self, world: World) -> World:

@@ -155,6 +155,23 @@ class Fitter:
                 break
         return best
 
+    def sized(self, model: Model, noise: Noise, steps: int = 2) -> Model:
+        """The model with the value of its last effect where that explains most, all else as it is."""
+        for _ in range(steps):
+            own = self.term_columns(model)
+            joined = {name: np.hstack([values, own[name][:, -1:]]) for name, values in model.residual.items()}
+            innovations, _ = whiten(joined, self.frame, noise)
+            left, shown = np.concatenate([innovations[name] for name in self.frame.names]).T
+            *others, term = model.terms
+            step = float(np.clip(left, -HUBER, HUBER) @ shown) / max(float(shown @ shown), 1e-30)
+            parameter = term.candidate.parameter
+            value = float(np.clip(term.value + step, parameter.low, parameter.high))
+            moved = self.at(model.z, (*others, replace(term, value=value)), noise)
+            if moved.cost >= model.cost - _WORTH:
+                break
+            model = moved
+        return model
+
     def _step(self, model: Model, own: Tracks, noise: Noise) -> Model | None:
         total = self._total(model, own, noise)
         for hold, damping in _ATTEMPTS if self._limits else _ATTEMPTS[1:]:

@@ -21,7 +21,9 @@ from hil.study.logs.table import (
 )
 from plant.vectors import CUT, INPUT, U
 
-SETTLE_S = 1.0
+SETTLE_S, _RINGS_S = 1.0, 2.0
+"""For how long what begins or ends is not compared; and a car that came to rest, which rings on its brakes and springs:
+when it stopped, to the hundredth, would matter more than all that was before (docs/decisions/0085)."""
 SHORTEST_S, LONGEST_S, TURNING_S = 8.0, 25.0, 3.0
 STRAIGHT_RAD = 0.02  # of the steering wheel
 _RELEASED_PA, _RELEASED_NM = 1e5, 20.0
@@ -221,7 +223,8 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float, follow
     slow = averaged(speed[:, None], stride)[:, 0]
     after = max(int(SETTLE_S / (stride * ROW_S)), 1)
     near_stop = np.convolve(slow < SLOW_MPS, np.ones(2 * after + 1), mode="same") > 0.5
-    resting = np.convolve(slow > 0.02, np.ones(2 * after + 1), mode="same") < 0.5
+    rings = max(int(_RINGS_S / (stride * ROW_S)), 1)
+    resting = np.convolve(slow > 0.02, np.ones(2 * rings + 1), mode="same") < 0.5
     resting[: 2 * after] = False  # the simulated body first sinks into its springs
     return Drive(
         log,

@@ -72,7 +72,7 @@ def instead(
     def placed(other: tuple[Candidate, float]) -> Contender:
         candidate, value = other
         terms = (*best.model.terms[:-1], replace(best.term, candidate=candidate, value=value))
-        model = fitter.at(best.model.z, terms, best.noise)
+        model = fitter.sized(fitter.at(best.model.z, terms, best.noise), best.noise)
         return refitted(best, fitter.fit(model, best.noise, 3, relinearise), best.noise)
 
     return Contest.at_once(placed, others)

@@ -137,11 +137,12 @@ class _Search:
         return self.settings.relinearise and not model.terms and strain(model.z) >= STRAINED
 
     def _from_handed_in(
-        self, model: Model, fitted: Sequence[Contender], with_fit: Refitted, reference: float, anew: int
-    ) -> tuple[list[Contender], tuple[Model, Noise]]:
+        self, model: Model, fitted: Sequence[Contender], with_fit: Refitted, reference: float, anew: int,
+        best: float = np.inf,
+    ) -> tuple[list[Contender], tuple[Model, Noise]]:  # fmt: skip
         """Contenders for a cause of a model fitted from the car as handed in, too; see there."""
         self.say("once more from the car as handed in")
-        found, without = from_handed_in(self.numbers, fitted, model, with_fit, reference, anew)
+        found, without = from_handed_in(self.numbers, fitted, model, with_fit, reference, anew, best)
         self.rig.quieten(self.fitter.world(model.z, model.terms))
         return found, without
 
@@ -255,8 +256,7 @@ class _Search:
         if _most(top, left) < _POOR * least:
             return None
         self.say(f"fitting {len(top)} leaders")
-        fitted = contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
-        return contest, top, from_the_best(self.fitter, fitted) if self.settings.relinearise else fitted
+        return contest, top, contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
 
     def _fitted_again(
         self, model: Model, fitted: list[Contender], top: list[Score], reference: float

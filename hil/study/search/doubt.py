@@ -16,7 +16,7 @@ from hil.study.search.diagnosis import TIED, Diagnosis, Say, causes_in
 from hil.study.search.intervals import deviations
 from hil.study.search.screen import threshold
 
-_FORM_DIFFERS = 1.5
+_FORM_DIFFERS = 4.0
 """Strain beyond which the car of the logs is of another form than the model's, as one of a page is: numbers that nobody
 stated went far. Drives of the independent car: 0.6 to 1.3 (docs/decisions/0073)."""
 _SURE = 0.05

@@ -14,37 +14,53 @@ from hil.study.likelihood.noise import Noise
 from hil.study.search.contest import Contender, Contest, odds
 
 _ROUNDS, _RIVAL = 3, 1.0 / 3.0
+_FIRST = 2
+"""How many of the best are fitted before the others, which go on while they explain a third of what those do."""
 Refitted = Callable[[Contender, Model, Noise], Contender]
 
 
 def from_handed_in(
-    numbers: Numbers, fitted: Sequence[Contender], beside: Model, refitted: Refitted, reference: float, anew: int
-) -> tuple[list[Contender], tuple[Model, Noise]]:
+    numbers: Numbers, fitted: Sequence[Contender], beside: Model, refitted: Refitted, reference: float, anew: int,
+    best: float = np.inf,
+) -> tuple[list[Contender], tuple[Model, Noise]]:  # fmt: skip
     """The same contenders, each fitted from the car as handed in where that explains more; the best fit without any.
 
-    So many of the best (one or more), if they take a third as much off the ``reference`` as the very best, get
-    sensitivities ``anew`` where their numbers are far from those of the model that is ``beside`` them. With those the
-    numbers are fitted without them, too. ``refitted`` gives a contender with another model and noise.
+    What takes less than a third as much off the ``reference`` as the very best (or others, whose odds are ``best``) is
+    not followed to its end. So many of the others (one or more) get sensitivities ``anew`` where their numbers are far
+    from those of the model that is ``beside`` them. With those the numbers are fitted without them, too. ``refitted``
+    gives a contender with another model and noise.
     """
     fitter = numbers.fitter
 
-    def again(one: Contender) -> Contender:
+    def near(one: Contender, best: float) -> bool:
+        return odds(one) <= reference - _RIVAL * max(reference - best, 0.0)
+
+    def again(one: Contender, best: float) -> Contender:
         own, noise = fitter.copied(), one.noise
         model = own.at(np.zeros(len(numbers.nuisances)), one.model.terms, noise)
-        for _ in range(_ROUNDS):
-            model = own.fit(model, noise, 4, follow=True)
-            if model.cost >= one.cost and strain(one.model.z) < STRAINED:
-                return one  # numbers that are not bent are found from either side
+        model = own.fit(model, noise, 4, follow=True)
+        begun = refitted(one, model, noise)
+        if strain(one.model.z) < STRAINED and begun.cost >= one.cost:
+            return one  # numbers that are not bent are found from either side
+        if not near(begun, best):
+            return min(one, begun, key=odds)
+        for _ in range(_ROUNDS - 1):
             noise = own.estimated(model, noise)
+            model = own.fit(model, noise, 4, follow=True)
+        noise = own.estimated(model, noise)
         return min(one, refitted(one, own.fit(model, noise, 2), noise), key=odds)
 
-    found, bare = Contest.at_once(again, fitted), []
-    leading = sorted(range(len(found)), key=lambda k: odds(found[k]))[:anew]
-    least = reference - _RIVAL * max(reference - odds(found[leading[0]]), 0.0)
+    order = sorted(range(len(fitted)), key=lambda k: odds(fitted[k]))
+    found = dict(zip(order, Contest.at_once(lambda k: again(fitted[k], best), order[:_FIRST]), strict=False))
+    best = min(best, *map(odds, found.values()))
+    rest = order[_FIRST:]
+    found |= dict(zip(rest, Contest.at_once(lambda k: again(fitted[k], best), rest), strict=True))
+    leading = sorted(order, key=lambda k: odds(found[k]))[:anew]
+    best, bare = min(best, odds(found[leading[0]])), []
     for k in leading:
         one = found[k]
-        far = strain(one.model.z) >= STRAINED or numbers.went_far(one.model, beside.z)
-        if k != leading[0] and not (far and odds(one) <= least):
+        far = near(one, best) and (strain(one.model.z) >= STRAINED or numbers.went_far(one.model, beside.z))
+        if k != leading[0] and not far:
             continue
         model, noise = one.model, one.noise
         if far:
@@ -58,4 +74,4 @@ def from_handed_in(
         without = numbers.fitter.fit(numbers.fitter.at(model.z, beside.terms, noise), noise, 6)
         bare.append(numbers.fitter.settle(without, noise, 2))
     numbers.fitter = fitter
-    return found, min(bare, key=lambda fit: fit[0].cost)
+    return [found[k] for k in range(len(fitted))], min(bare, key=lambda fit: fit[0].cost)

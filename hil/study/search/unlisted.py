@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from hil.study.fitting.fit import Model
 from hil.study.fitting.numbers import Numbers
 from hil.study.fitting.own_error import variance_of_law
@@ -18,7 +20,7 @@ _CLEARER = 5.0
 """By how much more than the best listed cause a law in no list must explain, log of the odds."""
 _BESIDE, _TRIED = 4, 2
 """Laws that are looked at with noise of their own; and fitted, where the vehicle's numbers go far."""
-Again = Callable[[Model, Sequence[Contender], Refitted, float, int], tuple[list[Contender], tuple[Model, Noise]]]
+Again = Callable[[Model, Sequence[Contender], Refitted, float, int, float], tuple[list[Contender], tuple[Model, Noise]]]
 """Fits contenders from the car as handed in, too (`hil.study.search.handed_in`)."""
 
 
@@ -72,7 +74,7 @@ class Unlisted:
 
         if now.bent:
             tried = [replayed(one) for one in sorted(seen, key=odds)[:_TRIED]]
-            seen, without = self._again(model, tried, refitted_law, reference, 1)
+            seen, without = self._again(model, tried, refitted_law, reference, 1, odds(now.listed))
             reference = min(reference, without[0].cost)
         law = min(seen, key=odds)
         best = entries[law.term.candidate.name]
@@ -85,7 +87,7 @@ class Unlisted:
             return gained >= least * now.error(law, law) and 0.5 * (reference - odds(law)) >= rival + _CLEARER
 
         if ahead() and self._settings.relinearise and not now.bent:
-            (law,), without = self._again(model, [replayed(law)], refitted_law, reference, 1)
+            (law,), without = self._again(model, [replayed(law)], refitted_law, reference, 1, np.inf)
             reference = min(reference, without[0].cost)
         if not ahead():
             return None

@@ -70,6 +70,14 @@ def test_a_fit_that_stopped_on_its_way_goes_on_from_where_the_best_ended(driven)
     assert further.term.value > 0.5
 
 
+def test_what_acts_alike_needs_no_fit_once_its_value_is_found(driven):
+    best = driven.contender(driven.fitted(["residual_drag@fl"], [20.0], 8), driven.noise)
+    begun = driven.fitter.at(best.model.z, [Term(driven.candidate("rolling_resistance@fl"), 0.01)], driven.noise)
+    sized = driven.fitter.sized(begun, driven.noise)
+    assert (sized.z == best.model.z).all()
+    assert sized.cost - best.cost < 0.2 * (begun.cost - best.cost)
+
+
 def _singles(driven: _Driven, names: Sequence[str], values: Sequence[float]) -> list[Contender]:
     """Single causes that would take the place of these."""
     model = driven.fitted(names, values, 8)

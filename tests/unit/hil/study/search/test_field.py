@@ -1,0 +1,46 @@
+"""What candidates show: two names of one weak brake show the same, up to a stop and after it."""
+
+import numpy as np
+import pytest
+from outsider import VEHICLE
+
+from hil.study.fitting.linear import track_columns
+from hil.study.likelihood.noise import Frame
+from hil.study.logs.prepare import prepare
+from hil.study.logs.table import make_log
+from hil.study.replay.rig import Rig
+from hil.study.replay.vehicle import load_vehicle
+from hil.study.replay.world import nominal
+from hil.study.search.field import Field
+
+WHEELS = ("fl", "fr", "rl", "rr")
+
+
+def _alike(log, one: str, other: str) -> float:
+    """Cosine of two signatures in the acceleration, where that is compared."""
+    vehicle = load_vehicle(VEHICLE)
+    case = prepare([log], 0.318)
+    rig, frame, base = Rig(case, vehicle).quieted(nominal(vehicle)), Frame.of(case), nominal(vehicle)
+    listed = {candidate.name: candidate for candidate in Field(rig, frame, ()).candidates}
+    shown = []
+    for name in (one, other):
+        candidate = listed[name]
+        step = 0.05 * candidate.parameter.typical
+        columns = track_columns(rig, frame, rig.run(base), [candidate.applied(base, step)], [step])
+        shown.append(np.where(frame.present["ax"].ravel() > 0.5, columns["ax"][:, 0], 0.0))
+    a, b = shown
+    return float(a @ b / np.sqrt((a @ a) * (b @ b)))
+
+
+@pytest.mark.parametrize(("rings_s", "alike"), [(None, True), (1.0, False)])
+def test_a_car_that_rings_at_a_stop_does_not_tell_two_names_of_one_brake_apart(monkeypatch, rings_s, alike):
+    """The simulated car stops 0.2 s after the measured one: compared a second later, it rings."""
+    if rings_s is not None:
+        monkeypatch.setattr("hil.study.logs.prepare._RINGS_S", rings_s)
+    t = np.arange(1800) * 0.01
+    speed = np.clip(20.0 - 3.0 * np.clip(t - 1.0, 0.0, None), 0.0, None)
+    channels = {f"wheel_speed_{w}_rad_s": speed / 0.318 for w in WHEELS}
+    channels |= {"ax_mps2": np.gradient(speed, t), "speed_mps": speed}
+    channels |= {f"pressure_{w}_pa": 17e5 * np.clip((t - 1.0) / 0.2, 0.0, 1.0) for w in WHEELS}
+    cosine = _alike(make_log("log", t, channels), "pad_mu_gain@front", "stuck_corner.loss@front")
+    assert (abs(cosine) > 0.999) is alike
