@@ -85,7 +85,7 @@ _MISSED = (
     ("pitch_dive", 15154224, "curves of tyre and springs that no set states do the same"),
     ("residual_drag", 14495151, "rolling resistance of that wheel: 2.2 to 3.3 deviations apart"),
     ("pressure_location", 14495151, "2.4 ms are within what a latency may be that no set states (2 ms)"),
-    ("bedding", 1903544, "all four brakes: the car's numbers alone, fitted from where it ended, explain as much"),
+    ("bedding", 1903544, "all four brakes; why is not known: 3.8 of 28.4 asked once the search began again"),
 )
 
 
