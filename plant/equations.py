@@ -29,11 +29,10 @@ def road_wheel_angle(u: Vector, p: Vector, y: Vector) -> float:
 
 
 @equation
-def over_the_road(x: Vector, u: Vector, p: Vector, road: Vector, y: Vector) -> None:
+def over_the_road(
+    x: Vector, p: Vector, road: Vector, y: Vector, cos_yaw: float, sin_yaw: float, cos_steer: float, sin_steer: float
+) -> None:
     """Velocity of each contact in its wheel's axes and the road's friction under it."""
-    cos_yaw, sin_yaw = cos(x[X.yaw_rad]), sin(x[X.yaw_rad])
-    steer = road_wheel_angle(u, p, y)
-    cos_steer, sin_steer = cos(steer), sin(steer)
     for i in range(4):
         axle = 0 if i < 2 else 1
         wheel_x = p[P.vehicle_cog_to_axle_m] if i < 2 else -p[P.vehicle_cog_to_axle_m + 1]
@@ -49,15 +48,16 @@ def over_the_road(x: Vector, u: Vector, p: Vector, road: Vector, y: Vector) -> N
 
 
 @equation
-def body(x: Vector, u: Vector, p: Vector, y: Vector, cos_grade: float, sin_grade: float) -> None:
+def body(
+    x: Vector, p: Vector, y: Vector, cos_grade: float, sin_grade: float, cos_yaw: float, sin_yaw: float,
+    cos_steer: float, sin_steer: float,
+) -> None:  # fmt: skip
     """Rates of the body and of the inertial measurement unit, from the forces at the wheels."""
     mass = p[P.vehicle_mass_kg]
     height = p[P.vehicle_cog_height_m]
     speed, lateral, yaw_rate = x[X.speed_mps], x[X.lateral_speed_mps], x[X.yaw_rate_rad_s]
     pitch, roll = x[X.pitch_rad], x[X.roll_rad]
-    steer = road_wheel_angle(u, p, y)
     against_air = at_car(speed, y, J.air_speed)
-    cos_steer, sin_steer = cos(steer), sin(steer)
     aero = dynamic_pressure_area(against_air, p[P.vehicle_air_density_kg_m3], p[P.vehicle_frontal_area_m2])
     drag = p[P.vehicle_drag_coefficient] * aero
     sum_x, sum_y, sum_yaw, sum_up, sum_pitch, sum_roll = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -80,7 +80,6 @@ def body(x: Vector, u: Vector, p: Vector, y: Vector, cos_grade: float, sin_grade
     rate = Y.rate
     specific_x, specific_y = at_car(sum_x - drag, y, J.body_force) / mass, sum_y / mass
     sprung = mass - p[P.vehicle_unsprung_mass_kg] - p[P.vehicle_unsprung_mass_kg + 1]
-    cos_yaw, sin_yaw = cos(x[X.yaw_rad]), sin(x[X.yaw_rad])
     y[rate + X.x_m] = speed * cos_yaw - lateral * sin_yaw
     y[rate + X.y_m] = speed * sin_yaw + lateral * cos_yaw
     y[rate + X.yaw_rad] = yaw_rate
@@ -126,9 +125,9 @@ def energy(x: Vector, p: Vector, y: Vector) -> None:
 
 
 @equation
-def sensed(x: Vector, y: Vector, wheels: int) -> None:
-    """What the sensors of the wheels stand at."""
-    for i in range(wheels):
+def sensed(x: Vector, y: Vector) -> None:
+    """What the sensors of the wheels stand at, from the other outputs."""
+    for i in range(4):
         y[Y.sensed_wheel_speed_rad_s + i] = at_wheel(x[X.wheel_speed_rad_s + i], y, J.sensor_wheel_speed, i)
         y[Y.sensed_pressure_pa + i] = at_wheel(y[Y.pressure_pa + i], y, J.sensor_pressure, i)
         y[Y.sensed_motor_nm + i] = at_wheel(y[Y.motor_current_nm + i], y, J.sensor_motor_torque, i)
@@ -136,7 +135,7 @@ def sensed(x: Vector, y: Vector, wheels: int) -> None:
 
 @block
 def derivative(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, y: Vector) -> None:
-    """Rates of change of the continuous state, in ``y.rate``, and all outputs.
+    """Rates of change of the continuous state, in ``y.rate``, and all outputs but those of `sensed`.
 
     Parameters
     ----------
@@ -149,11 +148,12 @@ def derivative(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, roa
     slope = at_car(road[segment_at(road, x[X.x_m]), 3], y, J.road_grade)
     cos_grade = 1.0 / sqrt(1.0 + slope * slope)
     y[Y.grade] = slope
-    over_the_road(x, u, p, road, y)
+    yaw, steer = x[X.yaw_rad], road_wheel_angle(u, p, y)
+    cos_yaw, sin_yaw, cos_steer, sin_steer = cos(yaw), sin(yaw), cos(steer), sin(steer)
+    over_the_road(x, p, road, y, cos_yaw, sin_yaw, cos_steer, sin_steer)
     brakes(x, u, cut, p, y, wheels)
     motors(x, u, cut, switch, p, y, wheels)
     contacts(x, u, cut, p, y, cos_grade, wheels)
-    body(x, u, p, y, cos_grade, slope * cos_grade)
+    body(x, p, y, cos_grade, slope * cos_grade, cos_yaw, sin_yaw, cos_steer, sin_steer)
     energy(x, p, y)
-    sensed(x, y, wheels)
     after(x, u, p, y)

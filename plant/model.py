@@ -12,7 +12,7 @@ from plant.effects import apply
 from plant.effects.bank import NO_TERMS
 from plant.effects.plugin import NO_PLUGINS
 from plant.effects.theta import THETA
-from plant.equations import derivative
+from plant.equations import derivative, sensed
 from plant.friction import mu_equilibrium
 from plant.integrate import (
     EXPONENTIAL_4,
@@ -141,6 +141,7 @@ def simulate(
         if columns.size > 0:
             if columns.max() >= x.size:  # an output, not a state
                 derivative(x, now, cut, switch, q, road, y)
+                sensed(x, y)
             for k in range(columns.size):
                 table[row, k] = x[columns[k]] if columns[k] < x.size else y[columns[k] - x.size]
         step = 0
@@ -166,6 +167,7 @@ def simulate(
             count_teeth(x, angles, long_s, 2.0 * pi / p[P.sensor_teeth])
             step += together
     derivative(x, now, cut, switch, q, road, y)
+    sensed(x, y)
 
 
 def advance(

@@ -30,6 +30,8 @@ _WORTH = 1.0
 """A step that takes less off the cost is the last."""
 _FOLLOWED = 0.5
 """A step of less, in standard deviations, says too little of how sensitivities change."""
+_ALIKE = 0.2
+"""Share by which an effect may change and its sensitivity be what it was."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +58,13 @@ class Model:
     def values(self) -> list[float]:
         """Values of the effects."""
         return [term.value for term in self.terms]
+
+
+def _far(taken: Model, now: Model) -> bool:
+    """Whether effects act otherwise now than where their sensitivities were taken."""
+    before, after = np.array(taken.values()), np.array(now.values())
+    moved = np.abs(after - before) > _ALIKE * np.maximum(np.abs(before), np.abs(after))
+    return bool(moved.any() or np.abs(now.z - taken.z).max(initial=0.0) > _FOLLOWED)
 
 
 def with_term(world: World, term: Term) -> World:
@@ -141,9 +150,10 @@ class Fitter:
         the steps made.
         """
         best = replace(model, cost=self.cost(model.residual, model.z, noise))
-        for step in range(steps):
-            if best.terms and (own is None or (relinearise and step)):
-                own = self.term_columns(best)
+        taken = best
+        for _ in range(steps):
+            if best.terms and (own is None or (relinearise and _far(taken, best))):
+                own, taken = self.term_columns(best), best
             moved = self._step(best, own or {}, noise)
             if moved is None:
                 break

@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cache
+from threading import Semaphore
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +46,16 @@ _INPUTS = (("pressure", "pressure_pa"), ("motor", "motor_torque_nm"))
 _SMOOTH = 21  # rows of 10 ms
 _FADING_MPS, _LEAST_NM = 0.3, 1.0
 _GRADE, _TURNS_MPS2, _CHARACTERISTIC_MPS = 0.01, 0.3, (8.0, 200.0)
+
+
+_FREE = Semaphore(max(WORKERS - 1, 0))
+"""Processors that may be idle while a thread replays."""
+
+
+@cache
+def _idle() -> ThreadPoolExecutor:
+    """Threads that replay drives for others."""
+    return ThreadPoolExecutor(WORKERS)
 
 
 def _radius_m(world: World) -> Floats:
@@ -211,9 +223,14 @@ class Rig:
         return {group: np.concatenate([part[group] for part in parts]) for group in self._groups}
 
     def run(self, world: World) -> Stack:
-        """Simulated channels of all drives."""
+        """Simulated channels of all drives; these over threads where processors are idle."""
         self.runs += 1
-        parts = [self._drive(drive, world) for drive in self.case.drives]
+        of_drives = _idle().map if (helped := _FREE.acquire(blocking=False)) else map
+        try:
+            parts = list(of_drives(lambda drive: self._drive(drive, world), self.case.drives))
+        finally:
+            if helped:
+                _FREE.release()
         return {group: np.concatenate([part[group] for part in parts]) for group in self._groups}
 
     def keep(self, world: World) -> None:

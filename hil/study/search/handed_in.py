@@ -13,7 +13,10 @@ from hil.study.fitting.numbers import STRAINED, Numbers, strain
 from hil.study.likelihood.noise import Noise
 from hil.study.search.contest import Contender, Contest, odds
 
-_ROUNDS, _RIVAL = 3, 1.0 / 3.0
+_ROUNDS = 3
+_RIVAL, _AS_GOOD = 1.0 / 3.0, 0.9
+"""Shares of what the best explains: below the one, numbers that went far hide no rival; below the other, sensitivities
+taken anew make none of a cause beside which they did not."""
 _FIRST = 2
 """How many of the best are fitted before the others, which go on while they explain a third of what those do."""
 Refitted = Callable[[Contender, Model, Noise], Contender]
@@ -25,23 +28,24 @@ def from_handed_in(
 ) -> tuple[list[Contender], tuple[Model, Noise]]:  # fmt: skip
     """The same contenders, each fitted from the car as handed in where that explains more; the best fit without any.
 
+    Numbers that are likely beside a cause are found from either side (docs/decisions/0086): they are left there.
     What takes less than a third as much off the ``reference`` as the very best (or others, whose odds are ``best``) is
     not followed to its end. So many of the others (one or more) get sensitivities ``anew`` where their numbers are far
-    from those of the model that is ``beside`` them. With those the numbers are fitted without them, too. ``refitted``
-    gives a contender with another model and noise.
+    from where they were last taken, at first those of the model that is ``beside`` them. With those the numbers are
+    fitted without them, too. ``refitted`` gives a contender with another model and noise.
     """
     fitter = numbers.fitter
 
-    def near(one: Contender, best: float) -> bool:
-        return odds(one) <= reference - _RIVAL * max(reference - best, 0.0)
+    def near(one: Contender, best: float, share: float = _RIVAL) -> bool:
+        return odds(one) <= reference - share * max(reference - best, 0.0)
 
     def again(one: Contender, best: float) -> Contender:
+        if strain(one.model.z) < STRAINED:
+            return one
         own, noise = fitter.copied(), one.noise
         model = own.at(np.zeros(len(numbers.nuisances)), one.model.terms, noise)
         model = own.fit(model, noise, 4, follow=True)
         begun = refitted(one, model, noise)
-        if strain(one.model.z) < STRAINED and begun.cost >= one.cost:
-            return one  # numbers that are not bent are found from either side
         if not near(begun, best):
             return min(one, begun, key=odds)
         for _ in range(_ROUNDS - 1):
@@ -56,17 +60,18 @@ def from_handed_in(
     rest = order[_FIRST:]
     found |= dict(zip(rest, Contest.at_once(lambda k: again(fitted[k], best), rest), strict=True))
     leading = sorted(order, key=lambda k: odds(found[k]))[:anew]
-    best, bare = min(best, odds(found[leading[0]])), []
+    best, bare, around = min(best, odds(found[leading[0]])), [], beside.z
     for k in leading:
         one = found[k]
-        far = near(one, best) and (strain(one.model.z) >= STRAINED or numbers.went_far(one.model, beside.z))
+        bent = strain(one.model.z) >= STRAINED
+        far = near(one, best) if bent else near(one, best, _AS_GOOD) and numbers.went_far(one.model, around)
         if k != leading[0] and not far:
             continue
         model, noise = one.model, one.noise
         if far:
             numbers.anew(model.z, model.terms)
-            begun = numbers.fitter.at(model.z, model.terms, noise)
-            if strain(begun.z) >= STRAINED:
+            begun, around = numbers.fitter.at(model.z, model.terms, noise), model.z
+            if bent:
                 model, noise = numbers.fitted(begun, noise)
             else:
                 model, noise = numbers.fitter.settle(begun, noise, 2)

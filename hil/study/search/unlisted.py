@@ -10,7 +10,7 @@ from hil.study.fitting.numbers import Numbers
 from hil.study.fitting.own_error import variance_of_law
 from hil.study.likelihood.noise import Noise
 from hil.study.search.basis import LAWS, Piece
-from hil.study.search.contest import Contender, Contest, odds
+from hil.study.search.contest import Contender, Contest, at_its_end, odds
 from hil.study.search.diagnosis import Diagnosis, Say, Settings
 from hil.study.search.handed_in import Refitted
 from hil.study.search.left_over import FORM, LeftOver
@@ -54,7 +54,10 @@ class Unlisted:
         self._race = None
 
     def best(self, found: Diagnosis, now: Round) -> Contender | None:
-        """The best law where it is ahead of the best listed cause, beyond noise and the model's own error."""
+        """The best law where it is ahead of the best listed cause, beyond noise and the model's own error.
+
+        A listed cause that is as far off as it may be is no rival to one that explains more.
+        """
         model, reference = now.model, now.reference
         if not self._settings.dictionary or any(isinstance(term.candidate, Piece) for term in model.terms):
             return None
@@ -81,9 +84,12 @@ class Unlisted:
         self._say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
         least = self._asked(found, race, best, now.left)
 
+        wants_more = at_its_end(now.listed)
+
         def ahead() -> bool:
-            gained = min(now.listed.cost, reference) - law.cost
-            rival = (1.0 + FORM**2) * max(0.5 * (reference - odds(now.listed)), 0.0)
+            rival = 0.0 if wants_more else (1.0 + FORM**2) * max(0.5 * (reference - odds(now.listed)), 0.0)
+            known = reference if wants_more else min(now.listed.cost, reference)
+            gained = known - law.cost if law.cost < now.listed.cost else 0.0
             return gained >= least * now.error(law, law) and 0.5 * (reference - odds(law)) >= rival + _CLEARER
 
         if ahead() and self._settings.relinearise and not now.bent:
