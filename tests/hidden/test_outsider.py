@@ -70,6 +70,25 @@ def test_without_the_dictionary_a_listed_effect_takes_a_wrong_name() -> None:
     assert found["verdict"] == "named"
 
 
+def _step(speed_mps: float, pressure_pa: np.ndarray) -> np.ndarray:
+    """Pads of the rear axle that lose 30 % above 17 m/s."""
+    weaker = 1.0 - 0.3 / (1.0 + np.exp(-(speed_mps - 17.0) / 0.8))
+    return np.array([1.0, 1.0, weaker, weaker])
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_listed_cause_at_its_end_gives_way_to_a_law_that_explains_more() -> None:
+    """It was `mu_speed`, as steep as it may be: a straight line along a step."""
+    found = explain(logs(_step), vehicle=VEHICLE).json
+    assert found["verdict"] == "unlisted"
+    (cause,) = found["causes"]
+    assert (cause["joint"], cause["wheel"], cause["variables"]) == ("friction.mu", "rear", ["speed"])
+    slow, fast = ([p["y"] for p in cause["curve"] if low < p["x"] < low + 5.0] for low in (8.0, 19.0))
+    assert np.mean(slow) == pytest.approx(0.0, abs=0.12)
+    assert np.mean(fast) == pytest.approx(-0.3, abs=0.12)
+
+
 def _rear_left_by_speed(speed_mps: float, t_s: float) -> np.ndarray:
     return np.array([1.0, 1.0, 1.0 - 0.35 * np.exp(-(((speed_mps - 15.0) / 5.0) ** 2)), 1.0])
 
@@ -102,8 +121,10 @@ def test_pads_of_one_wheel_that_fail_in_the_middle_of_one_log_are_told_with_whee
     csv, car = one_log.write(tmp_path, _weak_from_80_s((3,), 0.3))
     found = explain(csv, vehicle=car).json
     (cause,) = found["causes"]
-    told = {one["effect"] for one in (cause, *found["rivals"])}
-    assert {"pad_mu_gain", "stuck_corner"} <= told
+    told = {one["effect"]: one["onset_s"] for one in (cause, *found["rivals"])}
+    assert {"pad_mu_gain", "stuck_corner"} <= set(told)
+    assert told["pad_mu_gain"] == pytest.approx(80.0, abs=0.1)
+    assert told["stuck_corner"] == pytest.approx(80.0, abs=0.1)
     assert cause["wheel"] == "rr"
     assert cause["onset_s"] == pytest.approx(80.0, abs=0.1)
     (value,) = (number["value"] for number in cause["parameters"].values())

@@ -255,7 +255,6 @@ class _Search:
         top = sorted(looked, key=lambda s: -s.evidence)[:_TRIED] if bent else leaders(looked, LEADERS)
         if _most(top, left) < _POOR * least:
             return None
-        top = _worth_a_fit(top, left, _POOR * least)
         self.say(f"fitting {len(top)} leaders")
         return contest, top, contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
 
@@ -297,21 +296,9 @@ class _Search:
         return min(better, key=odds, default=best), placed
 
 
-def _beyond(item: Score, left: LeftOver) -> float:
-    """What a candidate gains by one step, beyond what the causes in the model may leave."""
-    return item.gain - left.of(item.candidate) / variance_of(item.candidate)
-
-
 def _most(listed: Sequence[Score], left: LeftOver) -> float:
-    """Most that one of them gains."""
-    return max((_beyond(item, left) for item in listed), default=0.0)
-
-
-def _worth_a_fit(top: Sequence[Score], left: LeftOver, least: float) -> list[Score]:
-    """Leaders that gain so much, and those ahead of them all by their odds, who may cast doubt on them."""
-    gaining = [item for item in top if _beyond(item, left) >= least]
-    ahead = max(item.evidence for item in gaining)
-    return [item for item in top if item in gaining or item.evidence >= ahead]
+    """Most that a candidate gains by one step, beyond what the causes in the model may leave."""
+    return max((item.gain - left.of(item.candidate) / variance_of(item.candidate) for item in listed), default=0.0)
 
 
 def _independent(found: Sequence[Score]) -> int:

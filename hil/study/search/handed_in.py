@@ -28,7 +28,6 @@ def from_handed_in(
 ) -> tuple[list[Contender], tuple[Model, Noise]]:  # fmt: skip
     """The same contenders, each fitted from the car as handed in where that explains more; the best fit without any.
 
-    Numbers that are likely beside a cause are found from either side (docs/decisions/0086): they are left there.
     What takes less than a third as much off the ``reference`` as the very best (or others, whose odds are ``best``) is
     not followed to its end. So many of the others (one or more) get sensitivities ``anew`` where their numbers are far
     from where they were last taken, at first those of the model that is ``beside`` them. With those the numbers are
@@ -40,12 +39,12 @@ def from_handed_in(
         return odds(one) <= reference - share * max(reference - best, 0.0)
 
     def again(one: Contender, best: float) -> Contender:
-        if strain(one.model.z) < STRAINED:
-            return one
         own, noise = fitter.copied(), one.noise
         model = own.at(np.zeros(len(numbers.nuisances)), one.model.terms, noise)
         model = own.fit(model, noise, 4, follow=True)
         begun = refitted(one, model, noise)
+        if strain(one.model.z) < STRAINED and begun.cost >= one.cost:
+            return one  # numbers that are not bent are found from either side
         if not near(begun, best):
             return min(one, begun, key=odds)
         for _ in range(_ROUNDS - 1):
