@@ -40,10 +40,13 @@ brake_gain_rear_nm_pa = 1.7e-4
 ```
 
 - A number without tolerance is taken to be known to a hundredth, one that is not given to what the tables say.
-- What stands once for each axle takes one number for both, or a list `[front, rear]`.
-- Of {sections} a set may say nothing at all: then no limit of theirs is simulated, torques are not compared
-  with their demands, and pressures only where none has been asked for. One key of a section, and the shipped numbers
-  stand for the rest of it.
+- What stands once for each axle takes one number for both, or a list `[front, rear]`; its tolerance is one number.
+  Of a number that the car has once, a list gives the mean, and half its spread as tolerance; the remarks say so.
+- The mass is the whole car's, wheels included; the inertia is that of one wheel with all that turns with it; the
+  rolling radius is effective, way per angle. A wheel's torque is its brake gain times the pressure above the threshold.
+- Of {sections} a set may say nothing at all: then torques are not compared with their demands, and
+  pressures only where none has been asked for. Limits that a set does not state (rates of the pressure; torque, power,
+  rate and fading of the motors; power of the battery) are not simulated: another car's would be wrong.
 - Without a `pad_` key the friction of the pads is one constant, which the brake gains contain.
 - Unknown keys are told in the remarks and left out.
 """
@@ -84,7 +87,8 @@ def _short(flat: Entries) -> list[str]:
 
 
 def _derived(flat: Entries) -> list[str]:
-    lines = ["", "## Numbers made of others", "", "| key | sets | what |", "|---|---|---|"]
+    said = "Each sets a number of the plant; in brackets, how many times the given one."
+    lines = ["", "## Numbers made of others", "", said, "", "| key | sets | what |", "|---|---|---|"]
     for key, (name, place, factor) in DERIVED.items():
         pair = isinstance(flat[name]["value"], list)
         where = f", {('front', 'rear')[place]}" if pair and place is not None else ""

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hil.parameters import is_number, load_set, override
+from hil.parameters import ParameterError, is_number, load_set, override
 from hil.study.logs.table import Floats, UnusableError
 from hil.study.replay.nuisances import BRAKE_K, CONSTANT_EPSILON_W, Nuisance, guessed, listed
 from hil.study.replay.vehicle_keys import ALIASES, DERIVED, OF_SECTION, SPECIAL, UNLIMITED, WIDE
@@ -127,25 +127,41 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
                 hint = f"; did you mean {near[0]!r}?" if near else ""
                 remarks.append(f"{where}: unknown key {key!r} is left out{hint}")
             continue
-        if key != stem and isinstance(value, int | float):
-            tolerances[name] = float(value)
-        elif key == stem:
-            numbers[name] = _number(value, f"{where}: {key}")
+        given = _number(value, f"{where}: {key}")
+        if key != stem:
+            tolerances[name] = max(tolerances.get(name, 0.0), *(given if isinstance(given, list) else [given]))
+        elif isinstance(given, list) and not _by_axle(name, base):
+            numbers[name], apart = float(np.mean(given)), 0.5 * float(np.ptp(given))
+            tolerances[name] = max(tolerances.get(name, 0.0), apart)
+            remarks.append(
+                f"{where}: {key} is one number of the car: {numbers[name]:g} is taken, {apart:g} more or less"
+            )
+        else:
+            numbers[name] = given
     source = resources.files("plant") / "parameters" / "paper_car.toml"
     shipped = _tolerances(tomllib.loads(source.read_text(encoding="utf-8")))
     changes, gains = _changes(numbers, base, where)
-    unlimited = [section for section in UNLIMITED if section not in changes]
-    for section in unlimited:
-        if UNLIMITED[section]:
-            changes[section] = dict(UNLIMITED[section])
-        for name in UNLIMITED[section]:
-            shipped.pop(f"{section}_{name}", None)
+    unstated = [section for section in UNLIMITED if section not in changes]
+    unlimited = []
+    for section, limits in UNLIMITED.items():
+        for together in limits:
+            stated = changes.setdefault(section, {})
+            if not together.keys() & stated.keys():
+                stated.update(together)
+                unlimited += [f"{section}_{name}" for name in together]
+    for name in unlimited:
+        shipped.pop(name, None)
     if unlimited:
+        remarks.append(f"{where}: not given, so no such limit is simulated: {', '.join(unlimited)}")
+    if unstated:
         remarks.append(
-            f"{where}: nothing said of {', '.join(unlimited)}, so no limits of theirs are simulated"
-            + "".join(f"; {_THEN[section]}" for section in unlimited if section in _THEN)
+            f"{where}: nothing said of {', '.join(unstated)}"
+            + "".join(f"; {_THEN[section]}" for section in unstated if section in _THEN)
         )
-    parameters = override(base, changes, where)
+    try:
+        parameters = override(base, changes, where)
+    except ParameterError as error:
+        raise UnusableError(str(error)) from error
     friction = any(name.startswith("pad_") for name in numbers)
     if gains and not friction:
         parameters = replace(parameters, pad=_constant_pad(parameters))
@@ -173,7 +189,7 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
         guessed(one, vehicle.p) if one.name.removesuffix("_front").removesuffix("_rear") in missing else one
         for one in vehicle.nuisances
     )
-    return replace(vehicle, nuisances=nuisances, unstated=tuple(unlimited))
+    return replace(vehicle, nuisances=nuisances, unstated=tuple(unstated))
 
 
 def _derive(
@@ -193,6 +209,11 @@ def _derive(
         changed = list(now) if isinstance(now, list | tuple) else [now]
         changed[place] = value * factor
         numbers[name] = changed if isinstance(now, list | tuple) else changed[0]
+
+
+def _by_axle(name: str, base: PlantParameters) -> bool:
+    """Whether a number of the plant stands once for each axle."""
+    return name in PARAMETER.sizes and isinstance(_value(base, name), tuple)
 
 
 def _number(value: Any, where: str) -> Any:

@@ -91,14 +91,15 @@ WIDE: Final = {
 """Half width as a share of the usual value, where a set does not say."""
 
 UNLIMITED: Final = {
-    "ehb": {"build_rate_pa_s": 5e8, "release_rate_pa_s": 5e8},
-    "motor": {
-        "peak_torque_nm": 5e3, "peak_power_w": 5e5, "rate_limit_nm_s": 1e6, "fade_end_mps": 0.0, "fade_start_mps": 0.1,
-    },
-    "battery": {"charge_power_w": 1e6, "discharge_power_w": 1e6},
-    "tyre": {},
+    "ehb": ({"build_rate_pa_s": 5e8, "release_rate_pa_s": 5e8},),
+    "motor": (
+        {"peak_torque_nm": 5e3}, {"peak_power_w": 5e5}, {"rate_limit_nm_s": 1e6},
+        {"fade_end_mps": 0.0, "fade_start_mps": 0.1},
+    ),
+    "battery": ({"charge_power_w": 1e6, "discharge_power_w": 1e6},),
+    "tyre": (),
 }  # fmt: skip
-"""Limits that do not act, for a section of which a set says nothing: another car's limits would be wrong."""
+"""Limits that do not act, for those of which a set says nothing: another car's limits would be wrong."""
 
 OF_SECTION: Final = {
     "ehb": (

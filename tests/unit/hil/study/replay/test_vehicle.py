@@ -46,6 +46,32 @@ def test_a_tolerance_is_two_standard_deviations() -> None:
     assert step == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.1 * area, rel=1e-3)
 
 
+def test_a_number_of_the_car_told_by_axle_is_taken_between_them_and_told() -> None:
+    """It was refused: rear drums need more pressure before they grip, and the plant has one threshold."""
+    car = load_vehicle({**SIX, "threshold_pressure_pa": [3e4, 24e4], "threshold_pressure_pa_tolerance": 2e4})
+    assert car.parameters.friction_brake.threshold_pressure_pa == pytest.approx(13.5e4)
+    (threshold,) = [n for n in car.nuisances if n.name == "friction_brake_threshold_pressure_pa"]
+    assert threshold.step[0] == pytest.approx(HALF_WIDTH_TO_SIGMA * 10.5e4)
+    assert any("threshold_pressure_pa is one number of the car: 135000 is taken" in text for text in car.remarks)
+
+
+def test_of_a_tolerance_by_axle_the_larger_counts() -> None:
+    """A list was left out without a word."""
+    told = {**SIX, "track_m": [1.5, 1.48]}
+    steps = [
+        {n.name: n.step for n in load_vehicle({**told, "track_m_tolerance": of}).nuisances}
+        for of in (0.05, [0.01, 0.05])
+    ]
+    assert steps[0] == steps[1]
+    with pytest.raises(UnusableError, match="track_m_tolerance: expected a number, got 'narrow'"):
+        load_vehicle({**told, "track_m_tolerance": "narrow"})
+
+
+def test_a_number_of_wrong_shape_makes_the_set_unusable() -> None:
+    with pytest.raises(UnusableError, match="track_m"):
+        load_vehicle({**SIX, "track_m": [1.5, 1.48, 1.5]})
+
+
 def test_a_stated_tolerance_is_kept_to_as_far_as_an_equation_is_that_good() -> None:
     told = {**SIX, "cog_height_m": 0.5, "cog_height_m_tolerance": 0.03}
     step = {n.name: n.step[0] for n in load_vehicle(told).nuisances}
@@ -81,7 +107,12 @@ def test_what_a_set_says_nothing_of_is_not_judged() -> None:
     told = load_vehicle({**SIX, "ehb_dead_time_s": 0.02, "motor_peak_torque_nm": 400.0, "tyre_lkx": 1.0})
     assert set(told.untold) == {"battery_soc"}
     assert not any("compared" in text for text in told.remarks)
-    assert told.parameters.motor.peak_torque_nm == 400.0
+    motor, ehb = told.parameters.motor, told.parameters.ehb
+    assert motor.peak_torque_nm == 400.0
+    assert min(motor.peak_power_w, motor.rate_limit_nm_s, ehb.build_rate_pa_s, ehb.release_rate_pa_s) > 2e5
+    assert motor.fade_start_mps < 0.5
+    assert any("no such limit is simulated: ehb_build_rate_pa_s" in text for text in told.remarks)
+    assert not {"ehb_build_rate_pa_s", "motor_peak_power_w"} & {one.name for one in told.nuisances}
     assert paper_car().unstated == ()
 
 
