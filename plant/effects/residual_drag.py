@@ -5,7 +5,7 @@ from plant.effects.effect import Effect, Parameter, Scope, slots
 from plant.effects.joints import J
 from plant.layout import Vector
 
-PARAMETERS = (Parameter("torque_nm", "N m", 0.0, 40.0, 6.0),)
+PARAMETERS = (Parameter("torque_nm", "N m", 0.0, 200.0, 6.0),)
 L = slots(Scope.WHEEL, PARAMETERS)
 
 
@@ -24,7 +24,7 @@ EFFECT = Effect(
     joints=("brake.torque",),
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
-    source="S: limits of 6.9 and 9.8 N m (Mitsubishi Fuso service manual); M: 0.5 to 10 N m",
+    source="S: limits of 6.9 and 9.8 N m (Mitsubishi Fuso service manual); M: 0.5 to 10 N m; C: to 200, it binds",
     signature="wheel slows and disc warms at zero pressure",
     manoeuvre="coast_down",
     confounded_with=("rolling_resistance", "stuck_corner"),

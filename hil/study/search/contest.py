@@ -44,10 +44,10 @@ def odds(contender: Contender) -> float:
     return contender.cost + contender.price - 2.0 * contender.evidence
 
 
-def at_its_end(contender: Contender) -> bool:
-    """Whether its value is as far as it may go: what it explains there is more than it can be."""
-    parameter = contender.term.candidate.parameter
-    return bool(np.isclose(contender.term.value, (parameter.low, parameter.high), rtol=1e-6, atol=0.0).any())
+def at_its_end(term: Term) -> bool:
+    """Whether its value is as far off as it may be: there it explains more than it can be."""
+    parameter = term.candidate.parameter
+    return bool(np.isclose(term.value, (parameter.low, parameter.high), rtol=1e-6, atol=0.0).any())
 
 
 def worth(contender: Contender) -> float:

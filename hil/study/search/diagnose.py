@@ -17,7 +17,16 @@ from hil.study.replay.vehicle import Vehicle
 from hil.study.replay.world import World
 from hil.study.search.basis import Piece
 from hil.study.search.begun import since_when, with_its_like
-from hil.study.search.contest import Contender, Contest, from_the_best, instead, odds, refitted, worth
+from hil.study.search.contest import (
+    Contender,
+    Contest,
+    at_its_end,
+    from_the_best,
+    instead,
+    odds,
+    refitted,
+    worth,
+)
 from hil.study.search.diagnosis import Diagnosis, Say, Settings, causes_in
 from hil.study.search.doubt import backward, erring, form_differs, stands_beside, strained, with_gain
 from hil.study.search.field import Field, number_of
@@ -99,6 +108,8 @@ class _Search:
             bare = found.fitter
             found.final, found.noise, found.fitter = model, noise, self.fitter
             backward(found, bare, self.told, self.say)
+        for term in filter(at_its_end, found.final.terms):
+            found.remarks.append(f"{term.candidate.name} = {term.value:.3g} is as far off as it may be: it may be more")
         return found
 
     def _screened(self, found: Diagnosis) -> None:

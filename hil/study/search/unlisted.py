@@ -84,7 +84,7 @@ class Unlisted:
         self._say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
         least = self._asked(found, race, best, now.left)
 
-        wants_more = at_its_end(now.listed)
+        wants_more = at_its_end(now.listed.term)
 
         def ahead() -> bool:
             rival = 0.0 if wants_more else (1.0 + FORM**2) * max(0.5 * (reference - odds(now.listed)), 0.0)
