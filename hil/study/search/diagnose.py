@@ -179,38 +179,39 @@ class _Search:
     def _next(self, found: Diagnosis, model: Model, noise: Noise) -> Accepted | None:
         """The next cause, if one is beyond doubt; no contender where the numbers explain more without a further one."""
         left = LeftOver(found.explained, self.fitter, model, noise, self.field.tracks)
-        least, leading = found.least_gain, self._leading(found, model, noise, left)
-        if leading is None:
-            return None
-        contest, top, fitted = leading
-        reference, error = contest.reference, self._errors(found)
+        least = found.least_gain
+        contest, top, fitted = self._leading(found, model, noise, left)
+        reference, error, tighter = contest.reference, self._errors(found), contest.noise
 
         def gained() -> list[Contender]:
             best = min(fitted, key=odds)
             return [with_gain(c, reference - left.of(c.term.candidate), error(c, best)) for c in fitted]
 
-        if self.settings.relinearise and (self._bent(model) or max(one.gained for one in gained()) >= least):
-            fitted, without = self._fitted_again(model, fitted, top, reference)
-            bare = without[0].cost
-            worse, more = reference - bare, bare - min(c.cost for c in fitted)
-            if not self.began_again and worse > max(least, _MISLED * more):
-                self.began_again = True
-                return *without, []
-            reference = min(reference, bare)
-        fitted = since_when(self.fitter, fitted)
-        if self.settings.relinearise:
-            fitted = with_its_like(self.fitter, self.field, model, fitted)
-        tighter = min(fitted, key=odds).noise
-        reference = min(reference, self.fitter.fit(model, tighter, 3).cost)
-        now = Round(contest, model, tighter, reference, min(fitted, key=odds), left, error, self._bent(model))
+        if fitted and self.settings.relinearise:
+            if self._bent(model) or max(one.gained for one in gained()) >= least:
+                fitted, without = self._fitted_again(model, fitted, top, reference)
+                bare = without[0].cost
+                worse, more = reference - bare, bare - min(c.cost for c in fitted)
+                if not self.began_again and worse > max(least, _MISLED * more):
+                    self.began_again = True
+                    return *without, []
+                reference = min(reference, bare)
+            fitted = with_its_like(self.fitter, self.field, model, since_when(self.fitter, fitted))
+        elif fitted:
+            fitted = since_when(self.fitter, fitted)
+        listed = min(fitted, key=odds, default=None)
+        if listed is not None:
+            tighter = listed.noise
+            reference = min(reference, self.fitter.fit(model, tighter, 3).cost)
+        now = Round(contest, model, tighter, reference, listed, left, error, self._bent(model))
         law = self.unlisted.best(found, now)
-        fitted = gained()
+        fitted = gained() if fitted else []
         clear = sorted((c for c in fitted if c.gained >= least and worth(c) > 0.0), key=odds)
         if law is not None:
             found.explained += reference - law.cost
             polished, tighter = self.fitter.settle(law.model, law.noise, 1)
             return polished, tighter, [replace(law, model=polished), *clear]
-        best = self._standing(fitted, clear, least)
+        best = self._standing(fitted, clear, least) if fitted else None
         if best is None:
             return None
         best, clear = self._placed(found, best, clear)
@@ -252,20 +253,20 @@ class _Search:
 
     def _leading(
         self, found: Diagnosis, model: Model, noise: Noise, left: LeftOver
-    ) -> tuple[Contest, list[Score], list[Contender]] | None:
-        """The race for the next cause, its leaders and their fits; None where none can be beyond doubt."""
+    ) -> tuple[Contest, list[Score], list[Contender]]:
+        """The race for the next cause, its leaders and their fits; no leader where none can be beyond doubt."""
         bent, least = self._bent(model), found.least_gain
         plausible = self.field.plausible(self.fitter, found, model, noise, bent)
-        if _most(plausible, left) < _HOPELESS * least:
-            return None
-        self.say(f"noise beside {len(plausible)} candidates")
         contest = Contest(self.fitter, self.field.tracks, model, noise, self.settings.relinearise)
+        if _most(plausible, left) < _HOPELESS * least:
+            return contest, [], []
+        self.say(f"noise beside {len(plausible)} candidates")
         seen = contest.at_once(contest.profiled, plausible)
         beside = {id(item): quieter for item, quieter in seen}
         looked = [item for item, _ in seen]
         top = sorted(looked, key=lambda s: -s.evidence)[:_TRIED] if bent else leaders(looked, LEADERS)
         if _most(top, left) < _POOR * least:
-            return None
+            return contest, [], []
         self.say(f"fitting {len(top)} leaders")
         return contest, top, contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
 

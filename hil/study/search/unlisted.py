@@ -28,6 +28,8 @@ Again = Callable[[Model, Sequence[Contender], Refitted, float, int, float], tupl
 class Round:
     """One round of the search: the model so far, the best ``listed`` cause beside it and what that ``left``.
 
+    There is none ``listed`` where none is worth a fit.
+
     ``reference`` is the cost without a cause more, with the ``noise`` beside one; ``error`` says what a contender's
     gain is divided by; ``bent``, whether something may have bent the vehicle's numbers.
     """
@@ -36,7 +38,7 @@ class Round:
     model: Model
     noise: Noise
     reference: float
-    listed: Contender
+    listed: Contender | None
     left: LeftOver
     error: Callable[[Contender, Contender], float]
     bent: bool
@@ -77,20 +79,23 @@ class Unlisted:
 
         if now.bent:
             tried = [replayed(one) for one in sorted(seen, key=odds)[:_TRIED]]
-            seen, without = self._again(model, tried, refitted_law, reference, 1, odds(now.listed))
+            best_listed = np.inf if now.listed is None else odds(now.listed)
+            seen, without = self._again(model, tried, refitted_law, reference, 1, best_listed)
             reference = min(reference, without[0].cost)
         law = min(seen, key=odds)
         best = entries[law.term.candidate.name]
         self._say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
         least = self._asked(found, race, best, now.left)
 
-        wants_more = at_its_end(now.listed.term)
-
         def ahead() -> bool:
-            rival = 0.0 if wants_more else (1.0 + FORM**2) * max(0.5 * (reference - odds(now.listed)), 0.0)
-            known = reference if wants_more else min(now.listed.cost, reference)
-            gained = known - law.cost if law.cost < now.listed.cost else 0.0
-            return gained >= least * now.error(law, law) and 0.5 * (reference - odds(law)) >= rival + _CLEARER
+            known, rival = reference, 0.0
+            if now.listed is not None and law.cost >= now.listed.cost:
+                return False
+            if now.listed is not None and not at_its_end(now.listed.term):
+                known = min(now.listed.cost, reference)
+                rival = (1.0 + FORM**2) * max(0.5 * (reference - odds(now.listed)), 0.0)
+            clearly = 0.5 * (reference - odds(law)) >= rival + _CLEARER
+            return clearly and known - law.cost >= least * now.error(law, law)
 
         if ahead() and self._settings.relinearise and not now.bent:
             (law,), without = self._again(model, [replayed(law)], refitted_law, reference, 1, np.inf)
