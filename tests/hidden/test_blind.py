@@ -119,6 +119,13 @@ def test_rolling_resistance_of_an_axle_is_told_or_tied_with_what_acts_alike() ->
     assert in_set(run_case(draw("single", SINGLES.index("rolling_resistance"), 68, 15.0), 68, 15.0))
 
 
+def test_a_law_that_no_listed_effect_resembles_is_told() -> None:
+    """It was answered ``none``: the best listed cause explained a third of what is asked, and no law was looked at."""
+    record = run_case(draw("unlisted", 6, 68), 68, None)
+    first, *_ = record["causes"]
+    assert (first["effect"], first["joint"], first["variables"]) == ("unlisted", "body.force", ["yaw_rate"])
+
+
 def test_a_wrong_speed_over_ground_is_no_tyre() -> None:
     """Tyres 1 % too large were named: nothing else in the list changed that ratio."""
     record = run_case(draw("twin", 11, 68), 68, None)
