@@ -49,7 +49,7 @@ _GRADE, _TURNS_MPS2, _CHARACTERISTIC_MPS = 0.01, 0.3, (8.0, 200.0)
 
 
 _FREE = Semaphore(max(WORKERS - 1, 0))
-"""Processors that may be idle while a thread replays."""
+"""Replays that may have others help them at a time: one less than there are processors."""
 
 
 @cache
@@ -223,7 +223,7 @@ class Rig:
         return {group: np.concatenate([part[group] for part in parts]) for group in self._groups}
 
     def run(self, world: World) -> Stack:
-        """Simulated channels of all drives; these over threads where processors are idle."""
+        """Simulated channels of all drives; these over threads, unless other replays have them (`_FREE`)."""
         self.runs += 1
         of_drives = _idle().map if (helped := _FREE.acquire(blocking=False)) else map
         try:

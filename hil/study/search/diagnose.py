@@ -109,7 +109,8 @@ class _Search:
             found.final, found.noise, found.fitter = model, noise, self.fitter
             backward(found, bare, self.told, self.say)
         for term in filter(at_its_end, found.final.terms):
-            found.remarks.append(f"{term.candidate.name} = {term.value:.3g} is as far off as it may be: it may be more")
+            told = f"{term.candidate.name} = {term.value:.3g}"
+            found.remarks.append(f"{told} is the end of its range: the true value may lie beyond")
         return found
 
     def _screened(self, found: Diagnosis) -> None:
