@@ -192,7 +192,7 @@ def _plant(table: Table, name: str, files: Files) -> PlantParameters:
 def _manoeuvre(top: Table, start: Table) -> Manoeuvre:
     driver, end, direct = top.table("driver"), top.table("end"), top.table("direct")
     manoeuvre = Manoeuvre(
-        initial_speed_mps=start.number("speed_mps", None, 0.0, 60.0),
+        initial_speed_mps=start.number("speed_mps", None, -15.0, 60.0),
         initial_disc_temperature_k=start.number("disc_temperature_k", 423.15, 200.0, 1200.0),
         initial_state_of_charge=start.number("state_of_charge", 0.7, 0.0, 1.0),
         duration_s=end.number("duration_s", None, 0.1, LONGEST_S),

@@ -45,8 +45,10 @@ brake_gain_rear_nm_pa = 1.7e-4
 - The mass is the whole car's, wheels included; the inertia is that of one wheel with all that turns with it; the
   rolling radius is effective, way per angle. A wheel's torque is its brake gain times the pressure above the threshold.
 - Of {sections} a set may say nothing at all: then torques are not compared with their demands, and
-  pressures only where none has been asked for. Limits that a set does not state (rates of the pressure; torque, power,
-  rate and fading of the motors; power of the battery) are not simulated: another car's would be wrong.
+  pressures only where none has been asked for, and left and right where the same is. Where nothing is said of the
+  tyres, each axle may corner otherwise (`vehicle_slip_angle_share`), and forms of tyre and suspension curves go
+  farther. Limits that a set does not state (rates of the pressure; torque, power, rate and fading of the motors;
+  power of the battery) are not simulated: another car's would be wrong.
 - Without a `pad_` key the friction of the pads is one constant, which the brake gains contain.
 - Unknown keys are told in the remarks and left out.
 """

@@ -44,8 +44,8 @@ def brakes(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, wheels: int)
 
         clamping = at_wheel(pressure, y, J.brake_pressure, i)
         force = pad_force(
-            clamping, per_axle(i, p, P.friction_brake_piston_area_m2), p[P.friction_brake_threshold_pressure_pa],
-            p[P.friction_brake_efficiency],
+            clamping, per_axle(i, p, P.friction_brake_piston_area_m2),
+            per_axle(i, p, P.friction_brake_threshold_pressure_pa), p[P.friction_brake_efficiency],
         )  # fmt: skip
         radius = per_axle(i, p, P.friction_brake_effective_radius_m)
         mu = x[X.pad_friction + i]

@@ -138,7 +138,8 @@ def contacts(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, cos_grade:
 
         side = 1.0 - 2.0 * (i % 2)
         force, cross = combined_at(
-            slip + damping * sliding / stiffness_x, atan(side_slip + damping * across / stiffness_y), loaded, grip,
+            slip + damping * sliding / stiffness_x,
+            per_axle(i, p, P.vehicle_slip_angle_share) * atan(side_slip + damping * across / stiffness_y), loaded, grip,
             stiffness_x, side, p,
         )  # fmt: skip
         carried = load / loaded

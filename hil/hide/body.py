@@ -170,13 +170,13 @@ def rates(
         wheel(x, i, steer, mass, car, e, law, dx, y)
 
     air = speed + direction * e[E.headwind, 0]
-    drag = 0.5 * car.air_density_kg_m3 * car.drag_coefficient * car.frontal_area_m2 * air * abs(air) * tanh(speed / 0.2)
+    moving = tanh(abs(speed) / 0.2)
+    drag = 0.5 * car.air_density_kg_m3 * car.drag_coefficient * car.frontal_area_m2 * air * abs(air) * moving
     if law == LAW_STEP_DRAG:
         drag += e[E.unlisted, 0] * (0.5 + 0.5 * tanh((speed - 17.0) / 0.5))
     elif law == LAW_STEER_DRAG:
         drag += e[E.unlisted, 0] * sqrt(abs(steer) + 1e-12)
     y[Y.drag_w] = drag * speed
-    moving = tanh(abs(speed) / 0.2)
     specific_x = (dx[S.speed_mps] - drag) / mass + gust_mps2 * moving
     specific_y = dx[S.lateral_mps] / mass
     grade = direction * e[E.road_grade, 0]

@@ -57,10 +57,12 @@ def friction_factor(x: Vector, i: int, pressure_pa: float, car: Car, e: Vector, 
     """What multiplies the pads' friction coefficient, each row of the effect catalogue, section C.
 
     Fade: 1 - k (T - Tf)+.  Cold: less below 423 K.  Speed: 1 + k v, v at the rim.  Pressure: (p/p0)^-n.
+    Leading end of the pad: 1 + e sign(w).
     Bedding: 1 - d exp(-E/E0).  Glazing: 1 - d E.  Water: 1 - w exp(-E/E1).  Judder: 1 + A sin(n th).
     """
     disc, rim = x[S.disc_k + i], abs(x[S.omega_rad_s + i]) * car.rolling_radius_m
     factor = (1.0 + e[E.pad_mu_gain, i]) * (1.0 - e[E.stuck_corner, i])
+    factor *= 1.0 + e[E.caliper_asymmetry, i] * tanh(x[S.omega_rad_s + i] / STICK_RAD_S)
     factor *= max(1.0 - e[E.pad_temp_fade, i] * max(disc - FADE_K, 0.0), 0.1)
     factor *= 1.0 - e[E.mu_warmup, i] * min(max((COLD_K - disc) / 100.0, 0.0), 1.0)
     factor *= 1.0 + e[E.mu_speed, i] * rim

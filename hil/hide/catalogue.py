@@ -153,10 +153,14 @@ TWINS: tuple[tuple[str, str], ...] = (
 )  # fmt: skip
 """Physical effect and the sensor effect it is taken for."""
 
-SENSOR_ONLY = (Hideable("speed_scale", "gain", "", 0.01, -0.1, 0.1),)
-"""Effects of a channel that the families above do not draw: the scale of the speed over ground."""
+NOT_DRAWN = (
+    Hideable("speed_scale", "gain", "", 0.01, -0.1, 0.1),
+    Hideable("caliper_asymmetry", "gain", "", 0.06, -0.3, 0.3, WHEEL),
+)
+"""Effects that no family draws but as a twin: the scale of the speed over ground; what a pad does unlike in reverse,
+which is weak pads by another name wherever a car drives forward."""
 
-HIDEABLE = {effect.name: effect for effect in (*LISTED, *UNLISTED, *SENSOR_ONLY)}
+HIDEABLE = {effect.name: effect for effect in (*LISTED, *UNLISTED, *NOT_DRAWN)}
 
 
 def find(name: str) -> Hideable:

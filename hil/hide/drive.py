@@ -111,7 +111,7 @@ def _integrate(
     play, since = x[S.pressure_pa : S.pressure_pa + 4].copy(), np.zeros(4)
     demand_pa, y, stages, trial = np.zeros(4), np.zeros(OUTPUTS), np.zeros((4, STATES)), np.zeros(STATES)
     stood = 0.0
-    started = x[S.speed_mps] > 0.0
+    started = x[S.speed_mps] != 0.0
     row = 0
     for tick in range(ticks):
         now = tick * TICK_S
@@ -147,7 +147,7 @@ def _integrate(
                 if e[E.pressure_location, i] <= 1e-4:
                     x[S.line_pa + i] = p
             row += 1
-        stood = stood + TICK_S if started and x[S.speed_mps] < 0.08 else 0.0
+        stood = stood + TICK_S if started and abs(x[S.speed_mps]) < 0.08 else 0.0
         if stood > STANDSTILL_S:
             break
     return row

@@ -165,13 +165,15 @@ def _cold() -> list[_Drive]:
 
 
 def _decide() -> list[_Drive]:
-    """Regenerative pulses and coasting both ways, beside the stops: what the stops alone leave tied."""
+    """Regenerative pulses, coasting both ways and stops in reverse, beside what the stops alone leave tied."""
     return [
         *_stops(),
         _motor_steps("pulses_28", 28.0, 150.0),
         _motor_steps("pulses_20", 20.0, 250.0),
         _coast("coast_out", 36.0, 20.0, 1),
         _coast("coast_back", 36.0, 20.0, -1),
+        _stop("stop_reverse", -9.0, 10.0, 10.0),
+        _stop("stop_reverse_firm", -9.0, 30.0, 6.0),
     ]
 
 

@@ -119,7 +119,7 @@ def _wheels(log: _Sampling) -> dict[str, Vector]:
     cosine, sine = (log.drift(4, noise.order_share, ORDER_TAU_S) for _ in range(2))
     share = cosine * np.cos(angle) + sine * np.sin(angle) + log.drift(4, noise.wheel_drift, noise.sensor_tau_s)
     error = log.white(4) * (noise.wheel_rad_s + noise.wheel_share * np.abs(omega)) + share * omega
-    speed = speed * (1.0 + log.fault("wheel_tooth_error") * np.cos(angle)) + (speed > 0.05) * error
+    speed = speed * (1.0 + log.fault("wheel_tooth_error") * np.cos(angle)) + (np.abs(speed) > 0.05) * error
     speed = np.where(np.abs(speed) * NOMINAL.rolling_radius_m < log.fault("wheel_speed_lowv", 1), 0.0, speed)
     return _named("wheel_speed", "rad_s", log.whole(speed * log.scale("wheel"), "wheel"))
 
@@ -179,12 +179,13 @@ def _sampled(k: int, t: Vector, faults: Faults, waiting: Vector) -> Vector:
 def _from_teeth(driven: Driven, t: Vector) -> Vector:
     """Speed from the teeth that pass within 10 ms around each time; none for half a second is standstill.
 
-    The angle between the last tooth before the window's end and the last one before its start, over the time between.
+    The angle between the last tooth before the window's end and the last one before its start, over the time between;
+    which way the wheel turns the sensor tells as well.
     """
-    pitch, true_t = 2.0 * pi / TEETH, driven.t_s
+    pitch, true_t, way = 2.0 * pi / TEETH, driven.t_s, np.copysign(1.0, driven.manoeuvre.speed_mps)
     speeds = np.zeros((len(t), 4))
     for i in range(4):
-        angle = np.maximum.accumulate(driven.states[:, S.angle_rad + i])
+        angle = np.maximum.accumulate(way * driven.states[:, S.angle_rad + i])
         angle = angle + 1e-12 * np.arange(len(angle))
         passed = np.interp(np.arange(1, int(angle[-1] / pitch) + 1) * pitch, angle, true_t)
         if len(passed) < 2:
@@ -194,12 +195,12 @@ def _from_teeth(driven: Driven, t: Vector) -> Vector:
         ok = (count > 0) & (first >= 0)
         span = passed[np.maximum(last, 0)] - passed[np.maximum(first, 0)]
         speed = np.where(ok, count * pitch / np.where(ok, span, 1.0), np.nan)
-        if driven.manoeuvre.speed_mps > 0.0:  # a car that rolled before the log began
+        if driven.manoeuvre.speed_mps != 0.0:  # a car that rolled before the log began
             speed[: int(np.argmax(ok))] = speed[int(np.argmax(ok))]
         held = np.maximum.accumulate(np.where(np.isfinite(speed), np.arange(len(t)), 0))
         waited = np.maximum(t + 0.5 * TICK_S - passed[np.maximum(last, 0)], 1e-3)
         least = np.where(waited > TIMEOUT_S, 0.0, np.minimum(np.nan_to_num(speed[held]), pitch / waited))
-        speeds[:, i] = np.where(np.isfinite(speed), speed, least)
+        speeds[:, i] = way * np.where(np.isfinite(speed), speed, least)
     return speeds
 
 

@@ -36,6 +36,7 @@ class Row(NamedTuple):
     threshold: int
     residual_drag: int
     stuck_corner: int
+    caliper_asymmetry: int
     air_in_line: int
     fluid_temp: int
     bedding: int

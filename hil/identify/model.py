@@ -64,7 +64,7 @@ def brake_of(parameters: FrictionBrakeParameters, axle: int, pads: int = 2) -> B
     return Brake(
         parameters.piston_area_m2[axle],
         parameters.effective_radius_m[axle],
-        parameters.threshold_pressure_pa,
+        parameters.threshold_pressure_pa[axle],
         parameters.efficiency,
         parameters.ambient_k,
         pads,

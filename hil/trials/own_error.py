@@ -27,8 +27,10 @@ def measure(count: int, seed: int, say: Callable[[str], None]) -> Gains:
     """Gains of every number of an effect, and of every law in no list, by kind of place, over ``count`` null cases.
 
     All places count, not the better ones: the best of nine explains twice what one does by chance alone, and how many
-    looks are taken is the threshold's business (`hil.study.search.screen.threshold`). They are taken where the whole
-    search ends, which may have begun again from numbers that explain more.
+    looks are taken is the threshold's business (`hil.study.search.screen.threshold`). What may be on one side of
+    nothing only counts where it is there: else half its looks would be zeros, and its error seem smaller than that of
+    the same law by another name. They are taken where the whole search ends, which may have begun again from numbers
+    that explain more.
     """
     found: Gains = defaultdict(list)
     for index in range(count):
@@ -45,7 +47,7 @@ def measure(count: int, seed: int, say: Callable[[str], None]) -> Gains:
 
 def _of_numbers(screened: Iterable[Score]) -> Iterator[tuple[Key, float]]:
     for item in screened:
-        if item.usual > _LEAST_USUAL:
+        if item.usual > _LEAST_USUAL and item.value != 0.0:
             candidate = item.candidate
             yield (candidate.effect.name, candidate.parameter.name, kind_of(candidate.place)), item.raw
 

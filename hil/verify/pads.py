@@ -95,7 +95,7 @@ def topic() -> Topic:
         method=RUNGE_KUTTA_4,
     )  # fmt: skip
     brake = car.friction_brake
-    force = brake.efficiency * brake.piston_area_m2[0] * (20e5 - brake.threshold_pressure_pa)
+    force = brake.efficiency * brake.piston_area_m2[0] * (20e5 - brake.threshold_pressure_pa[0])
     power = force * brake.effective_radius_m[0] * float(held["wheel_speed_rad_s_fl"][-1])
     _, mu, kelvin = alone(car, power, 20.0)
     numbers += [

@@ -5,7 +5,7 @@ from plant.effects.effect import Effect, Parameter, Scope, slots
 from plant.effects.joints import J
 from plant.layout import Vector
 
-PARAMETERS = (Parameter("gain", "", -0.6, 1.5, 0.3),)
+PARAMETERS = (Parameter("gain", "", -0.95, 1.5, 0.3),)
 L = slots(Scope.WHEEL, PARAMETERS)
 
 

@@ -26,7 +26,7 @@ class FrictionBrakeParameters:
 
     piston_area_m2: Annotated[tuple[float, float], "m2", 1e-4, 2e-2]
     effective_radius_m: Annotated[tuple[float, float], "m", 0.02, 0.5]
-    threshold_pressure_pa: Annotated[float, "Pa", 0.0, 1e6]
+    threshold_pressure_pa: Annotated[tuple[float, float], "Pa", 0.0, 1e6]
     efficiency: Annotated[float, "", 0.5, 1.0]
     heat_capacity_j_k: Annotated[tuple[float, float], "J/K", 100.0, 50000.0]
     cooling_w_k: Annotated[tuple[float, float], "W/K", 0.0, 200.0]

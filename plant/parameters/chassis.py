@@ -23,6 +23,7 @@ class VehicleParameters:
     rolling_resistance: Annotated[float, "", 0.0, 0.1]
     rolling_resistance_speed_s2_m2: Annotated[float, "s2/m2", 0.0, 1e-4]
     steering_ratio: Annotated[float, "", 1.0, 50.0]
+    slip_angle_share: Annotated[tuple[float, float], "", 0.2, 2.0]  # of an axle's slip angle, at its tyres
 
 
 @dataclass(frozen=True, slots=True)

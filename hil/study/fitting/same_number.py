@@ -1,7 +1,8 @@
 """Causes that are a number of the vehicle: what of them is the number's tolerance, and what the cause.
 
-A dead time that is 15 ms too long is the vehicle's dead time off by as much: no data tell the two apart, only what is
-stated of the vehicle. A fit ends anywhere on that line; here its most likely point is taken.
+A dead time that is 15 ms too long is the vehicle's dead time off by as much, and stamps of a node that are late are its
+latency: no data tell the two apart, only what is stated. A fit ends anywhere on that line; here its most likely point
+is taken.
 """
 
 from collections.abc import Sequence
@@ -18,15 +19,23 @@ from plant.effects.apply import Q
 from plant.effects.theta import THETA
 from plant.vectors import OUTPUT, PARAMETER
 
+_STAMPS = "timestamp_offset"
+"""Of the stamps of a node, the same number as its latency."""
+
 
 @dataclass(frozen=True)
 class Same:
     """The number of the vehicle that a cause is: which of the nuisances, where it lies, how much a unit of the cause
-    moves it."""
+    moves it; whether it is a latency."""
 
     nuisance: int
     at: int
     slope: float
+    latency: bool = False
+
+    def of(self, world: World) -> float:
+        """The number in a world, without the cause."""
+        return world.late_s[self.at] if self.latency else float(world.p[self.at])
 
     def deviation(self, nuisances: Sequence[Nuisance]) -> float:
         """One standard deviation of the number, in units of the cause."""
@@ -35,7 +44,12 @@ class Same:
 
 def same_number(term: Term, nuisances: Sequence[Nuisance], world: World) -> Same | None:
     """The number that the cause is in a world without it; None: it is none, or more than one."""
-    if term.onset is not None or term.candidate.place != "car":
+    if term.onset is not None:
+        return None
+    if term.candidate.effect.name == _STAMPS:
+        late = (k for k, one in enumerate(nuisances) if one.name == f"late_{term.candidate.place}")
+        return next((Same(k, nuisances[k].at[0], 1.0, True) for k in late), None)
+    if term.candidate.place != "car":
         return None
     step = 0.01 * term.candidate.parameter.typical
     moved = [_numbers(term, value, world) for value in (term.value, term.value - step)]
@@ -58,7 +72,7 @@ def restated(model: Model, nuisances: Sequence[Nuisance], base: World) -> Model:
         step, spread = nuisances[same.nuisance].step[0], term.candidate.spread * same.slope
         wanted = _value(term, base.shifted(nuisances, model.z), same)
         z = model.z.copy()
-        z[same.nuisance] = (wanted - base.p[same.at]) * step / (step**2 + spread**2)
+        z[same.nuisance] = (wanted - same.of(base)) * step / (step**2 + spread**2)
         without = base.shifted(nuisances, z)
         parameter = term.candidate.parameter
 
@@ -78,8 +92,10 @@ def restated(model: Model, nuisances: Sequence[Nuisance], base: World) -> Model:
 
 def _value(term: Term, world: World, same: Same) -> float:
     """The number as the equations read it."""
-    numbers = _numbers(term, term.value, world)
-    return float(world.p[same.at] if numbers is None else numbers[same.at])
+    numbers = None if same.latency else _numbers(term, term.value, world)
+    if numbers is None:
+        return same.of(world) + (term.value if same.latency else 0.0)
+    return float(numbers[same.at])
 
 
 def _numbers(term: Term, value: float, world: World) -> Floats | None:

@@ -78,7 +78,7 @@ class Frame:
             for group, values in drive.measured.items():
                 shown = _known(group, values, drive.moving, drive.resting)
                 for name, known in shown.items():
-                    tracks.setdefault(name, []).append(known)
+                    tracks.setdefault(name, []).append(known * drive.compared.get(name, 1.0))
         present = {name: np.concatenate(parts) for name, parts in tracks.items()}
         begun = np.concatenate(restart)  # a lag mixes the first sample with those before, a body in a bend swings in
         swings = np.convolve(begun, np.ones(int(np.ceil(_SWING_S / case.sample_s))))[: len(begun)]

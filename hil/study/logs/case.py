@@ -1,6 +1,7 @@
 """What is replayed and compared: drives on a 10 ms grid, cut into segments."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -33,6 +34,7 @@ class Drive:
     moving, resting : (samples,) where speeds, and where the body at rest is compared.
     speed_mps, pressure_pa : (samples,) about the speed, and the largest pressure.  number : among the drives.
     wait_s : standard deviation of what two nodes' frames wait more or less than each other.
+    compared : track (`hil.study.likelihood.noise`) -> (samples,) where the simulation follows it; all else, everywhere.
     """
 
     log: Log
@@ -46,6 +48,7 @@ class Drive:
     pressure_pa: Floats
     number: int = 0
     wait_s: float = 0.0
+    compared: Mapping[str, Floats] = field(default_factory=dict)
 
     @property
     def samples(self) -> int:

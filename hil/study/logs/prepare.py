@@ -65,7 +65,7 @@ def prepare(logs: Sequence[Log], radius_m: float, unstated: Collection[str] = ()
     """Cut and grid logs.
 
     Of sections that are ``unstated`` in the vehicle set no simulation can follow a demand: torques of such motors are
-    not compared, and pressures only where none is asked for.
+    not compared, and pressures only where none is asked for, or of the left and the right where the same is.
 
     Raises
     ------
@@ -215,11 +215,9 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float, follow
             measured[name][~_sampled(log, channel, begin, len(measured[name]), stride), k] = np.nan
         if name in FILTERED:
             measured[name][: int(np.ceil(FILTER_S / (stride * ROW_S)))] = np.nan
+    compared = {}
     if "pressure" in measured and "pressure" not in followed:
-        asked = averaged(inputs[:, INPUT.slice("pressure_demand_pa")].max(axis=1)[:, None], stride)[:, 0] > _ASKED_PA
-        asked[0] = True  # the simulated one starts where the measured one does
-        since = np.convolve(asked, np.ones(1 + int(SETTLE_S / (stride * ROW_S))))[: len(asked)]
-        measured["pressure"][since > 0.5] = np.nan
+        compared = _pressures_known(averaged(inputs[:, INPUT.slice("pressure_demand_pa")], stride), stride)
     slow = averaged(speed[:, None], stride)[:, 0]
     after = max(int(SETTLE_S / (stride * ROW_S)), 1)
     near_stop = np.convolve(slow < SLOW_MPS, np.ones(2 * after + 1), mode="same") > 0.5
@@ -237,7 +235,25 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float, follow
         slow,
         averaged(brakes[:, None], stride)[:, 0],
         wait_s=wait_s(log.t_s),
+        compared=compared,
     )
+
+
+def _pressures_known(demand_pa: Floats, stride: int) -> dict[str, Floats]:
+    """Where pressures of hydraulics that nobody states are known, by track, (samples,): none are where none is asked
+    for, and both of an axle are alike where the same is asked of both. ``demand_pa`` (samples, 4)."""
+
+    def never_since(asked: Floats) -> Floats:
+        begun = asked > _ASKED_PA
+        begun[0] = True  # the simulated one starts where the measured one does
+        return (np.convolve(begun, np.ones(1 + int(SETTLE_S / (stride * ROW_S))))[: len(begun)] < 0.5) * 1.0
+
+    released = never_since(demand_pa.max(axis=1))
+    alike = [never_since(np.abs(demand_pa[:, left] - demand_pa[:, left + 1])) for left in (0, 2)]
+    return {
+        "pressure.mean": released, "pressure.front-rear": released,
+        "pressure.left-right front": alike[0], "pressure.left-right rear": alike[1],
+    }  # fmt: skip
 
 
 def _sampled(

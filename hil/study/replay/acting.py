@@ -37,7 +37,7 @@ _SECTIONS = {
 }  # fmt: skip
 _LATERAL = (
     "tyre_lky", "tyre_lmuy", "vehicle_steering_ratio", "vehicle_yaw_inertia_kg_m2", "suspension_anti_roll_nm_rad",
-    "suspension_roll_centre_height_m",
+    "suspension_roll_centre_height_m", "vehicle_slip_angle_share", "tyre_pky2",
 )  # fmt: skip
 _AT_JOINT = {
     "friction.mu": Acting.BRAKES, "brake.pressure": Acting.BRAKES, "brake.torque": Acting.BRAKES,

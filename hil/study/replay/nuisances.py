@@ -28,6 +28,8 @@ _SUSPENSION = {
 _LIFT = 0.1
 """The same of an axle's lift coefficient: it takes what two models of the axles' loads do not have in common. Known to
 0.03, it was off by 1.9 of what noise explains on drives with nothing hidden."""
+_SIDE = 0.5
+"""Share that the load may be off at which a tyre's cornering stiffness is largest: whether it grows with the load."""
 _THERMAL = {"friction_brake_heat_capacity_j_k": 0.2, "friction_brake_cooling_w_k": 0.3}
 """Heat store of the discs; where the friction does not depend on temperature it does not matter."""
 _SIGNED = ("suspension_progression_n_m3", "suspension_brake_support_tangent", "suspension_roll_centre_height_m")
@@ -40,8 +42,8 @@ class Nuisance:
 
     ``farthest`` is how many standard deviations it may be off at most; farther off it is a cause to be named.
     ``kind`` says of what: a number of the vehicle (``signed`` if it may be below zero), the discs' temperature at the
-    start, the latency of a node, or of what holds a demand (never below zero), the lag of a toothed wheel, or the time
-    over which it is a mean (never below zero).
+    start, the latency of a node, or of what holds a demand (never below zero), the zero of a sensor, the lag of a
+    toothed wheel, or the time over which it is a mean (never below zero).
     """
 
     name: str
@@ -52,7 +54,9 @@ class Nuisance:
 
 
 def guessed(nuisance: Nuisance, p: Floats) -> Nuisance:
-    """A number that no set states may go far, but to no more than five times or a fifth."""
+    """A number that no set states may go far, but a positive one to no more than five times or a fifth."""
+    if nuisance.kind == "signed":
+        return replace(nuisance, farthest=_GUESSED)
     factor = max(factor_of(p[at], step) for at, step in zip(nuisance.at, nuisance.step, strict=True))
     limit = np.log(_MOST_TIMES) / np.log(factor) if factor > 1.0 else _GUESSED
     return replace(nuisance, farthest=min(_GUESSED, float(limit)))
@@ -81,7 +85,7 @@ def listed(p: Floats, tolerance: Mapping[str, float], thermal: bool, layout: Lay
         "vehicle_mass_kg", "vehicle_cog_height_m", "vehicle_drag_coefficient", "vehicle_rolling_resistance",
         "wheel_rolling_radius_m", "wheel_inertia_kg_m2", "tyre_lkx", "tyre_lsgkp", "ehb_natural_frequency_hz",
         "ehb_damping_ratio", "ehb_dead_time_s", "ehb_build_rate_pa_s", "ehb_release_rate_pa_s",
-        "tyre_lmux", "friction_brake_threshold_pressure_pa", "motor_time_constant_s",
+        "tyre_lmux", "motor_time_constant_s",
         "motor_rate_limit_nm_s", "motor_peak_torque_nm",
         "motor_fade_end_mps", "motor_fade_start_mps", "battery_charge_power_w", "sensor_imu_cutoff_hz",
         "tyre_lky", "vehicle_yaw_inertia_kg_m2", "vehicle_steering_ratio",
@@ -112,12 +116,16 @@ def listed(p: Floats, tolerance: Mapping[str, float], thermal: bool, layout: Lay
             reached = temperature if epsilon >= CONSTANT_EPSILON_W else BRAKE_K
             share = gain / (brake_gain * reached / epsilon)
         add(f"brake_gain_{axle}", [area], [float(share) * p[area]])
+        for name in ("friction_brake_threshold_pressure_pa", "vehicle_slip_angle_share"):
+            add(f"{name}_{axle}", [layout.slice(name).start + k], [tolerance.get(name, 0.0)])
     for name in ("pad_a_1_ks", "pad_epsilon_w", "pad_c_1_s"):
         add(name, [layout.slice(name).start], [tolerance.get(name, 0.0)])
     # forms of curves that no vehicle set states: the tyre's near its peak and at the side, the roll of the body
     add("tyre_curve", [layout.slice("tyre_lex").start], [1.5])
     add("tyre_shape", [layout.slice("tyre_lcx").start], [0.1])
     add("tyre_stiffness_load", [layout.slice("tyre_pkx3").start], [0.3])
+    side = layout.slice("tyre_pky2").start
+    add("tyre_side_stiffness_load", [side], [_SIDE * float(p[side])])
     add("tyre_friction_load", [layout.slice("tyre_pdx2").start], [0.04])
     add("tyre_relaxation_load", [layout.slice("tyre_ptx2").start], [1.5])
     add("wheel_brake_windup_time_s", [layout.slice("wheel_brake_windup_time_s").start], [0.006])

@@ -45,6 +45,7 @@ _SLOW = np.concatenate(
 _INPUTS = (("pressure", "pressure_pa"), ("motor", "motor_torque_nm"))
 _SMOOTH = 21  # rows of 10 ms
 _FADING_MPS, _LEAST_NM = 0.3, 1.0
+_BACKWARD_MPS = 0.5
 _GRADE, _TURNS_MPS2, _CHARACTERISTIC_MPS = 0.01, 0.3, (8.0, 200.0)
 
 
@@ -63,6 +64,11 @@ def _radius_m(world: World) -> Floats:
     worn = 1.0 + world.theta[THETA.slice("tyre_radius", "gain")]
     flat = 1.0 - 0.01 * world.theta[THETA.slice("tyre_pressure_loss", "share")]
     return np.asarray(float(world.p[P.wheel_rolling_radius_m]) * worn * flat)
+
+
+def _moving(speed_mps: float) -> float:
+    """A measured speed; a little backward is a car at rest."""
+    return 0.0 if -_BACKWARD_MPS < speed_mps < 0.0 else speed_mps
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,9 +280,9 @@ class Rig:
     def _speed(self, drive: Drive, segment: Segment, world: World) -> float:
         """Speed a segment starts with: what the sensors told, less what the world's sensors add."""
         if segment.start_speed_mps is not None:
-            return max(ground_speed_before(segment.start_speed_mps, world.theta_in(drive)), 0.0)
+            return _moving(ground_speed_before(segment.start_speed_mps, world.theta_in(drive)))
         told = wheel_speed_before(segment.start_wheel_rad_s, world.theta_in(drive))
-        return max(told, 0.0) * float(np.median(_radius_m(world)))
+        return _moving(told * float(np.median(_radius_m(world))))
 
     def _drive(self, drive: Drive, world: World) -> Stack:
         """Simulated channels of one drive; from what was kept where the worlds cannot differ."""
@@ -340,12 +346,13 @@ class Rig:
         wheels = STATE.slice("wheel_speed_rad_s")
         if not np.isfinite(x).all():
             x[~np.isfinite(x)] = 0.0
-        ratio = speed_mps / now if now > 0.5 else 1.0
+        rolls = abs(now) > 0.5
+        ratio = speed_mps / now if rolls else 1.0
         x[wheels] *= ratio
-        if now <= 0.5:
+        if not rolls:
             x[wheels] += (speed_mps - now) / 0.3
-        if speed_mps < 0.1:
+        if abs(speed_mps) < 0.1:
             x[wheels] = 0.0
         x[X.speed_mps] = speed_mps
         for name in ("lateral_speed_mps", "yaw_rate_rad_s"):
-            x[STATE.slice(name)] *= ratio if now > 0.5 else 0.0
+            x[STATE.slice(name)] *= ratio if rolls else 0.0

@@ -86,7 +86,8 @@ class Telling:
     def _at_measured_speed(self, found: Stack, drive: Drive) -> None:
         """The turning of the car as it is at the measured speed."""
         faster = np.nan_to_num(drive.measured["wheel"] - found["wheel"]).mean(axis=1)
-        turning = np.maximum(found["wheel"].mean(axis=1), SLOW_MPS / _USUAL_RADIUS_M)
+        turning = found["wheel"].mean(axis=1)
+        turning = np.copysign(np.maximum(np.abs(turning), SLOW_MPS / _USUAL_RADIUS_M), turning)
         share = np.clip(faster / turning, -0.2, 0.2)
         both = powers(turning * self.parameters.wheel.rolling_radius_m, self.characteristic_mps)
         for group, power in zip(("ay", "yaw"), both, strict=True):

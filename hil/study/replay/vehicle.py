@@ -21,13 +21,20 @@ from plant.vectors import PARAMETER, P
 
 _CONSTANT_B_1_J = 2e-6
 _STATED = 0.01
+_BALANCE = 0.3
+"""Half width of what an axle's cornering stiffness may be off beside the other's, where nobody states the tyres'."""
 _HELD_KG_M2 = 1e12
 """Yaw inertia of a car that cannot turn."""
-_TURNING = ("vehicle_yaw_inertia_kg_m2", "vehicle_steering_ratio", "tyre_lky")
+_TURNING = (
+    "vehicle_yaw_inertia_kg_m2", "vehicle_steering_ratio", "tyre_lky", "vehicle_slip_angle_share_front",
+    "vehicle_slip_angle_share_rear", "tyre_side_stiffness_load",
+)  # fmt: skip
 _OF_STEERING = ("steer_lateral",)
 _KNOWN = sorted({*ALIASES, *DERIVED, *SPECIAL, *PARAMETER.sizes})
+_FORMS = ("tyre_", "suspension_")
+"""Sections whose curves no set states: where it says nothing else of them either, they may go as far as any guess."""
 _THEN = {
-    "ehb": "pressures are compared only where none has been asked for a while",
+    "ehb": "pressures are compared only where none has been asked for a while, and left and right where the same is",
     "motor": "torques of the motors are not compared with what is asked of them",
 }
 """What follows where a set says nothing of a section."""
@@ -181,12 +188,17 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
             missing.append(name)
             value = float(np.max(np.abs(np.asarray(_value(parameters, name)))))
             tolerance[name] = max(tolerance[name], share * value)
+    if "tyre_lky" in missing:
+        tolerance["vehicle_slip_angle_share"] = max(tolerance["vehicle_slip_angle_share"], _BALANCE)
     if missing:
         remarks.append(f"{where}: not given, so a usual value with wide uncertainty: {', '.join(missing)}")
     tolerance |= {n: max(t, shipped.get(n, 0.0)) if n.startswith("suspension") else t for n, t in tolerances.items()}
     vehicle = _vehicle(parameters, tolerance, friction or not gains, tuple(remarks))
+    silent = tuple(s for s in _FORMS if not any(name.startswith(s) for name in (*given, *tolerances)))
     nuisances = tuple(
-        guessed(one, vehicle.p) if one.name.removesuffix("_front").removesuffix("_rear") in missing else one
+        guessed(one, vehicle.p)
+        if one.name.startswith(silent) or one.name.removesuffix("_front").removesuffix("_rear") in missing
+        else one
         for one in vehicle.nuisances
     )
     return replace(vehicle, nuisances=nuisances, unstated=tuple(unstated))

@@ -76,6 +76,7 @@ WIDE: Final = {
     "wheel_rolling_radius_m": 0.03,
     "wheel_inertia_kg_m2": 0.3,
     "tyre_lkx": 0.4,
+    "tyre_lmux": 0.2,
     "vehicle_yaw_inertia_kg_m2": 0.3,
     "tyre_lky": 0.4,
     "friction_brake_threshold_pressure_pa": 1.0,

@@ -19,6 +19,8 @@ _OF_THE_ROAD = (("road_grade", "grade"), ("headwind", "wind_mps"))
 LATE = ("imu", "pressure", "motor", "demand", "steering")
 """Nodes whose frames may come later than the wheel speeds'; demands, and the steering wheel, may act later than they
 are logged."""
+ZEROS = {"ay_mps2": 0.01, "yaw_rate_rad_s": 5e-4}
+"""Standard deviations of what an inertial unit tells at rest, across: a tenth of a degree of roll, and 0.03 deg/s."""
 DISC_TOLD_K, DISC_GUESSED_K = 5.0, 15.0
 """Standard deviations of the discs' temperature at the start: as a thermocouple tells it, and as we guess."""
 
@@ -57,7 +59,7 @@ class World:
     def shifted(self, nuisances: Sequence[Nuisance], z: Floats) -> "World":
         """With nuisances ``z`` standard deviations off."""
         p, disc, late, tooth = self.p.copy(), self.disc_offset_k, list(self.late_s), self.tooth_share
-        window = self.window_rows2
+        theta, window = self.theta.copy(), self.window_rows2
         for nuisance, amount in zip(nuisances, z, strict=True):
             for at, step in zip(nuisance.at, nuisance.step, strict=True):
                 if nuisance.kind == "disc":
@@ -68,11 +70,15 @@ class World:
                     tooth += amount * step
                 elif nuisance.kind == "window":
                     window += amount * step
+                elif nuisance.kind == "zero":
+                    theta[at] += amount * step
                 elif nuisance.kind == "signed":
                     p[at] += amount * step
                 else:
                     p[at] = _positive(p[at], amount, step)
-        return replace(self, p=p, disc_offset_k=disc, late_s=tuple(late), tooth_share=tooth, window_rows2=window)
+        return replace(
+            self, p=p, theta=theta, disc_offset_k=disc, late_s=tuple(late), tooth_share=tooth, window_rows2=window
+        )
 
 
 def start_nuisances(disc_told: bool) -> list[Nuisance]:
@@ -82,6 +88,10 @@ def start_nuisances(disc_told: bool) -> list[Nuisance]:
     """
     found = [
         Nuisance(f"late_{node}", (k,), (2e-3,), "held" if node == "demand" else "late") for k, node in enumerate(LATE)
+    ]
+    found += [
+        Nuisance(f"zero_{name}", (THETA.slice("imu_bias", name).start,), (step,), "zero")
+        for name, step in ZEROS.items()
     ]
     return [
         Nuisance("disc_temperature_k", (0,), (DISC_TOLD_K if disc_told else DISC_GUESSED_K,), "disc"),

@@ -44,6 +44,23 @@ def odds(contender: Contender) -> float:
     return contender.cost + contender.price - 2.0 * contender.evidence
 
 
+def behind(one: Contender, best: Contender) -> float:
+    """How much worse the odds of one are than those of the best in its place, shared out over the model's error.
+
+    What divides a gain before it is believed divides the difference of two.
+    """
+    return (odds(one) - odds(best)) / _shared_by(best)
+
+
+def worse(one: Contender, best: Contender) -> float:
+    """How much worse one fits than the best in its place, in chi-squared, shared out likewise."""
+    return (one.cost - best.cost) / _shared_by(best)
+
+
+def _shared_by(best: Contender) -> float:
+    return best.error if np.isfinite(best.error) else 1.0
+
+
 def at_its_end(term: Term) -> bool:
     """Whether its value is as far off as it may be: there it explains more than it can be."""
     parameter = term.candidate.parameter

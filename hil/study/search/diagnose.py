@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from hil.study.fitting.fit import Fitter, Model
+from hil.study.fitting.linear import Sums
 from hil.study.fitting.numbers import STRAINED, Numbers, strain
 from hil.study.fitting.own_error import variance_of
 from hil.study.fitting.same_number import restated
@@ -47,6 +48,9 @@ _MISLED = 1.0 / 3.0
 begin again from a better one."""
 _LED_ANEW = 3
 """Leaders that get sensitivities of their own, when they are fitted from the car as handed in."""
+_INFLATED = 1.5
+"""How much more than noise lets them candidates explain beside the best by one step, beyond which it is looked at again
+beside the best as fitted."""
 _HOPELESS, _POOR = 0.1, 0.4
 """Shares of the gain asked: below the one no candidate is looked at with noise of its own, below the other none is
 fitted."""
@@ -122,9 +126,27 @@ class _Search:
         found.screened = self.field.scores(self.fitter, found.sums, found.base, found.first_noise)
         found.untestable = sorted({*not_testable(found.screened), *self.rig.vehicle.untold})
         found.looks = _independent(found.screened)
-        held = self.fitter.at_their_end(found.base.z)
-        found.inflation = inflation(beside_best(found.screened, found.sums, found.base.z, held))
+        found.inflation = np.inf
+        self._asked(found, found.screened, found.sums, found.base)
+
+    def _asked(self, found: Diagnosis, listed: list[Score], sums: Sums, model: Model) -> None:
+        """What is asked of a cause: the more, the more all others seem to explain, as seen beside most causes so far.
+
+        What is to come shows through others, too.
+        """
+        held = self.fitter.at_their_end(model.z)
+        self._inflated(found, inflation(beside_best(listed, sums, model.z, held, len(model.terms))))
+
+    def _inflated(self, found: Diagnosis, seen: float) -> None:
+        found.inflation = min(found.inflation, seen)
         found.least_gain = threshold(found.looks, self.settings.alpha) * found.inflation
+
+    def _asked_beside(self, found: Diagnosis, fitted: list[Contender]) -> float:
+        """What is asked where much was, as seen beside the best as fitted: it lets numbers go back that it had bent."""
+        if found.inflation > _INFLATED and self.settings.relinearise:
+            best = min(fitted, key=odds)
+            self._inflated(found, inflation(self.field.beside(self.fitter, best.model, best.noise)))
+        return found.least_gain
 
     def _shown_at(self, model: Model) -> None:
         """What candidates, and laws in no list, show is that at this model."""
@@ -180,8 +202,8 @@ class _Search:
     def _next(self, found: Diagnosis, model: Model, noise: Noise) -> Accepted | None:
         """The next cause, if one is beyond doubt; no contender where the numbers explain more without a further one."""
         left = LeftOver(found.explained, self.fitter, model, noise, self.field.tracks)
-        least = found.least_gain
         contest, top, fitted = self._leading(found, model, noise, left)
+        least = self._asked_beside(found, fitted) if fitted else found.least_gain
         reference, error, tighter = contest.reference, self._errors(found), contest.noise
 
         def gained() -> list[Contender]:
@@ -198,6 +220,7 @@ class _Search:
                     return *without, []
                 reference = min(reference, bare)
             fitted = with_its_like(self.fitter, self.field, model, since_when(self.fitter, fitted))
+            least = self._asked_beside(found, fitted)
         elif fitted:
             fitted = since_when(self.fitter, fitted)
         listed = min(fitted, key=odds, default=None)
@@ -246,8 +269,8 @@ class _Search:
             if not form_differs(strain):
                 return strain
             if best.model not in known:
-                most = self.field.most_beside(self.fitter, best.model, best.noise)
-                known[best.model] = erring(most, found)
+                others = self.field.beside(self.fitter, best.model, best.noise)
+                known[best.model] = erring(max((item.gain for item in others), default=0.0), found)
             return min(strain, known[best.model])
 
         return error
@@ -256,8 +279,11 @@ class _Search:
         self, found: Diagnosis, model: Model, noise: Noise, left: LeftOver
     ) -> tuple[Contest, list[Score], list[Contender]]:
         """The race for the next cause, its leaders and their fits; no leader where none can be beyond doubt."""
+        listed, sums = self.field.seen(self.fitter, found, model, noise)
+        if model.terms:
+            self._asked(found, listed, sums, model)
         bent, least = self._bent(model), found.least_gain
-        plausible = self.field.plausible(self.fitter, found, model, noise, bent)
+        plausible = self.field.plausible(self.fitter, listed, sums, model, bent)
         contest = Contest(self.fitter, self.field.tracks, model, noise, self.settings.relinearise)
         if _most(plausible, left) < _HOPELESS * least:
             return contest, [], []

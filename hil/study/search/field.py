@@ -47,13 +47,16 @@ class Field:
         met = dict(zip(map(id, hidden), shown, strict=True))
         return [met.get(id(item), item) for item in found]
 
-    def plausible(self, fitter: Fitter, found: Diagnosis, model: Model, noise: Noise, bent: bool) -> list[Score]:
-        """Those that explain most by one step and are not in the model yet; of all places, where numbers are bent."""
-        listed, sums = found.screened, found.sums
+    def seen(self, fitter: Fitter, found: Diagnosis, model: Model, noise: Noise) -> tuple[list[Score], Sums]:
+        """What each explains beside a model by one step, and the products that tell it."""
         if model.terms:
             sums = fitter.screen(model, self.tracks, noise)
-            listed = self.scores(fitter, sums, model, noise)
-        assert sums is not None  # screened before any cause is looked for
+            return self.scores(fitter, sums, model, noise), sums
+        assert found.sums is not None  # screened before any cause is looked for
+        return found.screened, found.sums
+
+    def plausible(self, fitter: Fitter, listed: list[Score], sums: Sums, model: Model, bent: bool) -> list[Score]:
+        """Those that explain most by one step and are not in the model yet; of all places, where numbers are bent."""
         held, starts = fitter.at_their_end(model.z), begins(self._rig.case)
         listed = with_beginnings(listed, sums, len(model.terms), model.z, held, starts, price(self._frame))
         used = {number_of(term.candidate) for term in model.terms}
@@ -63,13 +66,13 @@ class Field:
             best = list(dict.fromkeys([*sorted(listed, key=lambda s: -s.evidence)[:_PLAUSIBLE], *best]))
         return best
 
-    def most_beside(self, fitter: Fitter, model: Model, noise: Noise) -> float:
-        """Most that any other effect explains beside those of a model, by one step, shared out over its own error."""
+    def beside(self, fitter: Fitter, model: Model, noise: Noise) -> list[Score]:
+        """What all other effects explain beside those of a model, by one step."""
         sums, accepted = fitter.screen(model, self.tracks, noise), len(model.terms)
         projected = project(sums.total(), sums.nuisances, range(accepted), model.z, fitter.at_their_end(model.z))
         used = {number_of(term.candidate)[:2] for term in model.terms}
         listed = scores(self.candidates, projected, accepted, [0.0] * len(self.candidates))
-        return max((item.gain for item in listed if number_of(item.candidate)[:2] not in used), default=0.0)
+        return [item for item in listed if number_of(item.candidate)[:2] not in used]
 
     def begun_at(self, fitter: Fitter, model: Model, noise: Noise, moment: Moment) -> list[Score]:
         """What each explains that begins in the manoeuvre of that moment, or in the next one."""

@@ -102,14 +102,17 @@ def inflation(found: Sequence[Score]) -> float:
     return float(np.clip(np.median(shown) / _MEDIAN_CHI2, 1.0, _MOST_INFLATION)) if shown else 1.0
 
 
-def beside_best(found: Sequence[Score], sums: Sums, z: Floats, held: Sequence[int]) -> list[Score]:
+def beside_best(
+    found: Sequence[Score], sums: Sums, z: Floats, held: Sequence[int], accepted: int = 0
+) -> list[Score]:  # fmt: skip
     """What all candidates explain beside the best of them, whose members take what they can.
 
-    A cause shows through whatever resembles it, and is no sign of a wrong model.
+    A cause shows through whatever resembles it, and is no sign of a wrong model. ``accepted`` causes are in the model.
     """
     best = max(found, key=lambda item: item.raw)
-    left = project(sums.total(), sums.nuisances, best.candidate.columns, z, held)
-    return scores([item.candidate for item in found], left, 0, [0.0] * len(found))
+    taken = (*range(accepted), *(accepted + k for k in best.candidate.columns))
+    left = project(sums.total(), sums.nuisances, taken, z, held)
+    return scores([item.candidate for item in found], left, accepted, [0.0] * len(found))
 
 
 def leaders(found: Sequence[Score], count: int) -> list[Score]:

@@ -10,11 +10,11 @@ from hil.study.fitting.fit import Term
 from hil.study.fitting.linear import project
 from hil.study.fitting.own_error import UNLISTED, variance_of_law
 from hil.study.search.basis import Piece, shown
-from hil.study.search.contest import Contender, odds
+from hil.study.search.contest import Contender, behind, worse
 from hil.study.search.diagnosis import TIED, Diagnosis
 from hil.study.search.intervals import half_width, intervals
 from hil.study.search.onset import begins, nearest
-from hil.study.verdict.decide import decide_with, write
+from hil.study.verdict.decide import MOST, Advice, decide_with, write
 from hil.study.verdict.measure import Gain, probabilities
 from hil.study.verdict.patterns import WORDS, Wrong
 from hil.study.verdict.tied import Tied, tied_set
@@ -23,7 +23,7 @@ _MOST_TIED = 5
 _SILENT = 0.5
 """Share of the effects that the manoeuvres would not show, beyond which finding nothing says nothing."""
 _CERTAIN = 4.6
-"""Difference in chi2 (ten to one) below which a cause of another name is not told apart."""
+"""Twice the log of the odds (ten to one) below which a cause of another name is not told apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,15 +76,25 @@ def _verdict(found: Diagnosis, causes: list[dict[str, Any]], tied: Tied | None) 
         return "not_testable" if len(effects.intersection(found.untestable)) > _SILENT * len(effects) else "none"
     if any(isinstance(term.candidate, Piece) for term in found.final.terms):
         return "unlisted"
-    if tied is not None and tied.indices:
+    if tied is not None and _undecided(found, tied):
         return "cannot_tell_apart"
     for listed in found.races:
         best = listed[0]
         for other in listed[1:]:
             another = other.term.candidate.effect.name != best.term.candidate.effect.name
-            if another and odds(other) - odds(best) < _CERTAIN:
+            if another and behind(other, best) < _CERTAIN:
                 return "cannot_tell_apart"
     return "named"
+
+
+def _undecided(found: Diagnosis, tied: Tied) -> tuple[int, ...]:
+    """Those of a tied set that the odds do not decide either: one by one, what is usual may tell the same law by two
+    names apart; several together were not fitted."""
+    best, *others = found.races[0]
+    decided = {c.term.candidate for c in others if behind(c, best) >= _CERTAIN}
+    if len(tied.members) > 1:
+        return tied.indices
+    return tuple(k for k in tied.indices if found.screened[k].candidate not in decided)
 
 
 def _causes(found: Diagnosis) -> list[dict[str, Any]]:
@@ -145,7 +155,7 @@ def _rivals(found: Diagnosis) -> list[tuple[Contender, float]]:
     named = {term.candidate.effect.name for term in found.final.terms}
     for listed in found.races:
         for contender, chance in list(zip(listed, probabilities(listed), strict=True))[1:]:
-            near = contender.cost - listed[0].cost < TIED
+            near = worse(contender, listed[0]) < TIED
             if near and contender.term.candidate.effect.name not in named:
                 rivals.append((contender, chance))
     return rivals
@@ -204,6 +214,17 @@ def _decide_with(
     unique = {name.split("@")[0].split(".")[0]: name for name in reversed(names)}  # the first of each effect
     if len(unique) < 2:
         return []
-    advice = decide_with(list(unique.values())[::-1][:_MOST_TIED])
+    advice = _advice(list(unique.values())[::-1][:_MOST_TIED])
     paths = write(advice, out) if out is not None else [None] * len(advice)
     return [one.as_json(path) for one, path in zip(advice, paths, strict=True)]
+
+
+def _advice(names: list[str]) -> list[Advice]:
+    """What tells all of a set apart; where no drive does, what tells the first from each of the others it can."""
+    advice = decide_with(names)
+    if advice or len(names) == 2:
+        return advice
+    each = {name: decide_with((names[0], name), 1) for name in names[1:]}
+    told = [name for name in names[1:] if each[name]]
+    advice = decide_with((names[0], *told)) if 1 < len(told) < len(each) else []
+    return advice or list({one.scenario: one for name in told for one in each[name]}.values())[:MOST]

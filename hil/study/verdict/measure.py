@@ -9,7 +9,7 @@ from hil.study.fitting.fit import Fitter, Model, Tracks
 from hil.study.fitting.linear import sums
 from hil.study.likelihood.noise import Frame, Noise
 from hil.study.logs.table import Floats
-from hil.study.search.contest import Contender, odds
+from hil.study.search.contest import Contender, behind
 from hil.study.search.diagnosis import Diagnosis
 
 FOLDS = 4
@@ -112,7 +112,7 @@ def _interval(sums_by: Floats) -> tuple[float, float]:
 
 def probabilities(contenders: Sequence[Contender], tempering: float = 1.5) -> list[float]:
     """Softmax of the log-odds, tempered: two contenders are less far apart than an exact noise model would say."""
-    logs = np.array([-0.5 * odds(c) / tempering for c in contenders])
+    logs = np.array([-0.5 * behind(c, contenders[0]) / tempering for c in contenders])
     logs -= logs.max()
     weights = np.exp(logs)
     return [float(v) for v in weights / weights.sum()]

@@ -9,7 +9,7 @@ from hil.report.report import Chart, Curve, Number, Panel, Report, Section, Tabl
 from hil.report.units import BAR, Display, Unit
 from hil.study.fitting.fit import Model
 from hil.study.logs.table import Floats
-from hil.study.search.contest import Contender
+from hil.study.search.contest import Contender, worse
 from hil.study.search.diagnosis import TIED
 from hil.study.verdict.answer import Answer
 from hil.study.verdict.measure import Gain, probabilities
@@ -230,7 +230,7 @@ def _race(answer: Answer) -> Section:
         rows = tuple(
             (
                 c.term.candidate.effect.title, c.term.candidate.name, float(f"{c.term.value:.4g}"),
-                c.term.candidate.parameter.unit, round(c.cost - listed[0].cost, 1), round(100.0 * p, 1),
+                c.term.candidate.parameter.unit, round(worse(c, listed[0]), 1), round(100.0 * p, 1),
             )
             for c, p in zip(listed, chances, strict=True)
         )  # fmt: skip
@@ -266,7 +266,7 @@ def _behind(title: str, listed: Sequence[Contender]) -> list[Chart]:
     if len(listed) < 2:
         return []
     rows = np.arange(1.0, len(listed) + 1.0)
-    behind = Curve("fitted", rows, np.array([c.cost - listed[0].cost for c in listed]), style="points", group="fl")
+    behind = Curve("fitted", rows, np.array([worse(c, listed[0]) for c in listed]), style="points", group="fl")
     rivals = Curve("rivals below", np.array([0.5, len(listed) + 0.5]), np.full(2, TIED), style="demand")
     names = tuple(c.term.candidate.name for c in listed)
     return [Chart(title, "candidate", "", "Δχ² to the best", "", (behind, rivals), names)]

@@ -173,3 +173,33 @@ def test_a_wheel_that_lifts_drives_on():
     strength[E.stuck_corner, 0] = 0.4
     for name in BY_NAME:
         assert np.isfinite(driven(name, strength).states).all(), name
+
+
+def reversing(strength=None):
+    stop = next(manoeuvre for manoeuvre in manoeuvre_set("decide") if manoeuvre.name == "stop_reverse")
+    given = np.zeros((ROWS, 4)) if strength is None else strength
+    return drive(stop, NOMINAL, given, np.zeros(ROWS), 0, np.zeros((stop.ticks, 2)))
+
+
+def test_a_stop_in_reverse_is_a_stop_forward_turned_round():
+    """Loads shift to the other axle, so pads and tyres see a little else."""
+    back = reversing()
+    ahead = drive(
+        replace(back.manoeuvre, speed_mps=9.0), NOMINAL, np.zeros((ROWS, 4)), np.zeros(ROWS), 0,
+        np.zeros((back.manoeuvre.ticks, 2)),
+    )  # fmt: skip
+    rows = round(3.0 / STEP_S)
+    assert back.states[0, S.speed_mps] == -9.0
+    np.testing.assert_allclose(-back.states[:rows, S.speed_mps], ahead.states[:rows, S.speed_mps], atol=0.01)
+    assert abs(back.states[-1, S.speed_mps]) < 0.05
+    assert len(back.states) == pytest.approx(len(ahead.states), rel=0.01)
+    assert abs(energy_balance(back, NOMINAL)) < 1e-3
+
+
+def test_the_leading_end_of_a_pad_grips_forward_and_less_in_reverse():
+    strength = np.zeros((ROWS, 4))
+    strength[E.caliper_asymmetry, 1] = 0.06
+    at = round(2.0 / STEP_S)
+    for stop, share in ((reversing(strength), -0.06), (driven("m05_stop_72_cold", strength), 0.06)):
+        fl, fr = stop.outputs[at, Y.brake_nm], stop.outputs[at, Y.brake_nm + 1]
+        assert fr / fl == pytest.approx(1.0 + share, rel=5e-3)

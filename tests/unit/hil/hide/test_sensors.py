@@ -39,6 +39,16 @@ def test_teeth_give_the_speed(stop):
     assert noisy["wheel_speed_fl_rad_s"][-1] == 0.0
 
 
+def test_teeth_tell_which_way_the_wheel_turns():
+    manoeuvre = next(one for one in manoeuvre_set("decide") if one.name == "stop_reverse")
+    back = drive(manoeuvre, NOMINAL, np.zeros((ROWS, 4)), np.zeros(ROWS), 0, np.zeros((manoeuvre.ticks, 2)))
+    noisy, clean = observe(back, NOISE, {}, (1,)), observe(back, NOISE, {}, (1,), clean=True)
+    fast = clean["wheel_speed_fl_rad_s"] < -10.0
+    assert fast.sum() > 200
+    assert (noisy["wheel_speed_fl_rad_s"] - clean["wheel_speed_fl_rad_s"])[fast].std() < 0.2
+    assert noisy["wheel_speed_fl_rad_s"][-1] == 0.0
+
+
 def test_time_runs_and_frames_wait(stop):
     steps = np.diff(observe(stop, NOISE, {}, (1,))["t_s"])
     assert (steps > 0.0).all()

@@ -7,7 +7,7 @@ from hil.study.fitting.candidates import candidates, columns
 from hil.study.fitting.fit import Model, Term
 from hil.study.fitting.same_number import restated, same_number
 from hil.study.replay.vehicle import paper_car
-from hil.study.replay.world import nominal
+from hil.study.replay.world import nominal, start_nuisances
 
 VEHICLE = paper_car()
 BASE = nominal(VEHICLE)
@@ -40,6 +40,29 @@ def test_a_cause_is_found_to_be_a_number_of_the_vehicle(name, number, slope):
     assert nuisance.name == number
     assert same.slope == pytest.approx(slope)
     assert same.deviation(VEHICLE.nuisances) == pytest.approx(abs(nuisance.step[0] / slope))
+
+
+@pytest.mark.parametrize("node", ["imu", "pressure", "motor"])
+def test_stamps_of_a_node_that_are_late_are_its_latency(node):
+    """45 ms were told as 39, with six by a latency that went as far as it may."""
+    nuisances = (*VEHICLE.nuisances, *start_nuisances(True))
+    at = next(k for k, nuisance in enumerate(nuisances) if nuisance.name == f"late_{node}")
+    z = np.zeros(len(nuisances))
+    z[at] = 3.0
+    term = Term(CANDIDATES[f"timestamp_offset@{node}"], 0.039)
+    told = restated(Model(z, (term,), {}, 9.0, np.zeros((0, 0))), nuisances, BASE)
+    late = BASE.shifted(nuisances, told.z).late_s[nuisances[at].at[0]]
+    assert told.terms[0].value + late == pytest.approx(0.045)
+    assert abs(late) < 5e-4
+    same = same_number(term, nuisances, BASE)
+    assert same is not None
+    assert same.deviation(nuisances) == pytest.approx(2e-3)
+
+
+def test_stamps_of_the_wheels_are_no_latency():
+    """All others are told against them."""
+    nuisances = (*VEHICLE.nuisances, *start_nuisances(True))
+    assert same_number(Term(CANDIDATES["timestamp_offset@wheel"], 0.02), nuisances, BASE) is None
 
 
 @pytest.mark.parametrize("name", ["pad_mu_gain@fl", "road_grade@car", "imu_bias.ax_mps2@car", "slip_stiffness@car"])

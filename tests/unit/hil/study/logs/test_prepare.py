@@ -1,5 +1,7 @@
 """Logs into replays: demands that the measurement contradicts are left out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -48,15 +50,31 @@ def test_a_demand_is_held_from_row_to_row_and_lies_between_sparse_samples(step_s
 
 
 def test_a_pressure_that_nobody_can_follow_is_compared_where_none_is_asked_for() -> None:
-    """A set that says nothing of the hydraulics: an offset still shows while the brakes are released."""
+    """A set that says nothing of the hydraulics: an offset still shows while the brakes are released, and of one wheel
+    beside the other at any time."""
     log = _log(20e5, 20e5)
     case = prepare([log], 0.3, unstated=("ehb", "motor"))
     (drive,) = case.drives
-    compared = np.isfinite(drive.measured["pressure"]).all(axis=1)
     t = np.arange(drive.samples) * case.sample_s
-    assert compared[(t > 1.1) & (t < 2.9)].all()
-    assert not compared[(t > 3.0) & (t < 7.0)].any()
-    assert compared[t > 7.1].all()
+    for track in ("pressure.mean", "pressure.front-rear"):
+        compared = drive.compared[track] > 0.5
+        assert compared[(t > 1.1) & (t < 2.9)].all()
+        assert not compared[(t > 3.0) & (t < 7.0)].any()
+        assert compared[t > 7.1].all()
+    assert all((drive.compared[f"pressure.left-right {axle}"][t > 1.1] > 0.5).all() for axle in ("front", "rear"))
     assert "pressure" not in case.followed
     (drive,) = prepare([log], 0.3).drives
-    assert np.isfinite(drive.measured["pressure"]).all()
+    assert not drive.compared
+
+
+def test_unlike_demands_are_not_compared_as_alike() -> None:
+    log = _log(20e5, 20e5)
+    uneven = replace(
+        log, channels=log.channels | {"pressure_demand_fr_pa": 0.5 * log.channels["pressure_demand_fr_pa"]}
+    )
+    (drive,) = prepare([uneven], 0.3, unstated=("ehb", "motor")).drives
+    t = np.arange(drive.samples) * drive.stride * 0.01
+    front, rear = (drive.compared[f"pressure.left-right {axle}"] > 0.5 for axle in ("front", "rear"))
+    assert not front[(t > 3.0) & (t < 7.0)].any()
+    assert front[t > 7.1].all()
+    assert rear[t > 1.1].all()

@@ -47,12 +47,23 @@ def test_a_tolerance_is_two_standard_deviations() -> None:
 
 
 def test_a_number_of_the_car_told_by_axle_is_taken_between_them_and_told() -> None:
-    """It was refused: rear drums need more pressure before they grip, and the plant has one threshold."""
-    car = load_vehicle({**SIX, "threshold_pressure_pa": [3e4, 24e4], "threshold_pressure_pa_tolerance": 2e4})
-    assert car.parameters.friction_brake.threshold_pressure_pa == pytest.approx(13.5e4)
-    (threshold,) = [n for n in car.nuisances if n.name == "friction_brake_threshold_pressure_pa"]
-    assert threshold.step[0] == pytest.approx(HALF_WIDTH_TO_SIGMA * 10.5e4)
-    assert any("threshold_pressure_pa is one number of the car: 135000 is taken" in text for text in car.remarks)
+    """It was refused."""
+    car = load_vehicle({**SIX, "wheel_inertia_kg_m2": [1.0, 1.4], "wheel_inertia_kg_m2_tolerance": 0.02})
+    assert car.parameters.wheel.inertia_kg_m2 == pytest.approx(1.2)
+    (inertia,) = [n for n in car.nuisances if n.name == "wheel_inertia_kg_m2"]
+    assert inertia.step[0] == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.2)
+    assert any("wheel_inertia_kg_m2 is one number of the car: 1.2 is taken" in text for text in car.remarks)
+
+
+@pytest.mark.parametrize(("told", "taken"), [([3e4, 24e4], (3e4, 24e4)), (4e4, (4e4, 4e4))])
+def test_each_axle_has_its_threshold(told, taken):
+    """Drums at the rear need more pressure before they grip: the axles may be off apart."""
+    car = load_vehicle({**SIX, "threshold_pressure_pa": told, "threshold_pressure_pa_tolerance": 2e4})
+    assert car.parameters.friction_brake.threshold_pressure_pa == pytest.approx(taken)
+    found = [n for n in car.nuisances if n.name.startswith("friction_brake_threshold_pressure_pa")]
+    assert [n.name.rsplit("_", 1)[1] for n in found] == ["front", "rear"]
+    assert [car.p[n.at[0]] for n in found] == pytest.approx(taken)
+    assert all(n.step == pytest.approx((HALF_WIDTH_TO_SIGMA * 2e4,)) for n in found)
 
 
 def test_of_a_tolerance_by_axle_the_larger_counts() -> None:

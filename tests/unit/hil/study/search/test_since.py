@@ -39,10 +39,10 @@ def _screened(
 
 @pytest.mark.parametrize("begin", [2, 3, 5])
 def test_a_cause_in_the_second_half_explains_more_from_there_on(begin: int) -> None:
-    always, later = _screened(begin, 12.0)
+    always, later = _screened(begin, 15.0)
     assert later.since == BEGINS[begin]
     assert later.gain > always.gain
-    assert later.value == pytest.approx(5.0 * 12.0 / ((MANOEUVRES - begin) * SAMPLES) ** 0.5, rel=0.3)
+    assert later.value == pytest.approx(5.0 * 15.0 / ((MANOEUVRES - begin) * SAMPLES) ** 0.5, rel=0.3)
 
 
 def test_what_was_always_there_or_is_nothing_begins_nowhere() -> None:

@@ -19,6 +19,7 @@ TIED = [
     ("pressure_offset", "pad_mu_gain"),
     ("tyre_radius", "wrong_scale"),
     ("tyre_radius", "speed_scale"),
+    ("pad_mu_gain@fr", "caliper_asymmetry@fr"),
 ]
 
 
@@ -49,6 +50,12 @@ def test_what_the_road_does_is_driven_out_and_back():
     assert decide_with(("road_grade", "imu_bias"))[0].both_ways
     assert "back" in decide_with(("road_grade", "imu_bias"))[0].why
     assert not decide_with(("pressure_offset", "pad_mu_gain"))[0].both_ways
+
+
+def test_what_the_leading_end_of_a_pad_does_is_seen_in_reverse():
+    assert [a.scenario for a in decide_with(("pad_mu_gain@fr", "caliper_asymmetry@fr"))] == [
+        "decide_reverse_and_forward"
+    ]
 
 
 def test_an_effect_with_several_numbers_counts_by_the_one_in_doubt():
