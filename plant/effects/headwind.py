@@ -8,7 +8,7 @@ from plant.vectors import P
 
 PARAMETERS = (
     Parameter("wind_mps", "m/s", -20.0, 20.0, 5.0),
-    Parameter("drag_gain", "", -0.5, 1.0, 0.15),
+    Parameter("drag_gain", "", -0.5, 0.6, 0.15),
 )
 L = slots(Scope.CAR, PARAMETERS)
 
@@ -28,7 +28,7 @@ EFFECT = Effect(
     joints=("air.speed", "vehicle_drag_coefficient"),
     scope=Scope.CAR,
     parameters=PARAMETERS,
-    source="M: 5 m/s of wind at 36 m/s is 29 % of the drag; roof loads, weather",
+    source="M: 5 m/s of wind at 36 m/s is 29 % of the drag; roof loads to 60 %, weather",
     signature="grows with v^2, the wind's part with v; changes sign with the direction; alike at all torques",
     manoeuvre="coast_down",
     confounded_with=("rolling_resistance", "road_grade"),
