@@ -21,6 +21,8 @@ LATE = ("imu", "pressure", "motor", "demand", "steering")
 are logged."""
 ZEROS = {"ay_mps2": 0.01, "yaw_rate_rad_s": 5e-4}
 """Standard deviations of what an inertial unit tells at rest, across: a tenth of a degree of roll, and 0.03 deg/s."""
+SCALE = 0.005
+"""Standard deviation of the scale of a pressure sensor: of a class of 1 %."""
 DISC_TOLD_K, DISC_GUESSED_K = 5.0, 15.0
 """Standard deviations of the discs' temperature at the start: as a thermocouple tells it, and as we guess."""
 
@@ -70,7 +72,7 @@ class World:
                     tooth += amount * step
                 elif nuisance.kind == "window":
                     window += amount * step
-                elif nuisance.kind == "zero":
+                elif nuisance.kind == "sensor":
                     theta[at] += amount * step
                 elif nuisance.kind == "signed":
                     p[at] += amount * step
@@ -81,18 +83,25 @@ class World:
         )
 
 
-def start_nuisances(disc_told: bool) -> list[Nuisance]:
-    """What the logs, not the vehicle, leave open: temperature of the discs, latency of the nodes.
+def start_nuisances(disc_told: bool, sides_alike: bool = False) -> list[Nuisance]:
+    """What the logs, not the vehicle, leave open: temperature of the discs, latency of the nodes, zeros and scales.
 
-    ``disc_told``: all logs tell the discs' temperature at the start.
+    ``disc_told``: all logs tell the discs' temperature at the start.  ``sides_alike``: pressures left and right are
+    compared with each other, not with a simulated one.
     """
     found = [
         Nuisance(f"late_{node}", (k,), (2e-3,), "held" if node == "demand" else "late") for k, node in enumerate(LATE)
     ]
     found += [
-        Nuisance(f"zero_{name}", (THETA.slice("imu_bias", name).start,), (step,), "zero")
+        Nuisance(f"zero_{name}", (THETA.slice("imu_bias", name).start,), (step,), "sensor")
         for name, step in ZEROS.items()
     ]
+    if sides_alike:
+        gain = THETA.slice("pressure_gain", "gain").start
+        found += [
+            Nuisance(f"pressure_scale_{axle}", (gain + k, gain + k + 1), (SCALE, -SCALE), "sensor")
+            for axle, k in (("front", 0), ("rear", 2))
+        ]
     return [
         Nuisance("disc_temperature_k", (0,), (DISC_TOLD_K if disc_told else DISC_GUESSED_K,), "disc"),
         Nuisance("tooth_lag", (0,), (0.5,), "tooth"),
