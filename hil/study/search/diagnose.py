@@ -1,12 +1,11 @@
 """The diagnosis: noise first, then nuisances, then one cause at a time, fitted non-linearly before it is believed."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from hil.study.fitting.fit import Fitter, Model
-from hil.study.fitting.linear import Sums
 from hil.study.fitting.numbers import STRAINED, Numbers, strain
 from hil.study.fitting.own_error import variance_of
 from hil.study.fitting.same_number import restated
@@ -16,6 +15,7 @@ from hil.study.logs.table import Floats
 from hil.study.replay.rig import Rig
 from hil.study.replay.vehicle import Vehicle
 from hil.study.replay.world import World
+from hil.study.search.asked import Asked, errors
 from hil.study.search.basis import Piece
 from hil.study.search.begun import since_when, with_its_like
 from hil.study.search.contest import (
@@ -29,13 +29,13 @@ from hil.study.search.contest import (
     worth,
 )
 from hil.study.search.diagnosis import Diagnosis, Say, Settings, causes_in
-from hil.study.search.doubt import backward, erring, form_differs, stands_beside, strained, with_gain
+from hil.study.search.doubt import backward, stands_beside, with_gain
 from hil.study.search.field import Field, number_of
 from hil.study.search.handed_in import Refitted, from_handed_in
 from hil.study.search.left_over import LeftOver
 from hil.study.search.one_for_all import one_for_all
 from hil.study.search.onset import with_onsets
-from hil.study.search.screen import LEADERS, Score, beside_best, inflation, leaders, not_testable, threshold
+from hil.study.search.screen import LEADERS, Score, leaders, not_testable
 from hil.study.search.unlisted import Round, Unlisted
 
 _TRIED = 10
@@ -48,9 +48,6 @@ _MISLED = 1.0 / 3.0
 begin again from a better one."""
 _LED_ANEW = 3
 """Leaders that get sensitivities of their own, when they are fitted from the car as handed in."""
-_INFLATED = 1.5
-"""How much more than noise lets them candidates explain beside the best by one step, beyond which it is looked at again
-beside the best as fitted."""
 _HOPELESS, _POOR = 0.1, 0.4
 """Shares of the gain asked: below the one no candidate is looked at with noise of its own, below the other none is
 fitted."""
@@ -125,28 +122,8 @@ class _Search:
         found.sums = self.fitter.screen(found.base, self.field.tracks, found.first_noise)
         found.screened = self.field.scores(self.fitter, found.sums, found.base, found.first_noise)
         found.untestable = sorted({*not_testable(found.screened), *self.rig.vehicle.untold})
-        found.looks = _independent(found.screened)
-        found.inflation = np.inf
-        self._asked(found, found.screened, found.sums, found.base)
-
-    def _asked(self, found: Diagnosis, listed: list[Score], sums: Sums, model: Model) -> None:
-        """What is asked of a cause: the more, the more all others seem to explain, as seen beside most causes so far.
-
-        What is to come shows through others, too.
-        """
-        held = self.fitter.at_their_end(model.z)
-        self._inflated(found, inflation(beside_best(listed, sums, model.z, held, len(model.terms))))
-
-    def _inflated(self, found: Diagnosis, seen: float) -> None:
-        found.inflation = min(found.inflation, seen)
-        found.least_gain = threshold(found.looks, self.settings.alpha) * found.inflation
-
-    def _asked_beside(self, found: Diagnosis, fitted: list[Contender]) -> float:
-        """What is asked where much was, as seen beside the best as fitted: it lets numbers go back that it had bent."""
-        if found.inflation > _INFLATED and self.settings.relinearise:
-            best = min(fitted, key=odds)
-            self._inflated(found, inflation(self.field.beside(self.fitter, best.model, best.noise)))
-        return found.least_gain
+        self.asked = Asked(found, self.field, self.settings.alpha)
+        self.asked.beside(self.fitter, found.screened, found.sums, found.base)
 
     def _shown_at(self, model: Model) -> None:
         """What candidates, and laws in no list, show is that at this model."""
@@ -203,24 +180,25 @@ class _Search:
         """The next cause, if one is beyond doubt; no contender where the numbers explain more without a further one."""
         left = LeftOver(found.explained, self.fitter, model, noise, self.field.tracks)
         contest, top, fitted = self._leading(found, model, noise, left)
-        least = self._asked_beside(found, fitted) if fitted else found.least_gain
-        reference, error, tighter = contest.reference, self._errors(found), contest.noise
+        error = errors(self.fitter, self.field, self.told, found)
+        reference, tighter = contest.reference, contest.noise
 
         def gained() -> list[Contender]:
             best = min(fitted, key=odds)
             return [with_gain(c, reference - left.of(c.term.candidate), error(c, best)) for c in fitted]
 
         if fitted and self.settings.relinearise:
-            if self._bent(model) or max(one.gained for one in gained()) >= least:
+            self.asked.beside_fitted(self.fitter, fitted)
+            if self._bent(model) or max(one.gained for one in gained()) >= found.least_gain:
                 fitted, without = self._fitted_again(model, fitted, top, reference)
                 bare = without[0].cost
                 worse, more = reference - bare, bare - min(c.cost for c in fitted)
-                if not self.began_again and worse > max(least, _MISLED * more):
+                if not self.began_again and worse > max(found.least_gain, _MISLED * more):
                     self.began_again = True
                     return *without, []
                 reference = min(reference, bare)
             fitted = with_its_like(self.fitter, self.field, model, since_when(self.fitter, fitted))
-            least = self._asked_beside(found, fitted)
+            self.asked.beside_fitted(self.fitter, fitted)
         elif fitted:
             fitted = since_when(self.fitter, fitted)
         listed = min(fitted, key=odds, default=None)
@@ -230,12 +208,12 @@ class _Search:
         now = Round(contest, model, tighter, reference, listed, left, error, self._bent(model))
         law = self.unlisted.best(found, now)
         fitted = gained() if fitted else []
-        clear = sorted((c for c in fitted if c.gained >= least and worth(c) > 0.0), key=odds)
+        clear = sorted((c for c in fitted if c.gained >= found.least_gain and worth(c) > 0.0), key=odds)
         if law is not None:
             found.explained += reference - law.cost
             polished, tighter = self.fitter.settle(law.model, law.noise, 1)
             return polished, tighter, [replace(law, model=polished), *clear]
-        best = self._standing(fitted, clear, least) if fitted else None
+        best = self._standing(fitted, clear, found.least_gain) if fitted else None
         if best is None:
             return None
         best, clear = self._placed(found, best, clear)
@@ -260,28 +238,13 @@ class _Search:
         found.explained += model.cost - singles[0].cost
         return self.fitter.settle(singles[0].model, noise, 2)
 
-    def _errors(self, found: Diagnosis) -> Callable[[Contender, Contender], float]:
-        """What the gain of a contender is divided by for what the model gets wrong here, seen beside the best one."""
-        known: dict[Model, float] = {}
-
-        def error(one: Contender, best: Contender) -> float:
-            strain = strained(self.fitter, one.model.z, self.told)
-            if not form_differs(strain):
-                return strain
-            if best.model not in known:
-                others = self.field.beside(self.fitter, best.model, best.noise)
-                known[best.model] = erring(max((item.gain for item in others), default=0.0), found)
-            return min(strain, known[best.model])
-
-        return error
-
     def _leading(
         self, found: Diagnosis, model: Model, noise: Noise, left: LeftOver
     ) -> tuple[Contest, list[Score], list[Contender]]:
         """The race for the next cause, its leaders and their fits; no leader where none can be beyond doubt."""
         listed, sums = self.field.seen(self.fitter, found, model, noise)
         if model.terms:
-            self._asked(found, listed, sums, model)
+            self.asked.beside(self.fitter, listed, sums, model)
         bent, least = self._bent(model), found.least_gain
         plausible = self.field.plausible(self.fitter, listed, sums, model, bent)
         contest = Contest(self.fitter, self.field.tracks, model, noise, self.settings.relinearise)
@@ -338,9 +301,3 @@ class _Search:
 def _most(listed: Sequence[Score], left: LeftOver) -> float:
     """Most that a candidate gains by one step, beyond what the causes in the model may leave."""
     return max((item.gain - left.of(item.candidate) / variance_of(item.candidate) for item in listed), default=0.0)
-
-
-def _independent(found: Sequence[Score]) -> int:
-    """How many looks: candidates that can show at all, places of one effect counted as one and a half."""
-    names = {(s.candidate.effect.name, s.candidate.parameter.name) for s in found if s.reach > 1.0}
-    return max(1, round(1.5 * len(names)))
