@@ -1,10 +1,13 @@
-"""Contenders for a cause: what is at the end of its range."""
+"""Contenders for a cause: what is at the end of its range, and how far one is behind another."""
 
+from typing import Any
+
+import numpy as np
 import pytest
 
 from hil.study.fitting.candidates import candidates, columns
 from hil.study.fitting.fit import Term
-from hil.study.search.contest import at_its_end
+from hil.study.search.contest import Contender, at_its_end, behind, worse
 
 CANDIDATES = {c.name: c for c in candidates(columns())}
 
@@ -13,3 +16,17 @@ CANDIDATES = {c.name: c for c in candidates(columns())}
 def test_a_value_as_far_off_as_it_may_be_is_at_its_end(share: float, ended: bool) -> None:
     drag = CANDIDATES["headwind.drag_gain@car"]
     assert at_its_end(Term(drag, share * drag.parameter.high)) is ended
+
+
+def _fitted(cost: float, evidence: float, error: float) -> Contender:
+    nothing: Any = None
+    return Contender(Term(CANDIDATES["mass_offset@car"], 100.0), nothing, cost, evidence, 1.0, nothing, error=error)
+
+
+@pytest.mark.parametrize(("error", "shared_by"), [(np.inf, 1.0), (1.0, 1.0), (4.0, 4.0)])
+def test_what_divides_gains_divides_their_difference(error: float, shared_by: float) -> None:
+    """A mass was 85 behind its motors, in lateral channels alone, in a car of another form."""
+    best, other = _fitted(-300.0, -4.0, error), _fitted(-260.0, -3.0, 9.0)
+    assert worse(other, best) == pytest.approx(40.0 / shared_by)
+    assert behind(other, best) == pytest.approx(38.0 / shared_by)
+    assert worse(best, best) == behind(best, best) == 0.0
