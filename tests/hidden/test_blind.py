@@ -45,6 +45,14 @@ def test_what_was_an_alarm_once_is_none_now(index: int, seed: int) -> None:
     assert run_case(draw("null", index, seed), seed, None)["causes"] == []
 
 
+def test_a_calliper_that_grips_less_in_reverse_is_named_where_it_is_driven_so() -> None:
+    case = make_case((Hidden("caliper_asymmetry", "fr", 0.06),), SEED, "medium", "decide")
+    record = run_case(case, SEED, None)
+    assert record["named"][:1] == ["caliper_asymmetry"]
+    assert record["causes"][0]["wheel"] == "fr"
+    assert record["causes"][0]["parameters"]["gain"]["value"] == pytest.approx(0.06, rel=0.2)
+
+
 @pytest.mark.parametrize("effect", ["pad_temp_fade", "mu_nv_dynamics", "mu_warmup"])
 def test_a_single_cause_is_named(effect: str) -> None:
     record = run_case(draw("single", SINGLES.index(effect), SEED, 15.0), SEED, 15.0)

@@ -21,8 +21,8 @@ LATE = ("imu", "pressure", "motor", "demand", "steering")
 are logged."""
 ZEROS = {"ay_mps2": 0.01, "yaw_rate_rad_s": 5e-4}
 """Standard deviations of what an inertial unit tells at rest, across: a tenth of a degree of roll, and 0.03 deg/s."""
-SCALE = 0.005
-"""Standard deviation of the scale of a pressure sensor: of a class of 1 %."""
+ZERO_PA, SCALE = 7e3, 0.005
+"""Standard deviations of zero and scale of a pressure sensor: of a good one for 200 bar, of a class of 1 %."""
 DISC_TOLD_K, DISC_GUESSED_K = 5.0, 15.0
 """Standard deviations of the discs' temperature at the start: as a thermocouple tells it, and as we guess."""
 
@@ -97,9 +97,11 @@ def start_nuisances(disc_told: bool, sides_alike: bool = False) -> list[Nuisance
         for name, step in ZEROS.items()
     ]
     if sides_alike:
-        gain = THETA.slice("pressure_gain", "gain").start
+        zero = THETA.slice("pressure_offset", "offset_pa").start
+        scale = THETA.slice("pressure_gain", "gain").start
         found += [
-            Nuisance(f"pressure_scale_{axle}", (gain + k, gain + k + 1), (SCALE, -SCALE), "sensor")
+            Nuisance(f"pressure_{name}_{axle}", (at + k, at + k + 1), (step, -step), "sensor")
+            for name, at, step in (("zero", zero, ZERO_PA), ("scale", scale, SCALE))
             for axle, k in (("front", 0), ("rear", 2))
         ]
     return [

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hil.study.replay.vehicle import load_vehicle, paper_car
-from hil.study.replay.world import SCALE, ZEROS, nominal, start_nuisances
+from hil.study.replay.world import SCALE, ZERO_PA, ZEROS, nominal, start_nuisances
 from plant.effects.theta import THETA
 
 SIX = {
@@ -40,12 +40,13 @@ def test_sensors_have_zeros_and_where_only_sides_are_compared_scales():
     """0.012 m/s2 across, a tenth of a degree, and sensors of a brake 0.6 % apart were told as causes."""
     stated, alike = start_nuisances(True), start_nuisances(True, sides_alike=True)
     more = [nuisance.name for nuisance in alike[len(stated) :]]
-    assert more == ["pressure_scale_front", "pressure_scale_rear"]
+    assert more == [f"pressure_{what}_{axle}" for what in ("zero", "scale") for axle in ("front", "rear")]
     base = nominal(paper_car())
     z = np.array([1.0 if one.kind == "sensor" else 0.0 for one in alike])
     theta = base.shifted(alike, z).theta
     assert theta[THETA.slice("imu_bias", "ay_mps2")] == pytest.approx(ZEROS["ay_mps2"])
     assert theta[THETA.slice("imu_bias", "yaw_rate_rad_s")] == pytest.approx(ZEROS["yaw_rate_rad_s"])
     assert theta[THETA.slice("pressure_gain", "gain")] == pytest.approx([SCALE, -SCALE, SCALE, -SCALE])
-    assert np.flatnonzero(theta != base.theta).size == 6
+    assert theta[THETA.slice("pressure_offset", "offset_pa")] == pytest.approx([ZERO_PA, -ZERO_PA, ZERO_PA, -ZERO_PA])
+    assert np.flatnonzero(theta != base.theta).size == 10
     assert (base.shifted(alike, 0.0 * z).theta == base.theta).all()
