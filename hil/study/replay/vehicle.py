@@ -14,6 +14,7 @@ from hil.parameters import ParameterError, is_number, load_set, override
 from hil.study.logs.table import Floats, UnusableError
 from hil.study.replay.nuisances import BRAKE_K, CONSTANT_EPSILON_W, Nuisance, guessed, listed
 from hil.study.replay.vehicle_keys import ALIASES, DERIVED, OF_SECTION, SPECIAL, UNLIMITED, WIDE
+from plant.effects.theta import THETA
 from plant.friction import mu_equilibrium
 from plant.model import pack
 from plant.parameters.plant import PlantParameters
@@ -21,6 +22,8 @@ from plant.vectors import PARAMETER, P
 
 _CONSTANT_B_1_J = 2e-6
 _STATED = 0.01
+_TORQUE_SCALE = 0.005
+"""Standard deviation of the torque that a motor gives, as a share of what it is asked for."""
 _BALANCE = 0.3
 """Half width of what an axle's cornering stiffness may be off beside the other's, where nobody states the tyres'."""
 _HELD_KG_M2 = 1e12
@@ -201,7 +204,19 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
         else one
         for one in vehicle.nuisances
     )
+    if any(name.startswith("motor_") for name in unlimited) and "motor" not in unstated:
+        nuisances += _torque_scales()
     return replace(vehicle, nuisances=nuisances, unstated=tuple(unstated))
+
+
+def _torque_scales() -> tuple[Nuisance, ...]:
+    """How far each motor may give more than it is asked for, where nobody states all of its limits: who does has
+    measured it."""
+    first = THETA.slice("iwm_gain", "gain").start
+    return tuple(
+        Nuisance(f"torque_scale_{wheel}", (first + k,), (_TORQUE_SCALE,), "sensor")
+        for k, wheel in enumerate(("fl", "fr", "rl", "rr"))
+    )
 
 
 def _derive(

@@ -159,9 +159,9 @@ def test_the_hash_covers_the_csv(write, tmp_path):
 
 
 WRONG = [
-    ("speed_mps = 20.0", "speed = 20.0", "mine.toml: start.speed_mps: expected a number from 0 to 60, got None"),
-    ("speed_mps = 20.0\ndisc", "speed_mps = 99.0\ndisc", "expected a number from 0 to 60, got 99.0"),
-    ("speed_mps = 20.0\ndisc", "speed_mps = nan\ndisc", "expected a number from 0 to 60, got nan"),
+    ("speed_mps = 20.0", "speed = 20.0", "mine.toml: start.speed_mps: expected a number from -15 to 60, got None"),
+    ("speed_mps = 20.0\ndisc", "speed_mps = 99.0\ndisc", "expected a number from -15 to 60, got 99.0"),
+    ("speed_mps = 20.0\ndisc", "speed_mps = nan\ndisc", "expected a number from -15 to 60, got nan"),
     ("speed_mps = 20.0\ndisc", "speed_mps = 20.0\nodd = 1\ndisc", "start: unknown key 'odd'; known here: disc_temp"),
     ("wait_for_ecu = true", "wait_for_ecu = 1", "start.wait_for_ecu: expected true or false, got 1"),
     ("after_standstill_s = false", "after_standstill_s = true", "end.after_standstill_s: expected a number from"),
