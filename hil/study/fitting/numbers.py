@@ -46,8 +46,7 @@ class Numbers:
     def __init__(self, rig: Rig, frame: Frame, vehicle: Vehicle, base: World, relinearise: bool) -> None:
         self._rig, self._frame, self._base, self._relinearise = rig, frame, base, relinearise
         told = all(drive.log.disc_temperature_k is not None for drive in rig.case.drives)
-        sides_alike = "pressure" in rig.case.groups and "pressure" not in rig.case.followed
-        self.nuisances = (*vehicle.nuisances, *start_nuisances(told, sides_alike))
+        self.nuisances = (*vehicle.nuisances, *start_nuisances(told))
         self._steps: Floats = np.full(len(self.nuisances), _COARSE)
 
     def anew(self, z: Floats, terms: Sequence[Term] = ()) -> None:

@@ -1,7 +1,7 @@
 """The vehicle as handed in: files and mappings into a parameter vector and its tolerances."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from importlib import resources
@@ -22,8 +22,11 @@ from plant.vectors import PARAMETER, P
 
 _CONSTANT_B_1_J = 2e-6
 _STATED = 0.01
-_TORQUE_SCALE = 0.005
-"""Standard deviation of the torque that a motor gives, as a share of what it is asked for."""
+_LOOSE = (
+    ("ehb", "pressure_offset", "offset_pa", 7e3), ("ehb", "pressure_gain", "gain", 0.005),
+    ("motor", "iwm_gain", "gain", 0.005),
+)  # fmt: skip
+"""Standard deviations of a pressure sensor of a class of 1 %, for 150 bar or so, and of the torque a motor gives."""
 _BALANCE = 0.3
 """Half width of what an axle's cornering stiffness may be off beside the other's, where nobody states the tyres'."""
 _HELD_KG_M2 = 1e12
@@ -204,19 +207,23 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
         else one
         for one in vehicle.nuisances
     )
-    if any(name.startswith("motor_") for name in unlimited) and "motor" not in unstated:
-        nuisances += _torque_scales()
-    return replace(vehicle, nuisances=nuisances, unstated=tuple(unstated))
+    loose = {section for section in UNLIMITED if any(name.startswith(f"{section}_") for name in unlimited)}
+    if "motor" in unstated:
+        loose -= {"motor"}  # nothing is compared with what is asked of them
+    return replace(vehicle, nuisances=(*nuisances, *_by_wheel(loose)), unstated=tuple(unstated))
 
 
-def _torque_scales() -> tuple[Nuisance, ...]:
-    """How far each motor may give more than it is asked for, where nobody states all of its limits: who does has
-    measured it."""
-    first = THETA.slice("iwm_gain", "gain").start
-    return tuple(
-        Nuisance(f"torque_scale_{wheel}", (first + k,), (_TORQUE_SCALE,), "sensor")
+def _by_wheel(loose: Collection[str]) -> list[Nuisance]:
+    """What each brake and motor may be off by itself where nobody states all limits of hydraulics or motors.
+
+    Who states them has measured the rest as well.
+    """
+    return [
+        Nuisance(f"{effect}_{wheel}", (THETA.slice(effect, number).start + k,), (step,), "sensor")
+        for section, effect, number, step in _LOOSE
+        if section in loose
         for k, wheel in enumerate(("fl", "fr", "rl", "rr"))
-    )
+    ]
 
 
 def _derive(

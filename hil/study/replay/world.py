@@ -21,8 +21,6 @@ LATE = ("imu", "pressure", "motor", "demand", "steering")
 are logged."""
 ZEROS = {"ay_mps2": 0.01, "yaw_rate_rad_s": 5e-4}
 """Standard deviations of what an inertial unit tells at rest, across: a tenth of a degree of roll, and 0.03 deg/s."""
-ZERO_PA, SCALE = 7e3, 0.005
-"""Standard deviations of zero and scale of a pressure sensor: of a good one for 200 bar, of a class of 1 %."""
 DISC_TOLD_K, DISC_GUESSED_K = 5.0, 15.0
 """Standard deviations of the discs' temperature at the start: as a thermocouple tells it, and as we guess."""
 
@@ -83,11 +81,10 @@ class World:
         )
 
 
-def start_nuisances(disc_told: bool, sides_alike: bool = False) -> list[Nuisance]:
-    """What the logs, not the vehicle, leave open: temperature of the discs, latency of the nodes, zeros and scales.
+def start_nuisances(disc_told: bool) -> list[Nuisance]:
+    """What the logs, not the vehicle, leave open: temperature of the discs, latency of the nodes, zeros.
 
-    ``disc_told``: all logs tell the discs' temperature at the start.  ``sides_alike``: pressures left and right are
-    compared with each other, not with a simulated one.
+    ``disc_told``: all logs tell the discs' temperature at the start.
     """
     found = [
         Nuisance(f"late_{node}", (k,), (2e-3,), "held" if node == "demand" else "late") for k, node in enumerate(LATE)
@@ -96,14 +93,6 @@ def start_nuisances(disc_told: bool, sides_alike: bool = False) -> list[Nuisance
         Nuisance(f"zero_{name}", (THETA.slice("imu_bias", name).start,), (step,), "sensor")
         for name, step in ZEROS.items()
     ]
-    if sides_alike:
-        zero = THETA.slice("pressure_offset", "offset_pa").start
-        scale = THETA.slice("pressure_gain", "gain").start
-        found += [
-            Nuisance(f"pressure_{name}_{axle}", (at + k, at + k + 1), (step, -step), "sensor")
-            for name, at, step in (("zero", zero, ZERO_PA), ("scale", scale, SCALE))
-            for axle, k in (("front", 0), ("rear", 2))
-        ]
     return [
         Nuisance("disc_temperature_k", (0,), (DISC_TOLD_K if disc_told else DISC_GUESSED_K,), "disc"),
         Nuisance("tooth_lag", (0,), (0.5,), "tooth"),

@@ -139,12 +139,19 @@ def test_a_brake_gain_without_tolerance_is_known_to_a_hundredth() -> None:
     assert share(told) == pytest.approx(0.1, rel=0.02)
 
 
-@pytest.mark.parametrize(("more", "count"), [
-    ({}, 0), ({"motor_time_constant_s": 0.02}, 4),
-    ({"motor_time_constant_s": 0.02, "motor_peak_torque_nm": 700.0, "motor_peak_power_w": 75e3,
-      "motor_rate_limit_nm_s": 12e3, "motor_fade_start_mps": 2.0, "motor_fade_end_mps": 0.5}, 0),
+HYDRAULICS = {"ehb_build_rate_pa_s": 25e6, "ehb_release_rate_pa_s": 40e6}
+MOTORS = {
+    "motor_time_constant_s": 0.02, "motor_peak_torque_nm": 700.0, "motor_peak_power_w": 75e3,
+    "motor_rate_limit_nm_s": 12e3, "motor_fade_start_mps": 2.0, "motor_fade_end_mps": 0.5,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("told", "off"), [
+    ({}, ("pressure_offset", "pressure_gain")), (MOTORS, ("pressure_offset", "pressure_gain")),
+    ({"motor_time_constant_s": 0.02}, ("pressure_offset", "pressure_gain", "iwm_gain")), (HYDRAULICS | MOTORS, ()),
 ])  # fmt: skip
-def test_motors_that_nobody_measured_whole_may_give_half_a_hundredth_more(more, count):
-    """0.4 % of one motor was told as a cause beside late stamps."""
-    car = load_vehicle({**SIX, **more})
-    assert sum(n.name.startswith("torque_scale_") for n in car.nuisances) == count
+def test_what_nobody_measured_whole_is_off_wheel_by_wheel(told, off):
+    """0.7 % of one pressure, 0.4 % of one motor were told as causes: no sensor is better."""
+    car = load_vehicle({**SIX, **told})
+    found = [n.name for n in car.nuisances if n.kind == "sensor"]
+    assert found == [f"{effect}_{wheel}" for effect in off for wheel in ("fl", "fr", "rl", "rr")]
