@@ -27,6 +27,7 @@ _LOOSE = (
     ("motor", "iwm_gain", "gain", 0.005),
 )  # fmt: skip
 """Standard deviations of a pressure sensor of a class of 1 %, for 150 bar or so, and of the torque a motor gives."""
+_THRESHOLD = "friction_brake_threshold_pressure_pa"
 _BALANCE = 0.3
 """Half width of what an axle's cornering stiffness may be off beside the other's, where nobody states the tyres'."""
 _HELD_KG_M2 = 1e12
@@ -207,10 +208,19 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
         else one
         for one in vehicle.nuisances
     )
+    if is_number(numbers.get(_THRESHOLD)):
+        nuisances = _as_one(nuisances, _THRESHOLD)
     loose = {section for section in UNLIMITED if any(name.startswith(f"{section}_") for name in unlimited)}
     if "motor" in unstated:
         loose -= {"motor"}  # nothing is compared with what is asked of them
     return replace(vehicle, nuisances=(*nuisances, *_by_wheel(loose)), unstated=tuple(unstated))
+
+
+def _as_one(nuisances: tuple[Nuisance, ...], name: str) -> tuple[Nuisance, ...]:
+    """A number of each axle that is stated once is one number."""
+    front, rear = (one for one in nuisances if one.name.startswith(name))
+    both = replace(front, name=name, at=front.at + rear.at, step=front.step + rear.step)
+    return tuple(both if one is front else one for one in nuisances if one is not rear)
 
 
 def _by_wheel(loose: Collection[str]) -> list[Nuisance]:

@@ -55,15 +55,19 @@ def test_a_number_of_the_car_told_by_axle_is_taken_between_them_and_told() -> No
     assert any("wheel_inertia_kg_m2 is one number of the car: 1.2 is taken" in text for text in car.remarks)
 
 
-@pytest.mark.parametrize(("told", "taken"), [([3e4, 24e4], (3e4, 24e4)), (4e4, (4e4, 4e4))])
-def test_each_axle_has_its_threshold(told, taken):
-    """Drums at the rear need more pressure before they grip: the axles may be off apart."""
-    car = load_vehicle({**SIX, "threshold_pressure_pa": told, "threshold_pressure_pa_tolerance": 2e4})
+@pytest.mark.parametrize(("told", "taken", "members"), [
+    ([3e4, 24e4], (3e4, 24e4), [1, 1]), (4e4, (4e4, 4e4), [2]), (None, (5e4, 5e4), [1, 1]),
+])  # fmt: skip
+def test_each_axle_has_its_threshold(told, taken, members):
+    """Drums at the rear need more pressure before they grip: axles may be off apart, but where one number is stated."""
+    given = {} if told is None else {"threshold_pressure_pa": told, "threshold_pressure_pa_tolerance": 2e4}
+    car = load_vehicle(SIX | given)
     assert car.parameters.friction_brake.threshold_pressure_pa == pytest.approx(taken)
     found = [n for n in car.nuisances if n.name.startswith("friction_brake_threshold_pressure_pa")]
-    assert [n.name.rsplit("_", 1)[1] for n in found] == ["front", "rear"]
-    assert [car.p[n.at[0]] for n in found] == pytest.approx(taken)
-    assert all(n.step == pytest.approx((HALF_WIDTH_TO_SIGMA * 2e4,)) for n in found)
+    assert [len(n.at) for n in found] == members
+    assert [car.p[k] for n in found for k in n.at] == pytest.approx(taken)
+    if told is not None:
+        assert all(step == pytest.approx(HALF_WIDTH_TO_SIGMA * 2e4) for n in found for step in n.step)
 
 
 def test_of_a_tolerance_by_axle_the_larger_counts() -> None:
