@@ -1,10 +1,12 @@
 """`explain`: measured logs in, an answer out. The library call behind ``brakebench explain``."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from dbc.database import parse_database
@@ -66,8 +68,10 @@ def explain(
         Path(out).mkdir(parents=True, exist_ok=True)
         written = str(Path(out) / "extension.toml")
         names = ", ".join(term.candidate.name for term in found.final.terms) or "no effect"
-        extended = found.fitter.world(found.final.z, found.final.terms)
-        write_extension(Path(written), handed_in, extended, found.final, f"Taught by {len(read)} logs: {names}")
+        fitter, final = found.fitter, found.final
+        causes = fitter.world(np.zeros_like(final.z), final.terms).theta  # zeros of sensors are of these logs
+        extended = replace(fitter.world(final.z, final.terms), theta=causes)
+        write_extension(Path(written), handed_in, extended, f"Taught by {len(read)} logs: {names}")
     read_so = (f"{drive.log.name}: {text}" for drive in case.drives for text in drive.log.remarks)
     remarks = [*car.remarks, *read_so, *found.remarks]
     return answer(found, gained, missed, written, remarks, None if out is None else Path(out))

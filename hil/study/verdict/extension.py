@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from hil.effects import EffectError, read_laws, written_laws
-from hil.study.fitting.fit import Model
 from hil.study.logs.table import Floats, UnusableError
 from hil.study.replay.world import World
 from plant.effects.bank import NO_TERMS
@@ -37,7 +36,7 @@ class Extension:
         return replace(world, p=p, theta=theta, terms=np.vstack([world.terms, self.terms]))
 
 
-def write_extension(path: Path, handed_in: World, extended: World, model: Model, note: str) -> None:
+def write_extension(path: Path, handed_in: World, extended: World, note: str) -> None:
     """Write what the extended world has and the one handed in has not."""
     lines = [
         f"# {note}",
