@@ -29,19 +29,11 @@ def test_a_time_to_begin_at_makes_no_cause_of_noise() -> None:
     assert run_case(draw("null", 3, 9001), 9001, None)["causes"] == []
 
 
-_TOLD_YET = pytest.mark.xfail(strict=True, reason="a small cause 3.8 deviations from nothing")
-
-
-@pytest.mark.parametrize(
-    ("index", "seed"),
-    [
-        *((0, 68), (1, 778), (23, 68), (212, 68), (289, 68), (78, 69)),
-        pytest.param(188, 68, marks=_TOLD_YET),
-    ],
-)
+@pytest.mark.parametrize(("index", "seed"), [(0, 68), (1, 778), (23, 68), (188, 68), (212, 68), (289, 68), (78, 69)])
 def test_what_was_an_alarm_once_is_none_now(index: int, seed: int) -> None:
     """A zero of one pressure sensor, where a little colour was lost in much noise; a clock that drifts, where the car
-    acted on demands that no frame had told; play, a drag and a weak brake on which manoeuvres disagree."""
+    acted on demands that no frame had told; play, a drag and a weak brake on which manoeuvres disagree; a steering 0.15
+    mrad off."""
     assert run_case(draw("null", index, seed), seed, None)["causes"] == []
 
 
