@@ -239,7 +239,7 @@ def _race(answer: Answer) -> Section:
                 f"Cause {k + 1}: candidates, fitted non-linearly",
                 ("candidate", "name", "value", "unit", "Δχ² to the best", "probability %"),
                 rows,
-                note=f"Below Δχ² {TIED} two candidates are rivals.",
+                note=f"Below Δχ² {TIED} two candidates are rivals. It is divided by the numbers' strain.",
             )
         )
     top = sorted(found.screened, key=lambda s: -s.gain)[:15]
