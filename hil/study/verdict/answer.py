@@ -76,7 +76,7 @@ def _verdict(found: Diagnosis, causes: list[dict[str, Any]], tied: Tied | None) 
         return "not_testable" if len(effects.intersection(found.untestable)) > _SILENT * len(effects) else "none"
     if any(isinstance(term.candidate, Piece) for term in found.final.terms):
         return "unlisted"
-    if tied is not None and _undecided(found, tied):
+    if tied is not None and tied.indices:
         return "cannot_tell_apart"
     for listed in found.races:
         best = listed[0]
@@ -85,16 +85,6 @@ def _verdict(found: Diagnosis, causes: list[dict[str, Any]], tied: Tied | None) 
             if another and behind(other, best) < _CERTAIN:
                 return "cannot_tell_apart"
     return "named"
-
-
-def _undecided(found: Diagnosis, tied: Tied) -> tuple[int, ...]:
-    """Those of a tied set that the odds do not decide either: one by one, what is usual may tell the same law by two
-    names apart; several together were not fitted."""
-    best, *others = found.races[0]
-    decided = {c.term.candidate for c in others if behind(c, best) >= _CERTAIN}
-    if len(tied.members) > 1:
-        return tied.indices
-    return tuple(k for k in tied.indices if found.screened[k].candidate not in decided)
 
 
 def _causes(found: Diagnosis) -> list[dict[str, Any]]:

@@ -14,7 +14,7 @@ from hil.study.logs.table import Floats
 
 APART = 2.0
 """Standard deviations that must be left of a signature for it to be told from its imitation."""
-MOST_RIVALS = 3
+MOST_RIVALS = 4
 _LEAST_SHARE = 0.02
 
 

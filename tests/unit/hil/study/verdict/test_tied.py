@@ -57,18 +57,6 @@ def test_mass_pads_and_drag_are_tied_together_though_no_pair_is():
     assert sum(pads) < 0.0  # a heavier car brakes as one with weaker pads does
 
 
-def test_four_that_conspire_are_no_rival():
-    """All forces 8 % less is a mass 8 % larger in other units: no drive tells, and none is to be driven for it."""
-    parts = 8.0 * np.eye(4)
-    for count, tied in ((3, True), (4, False)):
-        leaves = np.vstack([parts[:count].sum(axis=0), parts[:count]])
-        ends = np.tile([-5.0, 5.0], (count + 1, 1))
-        found = imitation(leaves @ leaves.T, np.full(count + 1, 1e-4), ends, 0, 1.0)
-        assert bool(found.members) is tied
-        assert (found.apart < APART) is tied
-        assert found.pairs == ()
-
-
 def test_the_null_vector_leaves_no_signature():
     q = information(straight_stops())
     found = tied_set(q, CANDIDATES, INDEX[MASS], 200.0)
