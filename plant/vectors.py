@@ -88,6 +88,7 @@ OUTPUTS = {
     "across_mps": 4,
     "slip_speed_mps": 4,
     "slip_gain_1_m": 4,  # 1 / relaxation length
+    "standing_damping_1_s": 4,  # how fast a wheel near standstill loses speed against the road
     "motor_available_nm": 4,
     "motor_derating": 4,
     "road_friction": 4,

@@ -15,7 +15,7 @@ from plant.compiled import EFFECTS, block, equation, section
 from plant.effects import bank, plugin
 from plant.effects.catalogue import BUILT_IN
 from plant.effects.joints import COUNT, FIRST, neutral_joints
-from plant.effects.theta import THETA
+from plant.effects.theta import ALWAYS_S, THETA
 from plant.layout import Layout, Vector
 from plant.vectors import BASE_RATES, PARAMETER, RATES, C, U, X, Y
 
@@ -30,6 +30,7 @@ Q = Layout(
         "theta": THETA.size,
         "on": len(ON_OFF),
         "anything": 1,  # whether any effect is on at any time
+        "turned": 1,  # whether the rest of a call is as this row is
         "dynamic": 1,  # whether the state decides anything
         "rates": 1,  # whether extra states move
         "terms": 1,
@@ -166,13 +167,13 @@ def _load(p: Vector, theta: Vector, terms: Vector, plugins: Vector, q: Vector, y
             break
     bank.load(terms, q, _AT.terms, _AT.term_rows)
     plugin.load(plugins, q, _AT.plugins, _AT.plugin_rows)
-    outside = terms.shape[0] + plugins.shape[0] > 0
     q[_AT.anything] = 1.0 if anything else 0.0
-    q[_AT.dynamic] = 1.0 if outside else 0.0
-    q[_AT.rates] = 1.0 if outside else 0.0
+    q[_AT.turned] = 0.0
+    q[_AT.dynamic] = 1.0 if terms.shape[0] + plugins.shape[0] > 0 else 0.0
+    q[_AT.rates] = 1.0 if bank.moves(terms) or plugins.shape[0] > 0 else 0.0
     for k in range(len(ON_OFF)):
         q[_AT.on + k] = 0.0
-    if anything | outside:
+    if anything or q[_AT.dynamic] > 0.5:
         for k in range(_THETA):
             q[_AT.theta + k] = theta[k]
     for k in range(_NUMBERS):
@@ -191,11 +192,14 @@ def turn(
 ) -> None:
     """Bring ``q`` to a row of inputs: theta within its times, then what theta alone decides.
 
-    A strength counts with the share of the row that lies between onset and end.
+    A strength counts with the share of the row that lies between onset and end. Where none begins or ends later, one
+    row is as all that follow.
     """
+    later = False
     for k in range(_NUMBERS):
         if theta[k] != 0.0 and _OWNER[k] >= 0:
             onset, until = theta[_TIMES[k]], theta[_TIMES[k] + 1]
+            later |= (begin_s < onset) | (until < ALWAYS_S)
             within = min(end_s, until) - max(begin_s, onset)
             length = end_s - begin_s
             share = 1.0 if within >= length else max(within, 0.0) / length
@@ -204,6 +208,7 @@ def turn(
         q[k] = p[k]
     for k in range(COUNT):
         y[FIRST + k] = _NEUTRAL[k]
+    q[_AT.turned] = 0.0 if later else 1.0
     _static(x, u, q, y)
     for k in range(_PARAMETERS):
         q[_AT.static + k] = q[k]
@@ -259,8 +264,8 @@ def _moving(q: Vector) -> bool:
 def _row(
     x: Vector, u: Vector, p: Vector, theta: Vector, begin_s: float, end_s: float, q: Vector, y: Vector, stage: Vector
 ) -> None:
-    """Bring ``q`` to a row of inputs, where there is any effect."""
-    if q[_AT.anything] > 0.5:
+    """Bring ``q`` to a row of inputs, where an effect may change it."""
+    if q[_AT.anything] > 0.5 and q[_AT.turned] < 0.5:
         turn(x, u, p, theta, begin_s, end_s, q, y, stage)
 
 

@@ -46,6 +46,9 @@ class Variable(IntEnum):
     WHEEL_LOAD = 17  # of the last step
 
 
+_APPLIED_TIME = float(Variable.APPLIED_TIME)
+
+
 class Shape(IntEnum):
     """Functions of s = (variable - centre) / width."""
 
@@ -144,6 +147,15 @@ def load(terms: Vector, q: Vector, count: int, rows: int) -> None:
     for k in range(min(terms.shape[0], MOST_TERMS)):
         for column in range(COLUMNS):
             q[rows + k * COLUMNS + column] = terms[k, column]
+
+
+@equation
+def moves(terms: Vector) -> bool:
+    """Whether a term needs a state that moves for the bank alone."""
+    found = False
+    for k in range(terms.shape[0]):
+        found |= (terms[k, 7] == _APPLIED_TIME) | (terms[k, 11] == _APPLIED_TIME)
+    return found
 
 
 @equation

@@ -228,12 +228,16 @@ class Fitter:
             return
         share = (scaled / squared).astype(np.float32)
         stepped = [new - old for new, old in zip(after.values(), before.values(), strict=True)]
+        unforetold = {}
         for name, columns in self.nuisance_columns.items():
             moved = (before.residual[name][:, 0] - after.residual[name][:, 0]).astype(np.float32)
             if own:
                 moved -= own[name].astype(np.float32) @ np.array(stepped, np.float32)
-            columns += np.outer(moved - columns @ change.astype(np.float32), share)
-        self._white_for = None
+            unforetold[name] = (moved - columns @ change.astype(np.float32))[:, None]
+            columns += unforetold[name] * share
+        white, _ = whiten(unforetold, self.frame, noise)
+        self._white = self._white + np.concatenate([white[name] for name in self.frame.names]) * share
+        self._products = np.asarray(self._white.T @ self._white, np.float64)
 
     def at_their_end(self, z: Floats) -> list[int]:
         """Nuisances as far off as they may be: they explain nothing more."""

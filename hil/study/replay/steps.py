@@ -18,8 +18,8 @@ def at_once(drive: Drive) -> NDArray[np.int64]:
     """How many steps each row of a drive makes as one.
 
     A step of a motor's torque makes wheel and tyre swing against each other, at 20 to 25 Hz and within some 0.1 s; the
-    pressure follows its demand in 0.2 s; a standing wheel is damped so much that longer steps swing by themselves
-    (docs/decisions/0085); the tyres' limit is stiff. The rest follows any step.
+    pressure follows its demand in 0.2 s; the tyres' limit is stiff, and so is a car that comes to rest
+    (docs/decisions/0089). The rest follows any step.
     """
 
     def changes(part: str, much: float, rows: int) -> NDArray[np.bool_]:
@@ -33,4 +33,4 @@ def at_once(drive: Drive) -> NDArray[np.int64]:
     slope = np.gradient(drive.speed_mps, drive.stride * ROW_S) if drive.samples > 1 else drive.speed_mps
     hard, creeps = (np.repeat(at, drive.stride) for at in (np.abs(slope) > _HARD_MPS2, drive.speed_mps < _CREEPS_MPS))
     quick = changes("motor_torque_nm", _QUICK_NM, _RINGS_ROWS) | changes("pressure_demand_pa", _QUICK_PA, _FOLLOWS_ROWS)
-    return np.where(quick | creeps, 1, np.where(hard, STEPS // 2, STEPS))
+    return np.where(quick, 1, np.where(hard | creeps, STEPS // 2, STEPS))

@@ -14,8 +14,9 @@ from hil.study.likelihood.noise import Noise
 from hil.study.search.onset import begins
 from hil.study.search.screen import Score, rescored, share_of, sized
 
-_ROUNDS, _SETTLED = 4, 1.0
-"""Times that a contender and its noise are fitted in turn, and how little less cost ends it."""
+_ROUNDS, _SETTLED, _SETTLED_SHARE = 4, 1.0, 0.01
+"""Times that a contender and its noise are fitted in turn, and how little less cost ends it: by itself, and as a share
+of all that it explains."""
 Item = TypeVar("Item")
 Of = TypeVar("Of")
 
@@ -195,7 +196,7 @@ class Contest:
             noise = self._no_worse(fitted, self._fitter.estimated(fitted, noise), noise)
             before = self._fitter.cost(fitted.residual, fitted.z, noise)
             fitted = self._fitter.fit(fitted, noise, 2, self._relinearise)
-            if before - fitted.cost < _SETTLED:
+            if before - fitted.cost < max(_SETTLED, _SETTLED_SHARE * (self.reference - fitted.cost)):
                 break
         begun_with = Contender(fitted.terms[-1], fitted, fitted.cost, 0.0, item.information, noise, price=item.price)
         return refitted(begun_with, fitted, noise)

@@ -50,7 +50,7 @@ _LED_ANEW = 3
 """Leaders that get sensitivities of their own, when they are fitted from the car as handed in."""
 _HOPELESS, _POOR = 0.1, 0.4
 """Shares of the gain asked: below the one no candidate is looked at with noise of its own, below the other none is
-fitted."""
+fitted but as a rival of one that is beyond doubt."""
 Accepted = tuple[Model, Noise, list[Contender]]
 """A model with one cause more, the noise beside it, and all that were fitted in its place, best first."""
 
@@ -257,8 +257,19 @@ class _Search:
         top = sorted(looked, key=lambda s: -s.evidence)[:_TRIED] if bent else leaders(looked, LEADERS)
         if _most(top, left) < _POOR * least:
             return contest, [], []
-        self.say(f"fitting {len(top)} leaders")
-        return contest, top, contest.at_once(lambda item: contest.contender(item, beside[id(item)]), top)
+        least /= found.inflation  # which beside the best as fitted may be less
+
+        def fits(some: Sequence[Score]) -> list[Contender]:
+            self.say(f"fitting {len(some)} leaders")
+            return contest.at_once(lambda item: contest.contender(item, beside[id(item)]), some)
+
+        first = [item for item in top if bent or _beyond(item, item.gain, left) >= _POOR * least]
+        fitted = fits(first)
+        gains = [(contest.reference - c.cost) / variance_of(c.term.candidate) for c in fitted]
+        rest = [item for item in top if item not in first]
+        if rest and any(_beyond(*one, left) >= least for one in zip(first, gains, strict=True)):
+            first, fitted = [*first, *rest], [*fitted, *fits(rest)]
+        return contest, first, fitted
 
     def _fitted_again(
         self, model: Model, fitted: list[Contender], top: list[Score], reference: float
@@ -298,6 +309,11 @@ class _Search:
         return min(better, key=odds, default=best), placed
 
 
+def _beyond(item: Score, gain: float, left: LeftOver) -> float:
+    """What a candidate gains beyond what the causes in the model may leave."""
+    return gain - left.of(item.candidate) / variance_of(item.candidate)
+
+
 def _most(listed: Sequence[Score], left: LeftOver) -> float:
-    """Most that a candidate gains by one step, beyond what the causes in the model may leave."""
-    return max((item.gain - left.of(item.candidate) / variance_of(item.candidate) for item in listed), default=0.0)
+    """Most that a candidate gains so by one step."""
+    return max((_beyond(item, item.gain, left) for item in listed), default=0.0)
