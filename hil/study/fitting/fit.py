@@ -8,7 +8,7 @@ import numpy as np
 from hil.study.fitting.candidates import Candidate
 from hil.study.fitting.linear import Sums, solve_within, sums, track_columns
 from hil.study.likelihood.estimate import estimate, first_guess
-from hil.study.likelihood.noise import Frame, Noise, tracks_of, whiten
+from hil.study.likelihood.noise import Frame, Noise, tracks_of, whiten, whitened
 from hil.study.likelihood.whiten import HUBER
 from hil.study.logs.table import Floats
 from hil.study.replay.nuisances import Nuisance
@@ -18,7 +18,7 @@ from hil.study.replay.world import World
 
 Tracks = dict[str, Floats]
 _LARGEST_STEP = 8.0
-_ATTEMPTS = ((False, 0.0), (True, 0.0), (True, 0.1), (True, 1.0), (True, 10.0))
+_ATTEMPTS = ((False, 0.0), (True, 0.1), (True, 1.0), (True, 10.0))
 """Ways to make a step, in turn until one improves: whether limits stay where they are, and the damping."""
 _LIMITS = (
     "battery_charge_power_w", "motor_peak_torque_nm", "motor_rate_limit_nm_s", "motor_fade_start_mps",
@@ -60,11 +60,17 @@ class Model:
         return [term.value for term in self.terms]
 
 
+def alike(some: Sequence[Term], others: Sequence[Term]) -> bool:
+    """Whether two lists are the same effects from the same times on, at values at which they act alike."""
+    if [(one.candidate, one.onset) for one in some] != [(other.candidate, other.onset) for other in others]:
+        return False
+    before, after = (np.array([term.value for term in terms]) for terms in (some, others))
+    return bool((np.abs(after - before) <= _ALIKE * np.maximum(np.abs(before), np.abs(after))).all())
+
+
 def _far(taken: Model, now: Model) -> bool:
     """Whether effects act otherwise now than where their sensitivities were taken."""
-    before, after = np.array(taken.values()), np.array(now.values())
-    moved = np.abs(after - before) > _ALIKE * np.maximum(np.abs(before), np.abs(after))
-    return bool(moved.any() or np.abs(now.z - taken.z).max(initial=0.0) > _FOLLOWED)
+    return not alike(taken.terms, now.terms) or bool(np.abs(now.z - taken.z).max(initial=0.0) > _FOLLOWED)
 
 
 def with_term(world: World, term: Term) -> World:
@@ -170,8 +176,7 @@ class Fitter:
         for _ in range(steps):
             own = self.term_columns(model)
             joined = {name: np.hstack([values, own[name][:, -1:]]) for name, values in model.residual.items()}
-            innovations, _ = whiten(joined, self.frame, noise)
-            left, shown = np.concatenate([innovations[name] for name in self.frame.names]).T
+            left, shown = whitened(joined, self.frame, noise).T
             *others, term = model.terms
             step = float(np.clip(left, -HUBER, HUBER) @ shown) / max(float(shown @ shown), 1e-30)
             parameter = term.candidate.parameter
@@ -184,7 +189,7 @@ class Fitter:
 
     def _step(self, model: Model, own: Tracks, noise: Noise) -> Model | None:
         total = self._total(model, own, noise)
-        for hold, damping in _ATTEMPTS if self._limits else _ATTEMPTS[1:]:
+        for hold, damping in _ATTEMPTS:
             z, terms, covariance, foretold = self.moved(model, total, hold, damping)
             if foretold < _WORTH:
                 break
@@ -235,8 +240,7 @@ class Fitter:
                 moved -= own[name].astype(np.float32) @ np.array(stepped, np.float32)
             unforetold[name] = (moved - columns @ change.astype(np.float32))[:, None]
             columns += unforetold[name] * share
-        white, _ = whiten(unforetold, self.frame, noise)
-        self._white = self._white + np.concatenate([white[name] for name in self.frame.names]) * share
+        self._white += whitened(unforetold, self.frame, noise) * share
         self._products = np.asarray(self._white.T @ self._white, np.float64)
 
     def at_their_end(self, z: Floats) -> list[int]:
@@ -262,9 +266,8 @@ class Fitter:
         """Whitened sensitivities of the nuisances, and their products."""
         if self._white_for is noise:
             return self._white, self._products
-        white, _ = whiten(self.nuisance_columns, self.frame, noise)
-        joined = np.concatenate([white[name] for name in self.frame.names])
-        return joined, np.asarray(joined.T @ joined, np.float64)
+        white = whitened(self.nuisance_columns, self.frame, noise)
+        return white, np.asarray(white.T @ white, np.float64)
 
     def _total(self, model: Model, own: Tracks, noise: Noise) -> Floats:
         """Products of [residual, nuisances, own columns]."""
@@ -273,8 +276,7 @@ class Fitter:
             name: np.hstack([values, own[name].astype(np.float64)]) if own else values
             for name, values in model.residual.items()
         }
-        innovations, _ = whiten(joined, self.frame, noise)
-        outer = np.concatenate([innovations[name] for name in self.frame.names])
+        outer = whitened(joined, self.frame, noise)
         outer[:, 0] = np.clip(outer[:, 0], -HUBER, HUBER)
         count, width = len(self.nuisances), outer.shape[1]
         total = np.empty((count + width, count + width))

@@ -1,10 +1,11 @@
 """The vehicle's numbers: sensitivities to them, and their fit with the noise in turn."""
 
+from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
 
-from hil.study.fitting.fit import Fitter, Model, Term, with_term
+from hil.study.fitting.fit import Fitter, Model, Term, alike, with_term
 from hil.study.fitting.linear import track_columns
 from hil.study.likelihood.noise import Frame, Noise
 from hil.study.logs.table import Floats
@@ -18,7 +19,9 @@ _KINKED = ("ehb_dead_time_s",)
 """What acts from step to step, with a kink at each."""
 _COARSE, _FINE = 0.5, 3.0
 """Finite differences: in standard deviations of what is known before, and of what data say."""
-_TURNS, _MOST_ANEW, _SETTLED, _STALE, _FAR = 20, 4, 3.0, 0.3, 1.0
+_TURNS, _MOST_ANEW, _SETTLED, _STALE, _STILL, _FAR = 20, 4, 3.0, 0.3, 0.5, 1.0
+_REMEMBERED = 3
+"""Times that sensitivities were taken last: those of the best of several causes serve again when it is accepted."""
 
 
 def strain(z: Floats, farthest: Floats | float = np.inf, told: float | None = None) -> float:
@@ -48,12 +51,17 @@ class Numbers:
         told = all(drive.log.disc_temperature_k is not None for drive in rig.case.drives)
         self.nuisances = (*vehicle.nuisances, *start_nuisances(told))
         self._steps: Floats = np.full(len(self.nuisances), _COARSE)
+        self._taken: deque[tuple[Floats, tuple[Term, ...], Fitter]] = deque(maxlen=_REMEMBERED)
 
     def anew(self, z: Floats, terms: Sequence[Term] = ()) -> None:
         """Take the sensitivities where the numbers are ``z`` standard deviations off, beside these effects.
 
-        What drives the car is made by that car too (`Rig.quieten`).
+        What drives the car is made by that car too (`Rig.quieten`). Those taken lately near there are as good.
         """
+        for around, beside, fitter in self._taken:
+            if float(np.abs(z - around).max()) <= _STILL and alike(beside, terms):
+                self.fitter = fitter
+                return
 
         def world(of: Floats) -> World:
             found = self._base.shifted(self.nuisances, of)
@@ -71,6 +79,7 @@ class Numbers:
                 for name, columns in tracks.items():
                     columns[:, k] = 0.5 * (columns[:, k] + other[name][:, 0])
         self.fitter = Fitter(self._rig, self._frame, self._base, self.nuisances, tracks)
+        self._taken.append((z, tuple(terms), self.fitter))
 
     def fitted(self, model: Model, noise: Noise) -> tuple[Model, Noise]:
         """Numbers and noise in turn, with sensitivities taken anew until neither moves.

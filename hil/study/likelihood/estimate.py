@@ -12,7 +12,6 @@ from hil.study.likelihood.noise import (
     Frame,
     Noise,
     Track,
-    evened,
     scale_of,
     white_variance,
     whiten,
@@ -122,7 +121,7 @@ def _smallest(costs: Costs, starts: Sequence[Floats], low: Floats, high: Floats,
 def _of_side(name: str, values: Floats, frame: Frame, noise: Noise) -> Noise:
     """Noise with that of a track that all others say nothing of."""
     at, floor, known = noise.tracks[name], _floor(name), frame.present[name]
-    scaled, _ = evened(name, values, frame, noise)
+    scaled = values[:, 0] / scale_of(name, frame, noise)
     common = white_variance(name, Track(0.0, 0.0, 0.0, 1.0), frame)
     faster = np.square(frame.speed_mps / REFERENCE_MPS)
     by_speed = name.startswith("wheel")
@@ -133,7 +132,7 @@ def _of_side(name: str, values: Floats, frame: Frame, noise: Noise) -> Noise:
         colour = (c**2 if noise.enabled else 0.0 * c) + 1e-16
         keep = np.exp(-frame.sample_s / tau_s)
         off, size = np.zeros(white.shape), np.ones(white.shape)
-        return -coloured_each(scaled[:, 0], frame.fresh, known, white, keep, colour, off, size), off, size
+        return -coloured_each(scaled, frame.fresh, known, white, keep, colour, off, size), off, size
 
     a = max(_differences(values[:, 0], known), floor)
     offered = [at, *(Track(a, 0.0, share * a, tau_s) for share in _COLOURS for tau_s in _TIMES_S)]
@@ -200,13 +199,13 @@ def _limited(innovations: Floats) -> Floats:
 
 def _rescaled(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> Noise:
     """Scales of the manoeuvres from the innovations, weak ones drawn towards 1."""
-    whitened, _ = whiten(tracks, frame, noise)
+    innovations, _ = whiten(tracks, frame, noise)
     blocks = np.asarray(frame.blocks, np.int64)
     count = int(blocks.max()) + 1
     found: dict[str, Floats] = {}
     for name in ("long", *(track for track in tracks if track not in LONG)):
         members = [track for track in LONG if track in tracks] if name == "long" else [name]
-        squares = sum(np.bincount(blocks, _limited(whitened[m][:, 0]), count) for m in members)
+        squares = sum(np.bincount(blocks, _limited(innovations[m][:, 0]), count) for m in members)
         samples = sum(np.bincount(blocks, frame.present[m], count) for m in members)
         share = np.sqrt((squares + _PRIOR_SAMPLES) / (samples + _PRIOR_SAMPLES))
         before = noise.scales.get(name)

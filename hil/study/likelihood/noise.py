@@ -143,21 +143,28 @@ def tracks_of(stack: Stack, frame: Frame, radius_m: float) -> dict[str, Floats]:
     return {name: np.where(np.isnan(values), 0.0, values) for name, values in found.items() if name in frame.names}
 
 
-def whiten(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> tuple[dict[str, Floats], float]:
-    """Innovations by track, (samples, columns), in the precision given, and the log-likelihood of the first column."""
-    out: dict[str, Floats] = {}
-    total = 0.0
-    columns = next(iter(tracks.values())).shape[1]
-    there = [name for name in LONG if name in tracks]
-    if there:
-        value, found = _long(tracks, frame, noise, columns)
-        total += value
-        out |= found
+def whiten(
+    tracks: Mapping[str, Floats], frame: Frame, noise: Noise, into: Mapping[str, Floats] | None = None
+) -> tuple[dict[str, Floats], float]:
+    """Innovations by track, (samples, columns), in the precision given, and the log-likelihood of the first column.
+
+    They are written ``into`` arrays by track, where these are given.
+    """
+    out = {name: np.empty_like(values) for name, values in tracks.items()} if into is None else dict(into)
+    total = _long(tracks, frame, noise, out) if any(name in tracks for name in LONG) else 0.0
     for name, values in tracks.items():
         if name not in LONG:
-            value, out[name] = _side(name, values, frame, noise)
-            total += value
+            total += _side(name, values, frame, noise, out[name])
     return out, total
+
+
+def whitened(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> Floats:
+    """Innovations of all tracks, one below the other in the frame's order, (tracks samples, columns)."""
+    samples, (columns, kind) = len(frame.fresh), next((one.shape[1], one.dtype) for one in tracks.values())
+    joined = np.empty((len(frame.names) * samples, columns), kind)
+    parts = {name: joined[k * samples : (k + 1) * samples] for k, name in enumerate(frame.names)}
+    whiten(tracks, frame, noise, parts)
+    return joined
 
 
 def white_variance(name: str, track: Track, frame: Frame) -> Floats:
@@ -181,40 +188,26 @@ def kept(tau_s: float, step_s: float) -> float:
     return float(np.exp(-step_s / max(tau_s, 1e-3)))
 
 
-def _long(tracks: Mapping[str, Floats], frame: Frame, noise: Noise, columns: int) -> tuple[float, dict[str, Floats]]:
-    samples = len(frame.fresh)
-    kind = next(iter(tracks.values())).dtype
-    y, white = np.zeros((samples, 3, columns), kind), np.zeros((samples, 3))
-    scale = scale_of("long", frame, noise)
-    likelihood = 0.0
-    for m, name in enumerate(LONG):
-        if name in tracks:
-            np.divide(tracks[name], scale.astype(kind)[:, None], out=y[:, m])
-            likelihood -= float(np.log(scale) @ frame.present[name])
-            white[:, m] = white_variance(name, noise.tracks[name], frame)
+def _long(tracks: Mapping[str, Floats], frame: Frame, noise: Noise, out: Mapping[str, Floats]) -> float:
+    scale, white = scale_of("long", frame, noise), np.zeros((len(frame.fresh), 3))
+    likelihood, there = 0.0, [name for name in LONG if name in tracks]
+    for name in there:
+        likelihood -= float(np.log(scale) @ frame.present[name])
+        white[:, LONG.index(name)] = white_variance(name, noise.tracks[name], frame)
     on = 1.0 if noise.enabled else 0.0
     colours = np.array([(kept(tau, frame.sample_s), on * size**2 + 1e-12) for size, tau in noise.disturbances])
-    out = np.empty_like(y)
     share = frame.speed_mps / REFERENCE_MPS
-    value = moving(y, frame.fresh, frame.restart, frame.moving, white, share, frame.sample_s, colours, out)
-    return likelihood + float(value), {name: out[:, m] for m, name in enumerate(LONG) if name in tracks}
+    nothing = np.empty_like(tracks[there[0]]) if len(there) < len(LONG) else None
+    given = tuple(np.ascontiguousarray(tracks.get(name, nothing)) for name in LONG)
+    told = tuple(out.get(name, nothing) for name in LONG)
+    how = (scale, frame.fresh, frame.restart, frame.moving, white, share, frame.sample_s, colours)
+    return likelihood + float(moving(given, *how, told))
 
 
-def _side(name: str, values: Floats, frame: Frame, noise: Noise) -> tuple[float, Floats]:
-    scaled, value = evened(name, values, frame, noise)
-    out = np.empty_like(scaled)
-    return value + _filtered(name, noise.tracks[name], scaled, frame, noise.enabled, out), out
-
-
-def evened(name: str, values: Floats, frame: Frame, noise: Noise) -> tuple[Floats, float]:
-    """Values of a track over the scale of their manoeuvre, and what that adds to the log-likelihood."""
-    scale = scale_of(name, frame, noise)
-    even = np.ascontiguousarray(values / scale.astype(values.dtype)[:, None])
-    return even, -float(np.log(scale) @ frame.present[name])
-
-
-def _filtered(name: str, track: Track, scaled: Floats, frame: Frame, enabled: bool, out: Floats) -> float:
-    """Innovations of an evened track into ``out``, and their log-likelihood."""
+def _side(name: str, values: Floats, frame: Frame, noise: Noise, out: Floats) -> float:
+    track, scale = noise.tracks[name], scale_of(name, frame, noise)
     white = white_variance(name, track, frame)
-    colour = track.c**2 if enabled else 0.0
-    return float(coloured(scaled, frame.fresh, white, kept(track.tau_s, frame.sample_s), colour + 1e-16, out))
+    colour = track.c**2 if noise.enabled else 0.0
+    keep = kept(track.tau_s, frame.sample_s)
+    value = coloured(values, scale, frame.fresh, white, keep, colour + 1e-16, out)
+    return float(value) - float(np.log(scale) @ frame.present[name])

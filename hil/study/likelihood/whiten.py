@@ -11,9 +11,10 @@ from hil.study.logs.table import Floats
 HUBER = 6.0
 """Innovations beyond so many standard deviations count in proportion, not squared (Huber 1964)."""
 UNKNOWN = 1e4  # variance of a start that nothing is known of
+Three = tuple[Floats, Floats, Floats]
 
 
-def _coloured(y: Floats, fresh: Floats, white: Floats, phi: float, colour: float, out: Floats) -> float:
+def _coloured(y: Floats, scale: Floats, fresh: Floats, white: Floats, phi: float, colour: float, out: Floats) -> float:
     columns = y.shape[1]
     state = np.zeros(columns)
     variance, likelihood = colour, 0.0
@@ -27,11 +28,11 @@ def _coloured(y: Floats, fresh: Floats, white: Floats, phi: float, colour: float
             variance = phi * phi * variance + (1.0 - phi * phi) * colour
         if white[t] > 0.0:
             total = variance + white[t]
-            gain, scale = variance / total, 1.0 / np.sqrt(total)
+            gain, size, even = variance / total, 1.0 / np.sqrt(total), 1.0 / scale[t]
             for k in range(columns):
-                innovation = y[t, k] - state[k]
+                innovation = y[t, k] * even - state[k]
                 state[k] += gain * innovation
-                out[t, k] = innovation * scale
+                out[t, k] = innovation * size
             variance -= gain * variance
             far = max(abs(out[t, 0]) - HUBER, 0.0)
             likelihood -= 0.5 * (out[t, 0] * out[t, 0] - far * far + np.log(total))
@@ -42,18 +43,19 @@ def _coloured(y: Floats, fresh: Floats, white: Floats, phi: float, colour: float
 
 
 def _moving(
-    y: Floats, fresh: Floats, restart: Floats, rolling: Floats, white: Floats, share: Floats, step_s: float,
-    colours: Floats, out: Floats,
+    tracks: Three, scale: Floats, fresh: Floats, restart: Floats, rolling: Floats, white: Floats, share: Floats,
+    step_s: float, colours: Floats, outs: Three,
 ) -> float:  # fmt: skip
     # states: error of the speed; disturbances: force, slope, accelerometer, wheels, and ground speed if it is measured
-    columns, count = y.shape[2], colours.shape[0]
+    columns, count = tracks[0].shape[1], colours.shape[0]
     size = 1 + count
     x = np.zeros((size, columns))
     cov = np.zeros((size, size))
     h = np.zeros(size)
     likelihood = 0.0
     move = np.zeros((size, size))
-    for t in range(y.shape[0]):
+    for t in range(len(fresh)):
+        even = 1.0 / scale[t]
         if fresh[t] > 0.5:
             x[:] = 0.0
             cov[:] = 0.0
@@ -87,9 +89,10 @@ def _moving(
                 for k in range(columns):
                     x[0, k] = 0.0
         for m in range(3):
+            y, out = tracks[m], outs[m]
             if white[t, m] <= 0.0:
                 for k in range(columns):
-                    out[t, m, k] = 0.0
+                    out[t, k] = 0.0
                 continue
             # what is seen: wheels (speed and their own share), acceleration (of a car at rest none), ground speed
             first, second = (1, 3) if m == 1 else (0, 4 if m == 0 else count)
@@ -98,25 +101,25 @@ def _moving(
             for i in range(size):
                 h[i] = one * cov[i, first] + other * cov[i, second]
             total = white[t, m] + one * h[first] + other * h[second]
-            scale = 1.0 / np.sqrt(total)
             for k in range(columns):
-                innovation = y[t, m, k] - one * x[first, k] - other * x[second, k]
+                innovation = y[t, k] * even - one * x[first, k] - other * x[second, k]
                 for i in range(size):
                     x[i, k] += h[i] / total * innovation
-                out[t, m, k] = innovation * scale
+                out[t, k] = innovation / np.sqrt(total)
             for i in range(size):
                 for j in range(size):
                     cov[i, j] -= h[i] * h[j] / total
-            far = max(abs(out[t, m, 0]) - HUBER, 0.0)
-            likelihood -= 0.5 * (out[t, m, 0] ** 2 - far * far + np.log(total))
+            far = max(abs(out[t, 0]) - HUBER, 0.0)
+            likelihood -= 0.5 * (out[t, 0] ** 2 - far * far + np.log(total))
     return likelihood
 
 
 coloured = compiled(_coloured)
 """White noise and AR(1) on one track: (samples, columns) in, innovations of variance 1 into ``out``; log-likelihood of
-the first column. ``white`` is the variance of each sample, 0 where nothing is compared; ``fresh`` begins a log."""
+the first column, over the ``scale`` of each sample. ``white`` is the variance of each sample, 0 where nothing is
+compared; ``fresh`` begins a log."""
 moving = compiled(_moving)
-"""The moving car: (samples, 3 tracks, columns) of speed, acceleration, ground speed.
+"""The moving car: three tracks, (samples, columns), of speed, acceleration, ground speed, over their ``scale``.
 
 ``colours`` holds rows (factor from sample to sample, variance) of force, slope, accelerometer and wheel disturbance,
 the last one weighted by ``share`` (samples,), and, where a ground speed is compared, its own; ``restart`` forgets the

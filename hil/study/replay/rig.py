@@ -1,10 +1,11 @@
 """Free replays of cars over all drives of a case, many at once."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
 from threading import Semaphore
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ from plant.model import column_indices, healthy, initial_state, simulate
 from plant.road import DRY, road_table
 from plant.vectors import INPUT, OUTPUT, STATE, P, U, X
 
+Of = TypeVar("Of")
 DISC_K = 350.0
 _SLOW = np.concatenate(
     [
@@ -59,6 +61,16 @@ def _idle() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(WORKERS)
 
 
+def _over_drives(of: Callable[[Drive], Of], drives: Sequence[Drive]) -> list[Of]:
+    """Of each drive; over threads, unless other replays have them (`_FREE`)."""
+    each = _idle().map if (helped := _FREE.acquire(blocking=False)) else map
+    try:
+        return list(each(of, drives))
+    finally:
+        if helped:
+            _FREE.release()
+
+
 def _radius_m(world: World) -> Floats:
     """Rolling radius of each wheel, (4,), effects that change it included: no slip at the start that nobody drove."""
     worn = 1.0 + world.theta[THETA.slice("tyre_radius", "gain")]
@@ -85,8 +97,8 @@ class _Kept:
     """A world, its replay of each drive, and what its sensors told of them."""
 
     world: World
-    replays: list[_Replay]
-    told: list[Stack]
+    replays: Sequence[_Replay]
+    told: Sequence[Stack]
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,29 +159,31 @@ class Rig:
         So steps stay sharp, between two samples too, if this world has what makes them. The measured one is taken back
         first: what its node, in this world, scaled or sampled late.
         """
-        wanted = [one for one in _INPUTS if one[0] in self._groups and one[0] in self.case.followed]
         self._kept = self._made = None
-        drives, told = [], []
-        for drive, given in zip(self.case.drives, self._given, strict=True):
-            drive = replace(drive, inputs=given)
-            raw = self._raw(drive, world)
-            inputs = _taken_back(given, drive, world).copy()
-            for group, part in wanted:
-                where = INPUT.slice(part)
-                apart = inputs[:, where] - raw[group]
-                window = min(_SMOOTH, (len(apart) - 1) // 2 * 2 + 1)
-                inputs[:, where] = raw[group] + savgol_filter(apart, window, 2, axis=0)
-            if "motor" in self._groups:
-                inputs[:, INPUT.slice("motor_torque_bend_nm")] = self._bend(drive, world)
-            again = given.copy()
-            drive = replace(drive, inputs=inputs)
-            seen = self.telling.at_rows({group: inputs[:, INPUT.slice(part)] for group, part in wanted}, drive, world)
-            for group, part in wanted:
-                again[:, INPUT.slice(part)] = seen[group]
-            told.append((again, _taken_back(again, drive, world)))
-            drives.append(drive)
-        self.case = replace(self.case, drives=tuple(drives))
-        self._made = _Made(world, told)
+        made = _over_drives(lambda drive: self._made_by(drive, world), self.case.drives)
+        self.case = replace(self.case, drives=tuple(drive for drive, _ in made))
+        self._made = _Made(world, [told for _, told in made])
+
+    def _made_by(self, drive: Drive, world: World) -> tuple[Drive, tuple[Floats, Floats]]:
+        """A drive with the inputs of `quieten`; and these as told, and taken back again, as in `_Made`."""
+        wanted = [one for one in _INPUTS if one[0] in self._groups and one[0] in self.case.followed]
+        given = self._given[drive.number]
+        drive = replace(drive, inputs=given)
+        raw = self._raw(drive, world)
+        inputs = _taken_back(given, drive, world).copy()
+        for group, part in wanted:
+            where = INPUT.slice(part)
+            apart = inputs[:, where] - raw[group]
+            window = min(_SMOOTH, (len(apart) - 1) // 2 * 2 + 1)
+            inputs[:, where] = raw[group] + savgol_filter(apart, window, 2, axis=0)
+        if "motor" in self._groups:
+            inputs[:, INPUT.slice("motor_torque_bend_nm")] = self._bend(drive, world)
+        again = given.copy()
+        drive = replace(drive, inputs=inputs)
+        seen = self.telling.at_rows({group: inputs[:, INPUT.slice(part)] for group, part in wanted}, drive, world)
+        for group, part in wanted:
+            again[:, INPUT.slice(part)] = seen[group]
+        return drive, (again, _taken_back(again, drive, world))
 
     def _driving(self, drive: Drive, world: World) -> Floats:
         """What drives the car in a world whose sensors and nodes told it as it is in the logs."""
@@ -229,21 +243,20 @@ class Rig:
         return {group: np.concatenate([part[group] for part in parts]) for group in self._groups}
 
     def run(self, world: World) -> Stack:
-        """Simulated channels of all drives; these over threads, unless other replays have them (`_FREE`)."""
+        """Simulated channels of all drives."""
         self.runs += 1
-        of_drives = _idle().map if (helped := _FREE.acquire(blocking=False)) else map
-        try:
-            parts = list(of_drives(lambda drive: self._drive(drive, world), self.case.drives))
-        finally:
-            if helped:
-                _FREE.release()
+        parts = _over_drives(lambda drive: self._drive(drive, world), self.case.drives)
         return {group: np.concatenate([part[group] for part in parts]) for group in self._groups}
 
     def keep(self, world: World) -> None:
         """Keep the motion of this world: others are simulated only where they can differ from it."""
         self._kept = None
-        replays = [self._replayed(drive, world, self._columns) for drive in self.case.drives]
-        told = [self.telling.told(d, world, one.table) for d, one in zip(self.case.drives, replays, strict=True)]
+
+        def kept(drive: Drive) -> tuple[_Replay, Stack]:
+            replay = self._replayed(drive, world, self._columns)
+            return replay, self.telling.told(drive, world, replay.table)
+
+        replays, told = zip(*_over_drives(kept, self.case.drives), strict=True)
         self._kept = _Kept(world, replays, told)
 
     def run_all(self, worlds: Sequence[World]) -> Iterator[Stack]:

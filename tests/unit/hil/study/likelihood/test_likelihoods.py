@@ -26,7 +26,7 @@ def test_one_track() -> None:
     each = coloured_each(y, fresh, known, white, keep, colour, off, size)
     out = np.empty((SAMPLES, 1))
     for k in range(LANES):
-        alone = coloured(y[:, None], fresh, known * white[:, k], keep[k], colour[k], out)
+        alone = coloured(y[:, None], np.ones(SAMPLES), fresh, known * white[:, k], keep[k], colour[k], out)
         assert each[k] == pytest.approx(alone, rel=1e-9)
         assert off[:, k] / np.sqrt(size[:, k]) == pytest.approx(out[:, 0], rel=1e-9)
 
@@ -43,14 +43,15 @@ def test_the_moving_car() -> None:
     sensor = rng.random((3, LANES))
     off, size = np.zeros((SAMPLES, 3, LANES)), np.ones((SAMPLES, 3, LANES))
     each = moving_each(y, fresh, restart, rolling, known, white, share, STEP_S, keep, colour, sensor, off, size)
-    out = np.empty((SAMPLES, 3, 1))
+    tracks = tuple(np.ascontiguousarray(y[:, m : m + 1]) for m in range(3))
+    out = tuple(np.empty((SAMPLES, 1)) for _ in tracks)
     for k in range(LANES):
         alone = moving(
-            y[:, :, None], fresh, restart, rolling, known * (white + sensor[:, k]), share, STEP_S,
+            tracks, np.ones(SAMPLES), fresh, restart, rolling, known * (white + sensor[:, k]), share, STEP_S,
             np.stack((keep[:, k], colour[:, k]), axis=1), out,
         )  # fmt: skip
         assert each[k] == pytest.approx(alone, rel=1e-9)
-        assert off[:, :, k] / np.sqrt(size[:, :, k]) == pytest.approx(out[:, :, 0], rel=1e-9)
+        assert off[:, :, k] / np.sqrt(size[:, :, k]) == pytest.approx(np.hstack(out), rel=1e-9)
 
 
 def test_information_is_what_innovations_and_variances_change() -> None:

@@ -19,7 +19,7 @@ def test_coloured_noise_becomes_white() -> None:
     y = (_ar1(n, 0.5, 0.4, rng) + 0.2 * rng.standard_normal(n))[:, None]
     fresh, white, out = np.zeros(n), np.full(n, 0.04), np.empty((n, 1))
     fresh[0] = 1.0
-    coloured(y, fresh, white, np.exp(-STEP_S / 0.4), 0.25, out)
+    coloured(y, np.ones(n), fresh, white, np.exp(-STEP_S / 0.4), 0.25, out)
     assert out.std() == pytest.approx(1.0, abs=0.03)
     assert abs(np.corrcoef(out[1:, 0], out[:-1, 0])[0, 1]) < 0.03
 
@@ -32,12 +32,20 @@ def _moving_car(n: int, rng: np.random.Generator) -> np.ndarray:
     return y
 
 
+def _moved(y, fresh, rolling, white, share, colours, out) -> None:
+    """The filter over (samples, 3 tracks, 1), without a restart."""
+    tracks = tuple(np.ascontiguousarray(y[:, m]) for m in range(3))
+    found = tuple(np.empty_like(track) for track in tracks)
+    moving(tracks, np.ones(len(y)), fresh, np.zeros(len(y)), rolling, white, share, STEP_S, colours, found)
+    out[:] = np.stack(found, axis=1)
+
+
 def _innovations(y: np.ndarray, force: float) -> np.ndarray:
     n = len(y)
     fresh, white, out = np.zeros(n), np.tile([1e-4, 4e-4, 0.0], (n, 1)), np.empty_like(y)
     fresh[0] = 1.0
     colours = np.array([[np.exp(-STEP_S), force**2], [0.5, 1e-12], [0.5, 1e-12], [0.5, 1e-12]])
-    moving(y, fresh, np.zeros(n), np.ones(n), white, np.ones(n), STEP_S, colours, out)
+    _moved(y, fresh, np.ones(n), white, np.ones(n), colours, out)
     return out[:, :2, 0]
 
 
@@ -63,14 +71,14 @@ def test_what_all_wheels_tell_wrong_is_no_motion() -> None:
     fresh, white, out = np.zeros(n), np.tile([2.5e-5, 0.0, 1e-4], (n, 1)), np.empty_like(y)
     fresh[0] = 1.0
     colours = np.array([[0.5, 1e-12], [0.5, 1e-12], [0.5, 1e-12], [np.exp(-STEP_S), 0.02**2]])
-    moving(y, fresh, np.zeros(n), np.ones(n), white, share, STEP_S, colours, out)
+    _moved(y, fresh, np.ones(n), white, share, colours, out)
     assert out[10:, [0, 2], 0].std(axis=0) == pytest.approx([1.0, 1.0], abs=0.05)
     assert abs(np.corrcoef(out[11:, 0, 0], out[10:-1, 0, 0])[0, 1]) < 0.05
 
 
 def test_what_is_not_measured_leaves_nothing() -> None:
     y, out = np.ones((50, 1)), np.ones((50, 1))
-    coloured(y, np.zeros(50), np.zeros(50), 0.9, 1.0, out)
+    coloured(y, np.ones(50), np.zeros(50), np.zeros(50), 0.9, 1.0, out)
     assert not out.any()
 
 
@@ -84,7 +92,7 @@ def test_a_car_held_at_rest_feels_no_gust() -> None:
     colours = np.array([[0.98, 0.5**2], [0.98, 0.5**2], [0.98, 1e-12], [0.5, 1e-12]])
     shown = []
     for rolling in (np.ones(n), np.zeros(n)):
-        moving(y, fresh, np.zeros(n), rolling, white, np.ones(n), STEP_S, colours, out)
+        _moved(y, fresh, rolling, white, np.ones(n), colours, out)
         shown.append(float(np.square(out[:, 1]).sum()))
     assert shown[1] == pytest.approx(n * 0.05**2 / 4e-4, rel=1e-3)
     assert shown[0] < 0.2 * shown[1]
