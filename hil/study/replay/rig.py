@@ -18,7 +18,8 @@ from hil.study.logs.prepare import averaged
 from hil.study.logs.table import Floats
 from hil.study.replay import acting
 from hil.study.replay.latency import in_time
-from hil.study.replay.sensing import ground_speed_before, inverted, wheel_speed_before
+from hil.study.replay.sensing import inverted
+from hil.study.replay.starting import restart, start, start_speed
 from hil.study.replay.steps import STEPS, at_once
 from hil.study.replay.telling import SOURCE, Stack, Telling, powers
 from hil.study.replay.vehicle import Vehicle
@@ -26,14 +27,12 @@ from hil.study.replay.world import World, apart, told_alike
 from plant.effects.plugin import NO_PLUGINS
 from plant.effects.states import EXTRA_STATES
 from plant.effects.theta import THETA
-from plant.friction import mu_equilibrium
 from plant.integrate import EXPONENTIAL_4
-from plant.model import column_indices, healthy, initial_state, simulate
+from plant.model import column_indices, healthy, simulate
 from plant.road import DRY, road_table
-from plant.vectors import INPUT, OUTPUT, STATE, P, U, X
+from plant.vectors import INPUT, OUTPUT, STATE, P, U
 
 Of = TypeVar("Of")
-DISC_K = 350.0
 _SLOW = np.concatenate(
     [
         np.arange(STATE.size)[STATE.slice(name)]
@@ -47,7 +46,6 @@ _SLOW = np.concatenate(
 _INPUTS = (("pressure", "pressure_pa"), ("motor", "motor_torque_nm"))
 _SMOOTH = 21  # rows of 10 ms
 _FADING_MPS, _LEAST_NM = 0.3, 1.0
-_BACKWARD_MPS = 0.5
 _GRADE, _TURNS_MPS2, _CHARACTERISTIC_MPS = 0.01, 0.3, (8.0, 200.0)
 
 
@@ -69,18 +67,6 @@ def _over_drives(of: Callable[[Drive], Of], drives: Sequence[Drive]) -> list[Of]
     finally:
         if helped:
             _FREE.release()
-
-
-def _radius_m(world: World) -> Floats:
-    """Rolling radius of each wheel, (4,), effects that change it included: no slip at the start that nobody drove."""
-    worn = 1.0 + world.theta[THETA.slice("tyre_radius", "gain")]
-    flat = 1.0 - 0.01 * world.theta[THETA.slice("tyre_pressure_loss", "share")]
-    return np.asarray(float(world.p[P.wheel_rolling_radius_m]) * worn * flat)
-
-
-def _moving(speed_mps: float) -> float:
-    """A measured speed; a little backward is a car at rest."""
-    return 0.0 if -_BACKWARD_MPS < speed_mps < 0.0 else speed_mps
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,9 +187,9 @@ class Rig:
         columns = column_indices(SOURCE["motor"])
         table = np.empty((len(halves), len(columns)))
         simulate(
-            self._start(drive, world, halves[0]), halves, self.case.cut, healthy(), world.p, self._road, ROW_S / 2, 1,
-            np.ones(len(halves), np.int64), EXPONENTIAL_4, columns, table, OUTPUT.zeros(), world.theta_in(drive),
-            world.terms, NO_PLUGINS,
+            start(self.vehicle, drive, world, halves[0]), halves, self.case.cut, healthy(), world.p, self._road,
+            ROW_S / 2, 1, np.ones(len(halves), np.int64), EXPONENTIAL_4, columns, table, OUTPUT.zeros(),
+            world.theta_in(drive), world.terms, NO_PLUGINS,
         )  # fmt: skip
         torque, middle = table[::2], table[1::2]
         following = np.concatenate((torque[1:], torque[-1:]))
@@ -273,30 +259,6 @@ class Rig:
         """Measured channels of all drives."""
         return {g: np.concatenate([drive.measured[g] for drive in self.case.drives]) for g in self._groups}
 
-    def _start(self, drive: Drive, world: World, given: Floats) -> Floats:
-        """State at the first row; ``given`` are its inputs, what the sensors add taken off."""
-        log, first = drive.log, drive.segments[0]
-        soc = log.channels.get("soc")
-        charge = 0.7 if soc is None else float(np.nanmean(soc[:20]))
-        disc = (log.disc_temperature_k or DISC_K) + world.disc_offset_k
-        pad_k = disc if self.vehicle.pad_temperature_matters else float(world.p[P.friction_brake_ambient_k])
-        pad = (float(world.p[at]) for at in (P.pad_a_1_ks, P.pad_b_1_j, P.pad_epsilon_w))
-        x = initial_state(self.vehicle.parameters, 0.0, disc, charge, mu_equilibrium(0.0, pad_k, *pad))
-        x[STATE.slice("pad_temperature_k")] = pad_k
-        speed = self._speed(drive, first, world)
-        x[X.speed_mps] = speed
-        x[STATE.slice("wheel_speed_rad_s")] = speed / _radius_m(world)
-        x[STATE.slice("pressure_pa")] = np.clip(given[INPUT.slice("pressure_pa")], 0.0, None)
-        x[STATE.slice("motor_torque_nm")] = given[INPUT.slice("motor_torque_nm")]
-        return x
-
-    def _speed(self, drive: Drive, segment: Segment, world: World) -> float:
-        """Speed a segment starts with: what the sensors told, less what the world's sensors add."""
-        if segment.start_speed_mps is not None:
-            return _moving(ground_speed_before(segment.start_speed_mps, world.theta_in(drive)))
-        told = wheel_speed_before(segment.start_wheel_rad_s, world.theta_in(drive))
-        return _moving(told * float(np.median(_radius_m(world))))
-
     def _drive(self, drive: Drive, world: World) -> Stack:
         """Simulated channels of one drive; from what was kept where the worlds cannot differ."""
         kept = self._kept
@@ -331,7 +293,7 @@ class Rig:
         """
         theta = world.theta_in(drive)
         inputs = kept.inputs if kept is not None and alike else self._driving(drive, world)
-        x = self._start(drive, world, inputs[0])
+        x = start(self.vehicle, drive, world, inputs[0])
         table = np.empty((len(inputs), len(columns)))
         cut, switch, y, pace = self.case.cut, healthy(), OUTPUT.zeros(), self._pace[drive.number]
         states = [x.copy()]
@@ -344,28 +306,10 @@ class Rig:
                 x[_SLOW] += ahead
                 continue
             if number:
-                self._restart(x, self._speed(drive, segment, world))
+                restart(x, start_speed(drive, segment, world))
             simulate(
                 x, inputs[rows], cut, switch, world.p, self._road, ROW_S / STEPS, STEPS, pace[rows], EXPONENTIAL_4,
                 columns, table[rows], y, theta, world.terms, NO_PLUGINS,
             )  # fmt: skip
             states.append(x.copy())
         return _Replay(inputs, table, tuple(states))
-
-    @staticmethod
-    def _restart(x: Floats, speed_mps: float) -> None:
-        """The measured speed with the slips as they are; temperatures, friction, energy and pitch go on."""
-        now = x[X.speed_mps]
-        wheels = STATE.slice("wheel_speed_rad_s")
-        if not np.isfinite(x).all():
-            x[~np.isfinite(x)] = 0.0
-        rolls = abs(now) > 0.5
-        ratio = speed_mps / now if rolls else 1.0
-        x[wheels] *= ratio
-        if not rolls:
-            x[wheels] += (speed_mps - now) / 0.3
-        if abs(speed_mps) < 0.1:
-            x[wheels] = 0.0
-        x[X.speed_mps] = speed_mps
-        for name in ("lateral_speed_mps", "yaw_rate_rad_s"):
-            x[STATE.slice(name)] *= ratio if rolls else 0.0
