@@ -7,7 +7,6 @@ import numpy as np
 
 from hil.study.fitting.fit import Fitter, Model
 from hil.study.fitting.numbers import STRAINED, Numbers, strain
-from hil.study.fitting.own_error import variance_of
 from hil.study.fitting.same_number import restated
 from hil.study.likelihood.noise import Frame, Noise
 from hil.study.logs.case import Case
@@ -32,14 +31,13 @@ from hil.study.search.diagnosis import Diagnosis, Say, Settings, causes_in
 from hil.study.search.doubt import backward, stands_beside, with_gain
 from hil.study.search.field import Field, number_of
 from hil.study.search.handed_in import Refitted, from_handed_in
+from hil.study.search.leading import fitted_leaders
 from hil.study.search.left_over import LeftOver
 from hil.study.search.one_for_all import one_for_all
 from hil.study.search.onset import with_onsets
-from hil.study.search.screen import LEADERS, Score, leaders, not_testable
+from hil.study.search.screen import Score, not_testable
 from hil.study.search.unlisted import Round, Unlisted
 
-_TRIED = 10
-"""Leaders where the vehicle's numbers go far, places of one effect among them."""
 _NEAR = 0.2
 """Share of what the best explains, by one step or fitted, below which no other is fitted from the car as handed in, nor
 the best at another place."""
@@ -48,9 +46,6 @@ _MISLED = 1.0 / 3.0
 begin again from a better one."""
 _LED_ANEW = 3
 """Leaders that get sensitivities of their own, when they are fitted from the car as handed in."""
-_HOPELESS, _POOR = 0.1, 0.4
-"""Shares of the gain asked: below the one no candidate is looked at with noise of its own, below the other none is
-fitted but as a rival of one that is beyond doubt."""
 Accepted = tuple[Model, Noise, list[Contender]]
 """A model with one cause more, the noise beside it, and all that were fitted in its place, best first."""
 
@@ -245,31 +240,10 @@ class _Search:
         listed, sums = self.field.seen(self.fitter, found, model, noise)
         if model.terms:
             self.asked.beside(self.fitter, listed, sums, model)
-        bent, least = self._bent(model), found.least_gain
+        bent = self._bent(model)
         plausible = self.field.plausible(self.fitter, listed, sums, model, bent)
         contest = Contest(self.fitter, self.field.tracks, model, noise, self.settings.relinearise)
-        if _most(plausible, left) < _HOPELESS * least:
-            return contest, [], []
-        self.say(f"noise beside {len(plausible)} candidates")
-        seen = contest.at_once(contest.profiled, plausible)
-        beside = {id(item): quieter for item, quieter in seen}
-        looked = [item for item, _ in seen]
-        top = sorted(looked, key=lambda s: -s.evidence)[:_TRIED] if bent else leaders(looked, LEADERS)
-        if _most(top, left) < _POOR * least:
-            return contest, [], []
-        least /= found.inflation  # which beside the best as fitted may be less
-
-        def fits(some: Sequence[Score]) -> list[Contender]:
-            self.say(f"fitting {len(some)} leaders")
-            return contest.at_once(lambda item: contest.contender(item, beside[id(item)]), some)
-
-        first = [item for item in top if bent or _beyond(item, item.gain, left) >= _POOR * least]
-        fitted = fits(first)
-        gains = [(contest.reference - c.cost) / variance_of(c.term.candidate) for c in fitted]
-        rest = [item for item in top if item not in first]
-        if rest and any(_beyond(*one, left) >= least for one in zip(first, gains, strict=True)):
-            first, fitted = [*first, *rest], [*fitted, *fits(rest)]
-        return contest, first, fitted
+        return contest, *fitted_leaders(contest, plausible, left, found, bent, self.say)
 
     def _fitted_again(
         self, model: Model, fitted: list[Contender], top: list[Score], reference: float
@@ -307,13 +281,3 @@ class _Search:
         placed = [*clear, *instead(self.fitter, best, [(place, best.term.value) for place in places], True)]
         better = [one for one in placed if number_of(one.term.candidate)[:2] == name[:2] and odds(one) < odds(best)]
         return min(better, key=odds, default=best), placed
-
-
-def _beyond(item: Score, gain: float, left: LeftOver) -> float:
-    """What a candidate gains beyond what the causes in the model may leave."""
-    return gain - left.of(item.candidate) / variance_of(item.candidate)
-
-
-def _most(listed: Sequence[Score], left: LeftOver) -> float:
-    """Most that a candidate gains so by one step."""
-    return max((_beyond(item, item.gain, left) for item in listed), default=0.0)
