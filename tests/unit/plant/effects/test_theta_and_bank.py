@@ -54,6 +54,19 @@ def test_an_onset_inside_a_row_counts_with_its_share(stop):
     assert changes[0] > changes[1] > changes[2] == 0.0
 
 
+def test_an_effect_of_the_model_ends(stop):
+    plan, signals = stop
+
+    def driven(**times: float) -> np.ndarray:
+        return simulate(plan, THETA.set(THETA.typical("pad_mu_gain"), "pad_mu_gain", times))[0]
+
+    assert np.array_equal(driven(until_s=0.0), signals)
+    ended, lasting = driven(onset_s=1.0, until_s=2.0), driven(onset_s=1.0)
+    assert np.array_equal(ended[:201], lasting[:201])
+    ax = NAMES.index("ax_mps2")
+    assert np.abs(lasting[210:300, ax] - ended[210:300, ax]).min() > 0.05
+
+
 def test_an_effect_ends(stop):
     plan, signals = stop
     theta = THETA.set(THETA.typical("imu_bias"), "imu_bias", {"onset_s": 1.0, "until_s": 2.0})

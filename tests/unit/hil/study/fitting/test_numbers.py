@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from pulses import log_of_pulses
 
+from hil.study.fitting.candidates import candidates, columns
+from hil.study.fitting.fit import Term
 from hil.study.fitting.numbers import Numbers, strain
 from hil.study.likelihood.noise import Frame
 from hil.study.logs.prepare import prepare
@@ -14,6 +16,7 @@ from hil.study.replay.vehicle import paper_car
 from hil.study.replay.world import DISC_GUESSED_K, DISC_TOLD_K, nominal
 
 NOISE_PA = 2e3
+(_MASS,) = (one for one in candidates(columns()) if one.name == "mass_offset@car")
 
 
 def test_numbers_within_their_tolerance_strain_nothing():
@@ -58,6 +61,31 @@ def test_a_strained_number_at_its_end_wants_to_go_on():
     assert strain(z) == pytest.approx(3.0)
     assert strain(z, np.full(4, 3.0)) == pytest.approx((4 * 9.0 + 3.0) / 4)
     assert strain(z / 3.0, np.full(4, 1.0)) == 1.0  # little strained
+
+
+def test_sensitivities_taken_lately_serve_again_where_cars_are_alike():
+    vehicle = paper_car()
+    case = prepare([log_of_pulses()], 0.308)
+    rig = Rig(case, vehicle)
+    numbers = Numbers(rig, Frame.of(case), vehicle, nominal(vehicle), True)
+    z, heavy = np.zeros(len(numbers.nuisances)), _MASS
+
+    def replays(z: np.ndarray, *terms: Term) -> int:
+        before = rig.runs
+        numbers.anew(z, terms)
+        return rig.runs - before
+
+    assert replays(z) > len(z)
+    bare = numbers.fitter
+    assert replays(z, Term(heavy, 100.0)) > len(z)
+    beside = numbers.fitter
+    assert replays(z + 0.4) == 0
+    assert numbers.fitter is bare
+    assert replays(z, Term(heavy, 110.0)) == 0
+    assert numbers.fitter is beside
+    assert replays(z, Term(heavy, 150.0)) > len(z)
+    assert replays(z, Term(heavy, 150.0, (0, 1.0))) > len(z)
+    assert replays(z + 1.0) > len(z)
 
 
 @pytest.mark.parametrize(("told_k", "deviation_k"), [(350.0, DISC_TOLD_K), (None, DISC_GUESSED_K)])
