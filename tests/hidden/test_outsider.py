@@ -1,13 +1,15 @@
 """Logs of cars nobody here modelled, told by six numbers: nothing in nothing, and a law in no list by its joint."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import one_log
 import pytest
-from outsider import VEHICLE, drive, logs
+from outsider import STEP_S, VEHICLE, drive, logs
 
 from hil.study.explain import explain
+from hil.study.logs.table import make_log
 from hil.study.search.diagnosis import Settings
 from hil.study.verdict.extension import load_extension
 
@@ -87,6 +89,40 @@ def test_a_listed_cause_at_its_end_gives_way_to_a_law_that_explains_more() -> No
     slow, fast = ([p["y"] for p in cause["curve"] if low < p["x"] < low + 5.0] for low in (8.0, 19.0))
     assert np.mean(slow) == pytest.approx(0.0, abs=0.12)
     assert np.mean(fast) == pytest.approx(-0.3, abs=0.12)
+
+
+class _Fading:
+    """Front pads that lose 0.2 % per kelvin of their disc above 470 K; discs as the plant's, told at the start."""
+
+    def __init__(self, disc_k: float) -> None:
+        self.disc_k = np.full(4, disc_k)
+
+    def __call__(self, speed_mps: float, pressure_pa: np.ndarray) -> np.ndarray:
+        share = 1.0 - np.array([2e-3, 2e-3, 0.0, 0.0]) * np.clip(self.disc_k - 470.0, 0.0, None)
+        gain = np.array([VEHICLE[f"brake_gain_{axle}_nm_pa"] for axle in ("front", "front", "rear", "rear")])
+        heat_w = gain * pressure_pa * share * speed_mps / VEHICLE["rolling_radius_m"]
+        cooling = np.array([4.0, 4.0, 2.7, 2.7]) + np.array([0.35, 0.35, 0.23, 0.23]) * speed_mps
+        capacity = np.array([3000.0, 3000.0, 2000.0, 2000.0])
+        self.disc_k = self.disc_k + STEP_S * (heat_w - cooling * (self.disc_k - 293.15)) / capacity
+        return share
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_fade_that_begins_elsewhere_has_its_name_and_says_where() -> None:
+    """It was told by its curve: shapes of listed effects were the usual ones."""
+    tables = [
+        replace(make_log(f"log{k}", log.pop("t_s"), log), disc_temperature_k=disc_k)
+        for k, (kind, disc_k) in enumerate((("stops", 380.0), ("mixed", 440.0), ("mixed", 540.0), ("motors", 300.0)))
+        for log in (drive(kind, 10 * k + 7, _Fading(disc_k)),)
+    ]
+    found = explain(tables, vehicle=VEHICLE).json
+    assert found["verdict"] == "named"
+    (cause,) = found["causes"]
+    assert (cause["effect"], cause["wheel"]) == ("pad_temp_fade", "front")
+    assert cause["parameters"]["fade_1_k"]["value"] == pytest.approx(2e-3, rel=0.2)
+    low, high = cause["parameters"]["start_k"]["ci95"]
+    assert 440.0 < low < 470.0 < high < 500.0
 
 
 def _rear_left_by_speed(speed_mps: float, t_s: float) -> np.ndarray:

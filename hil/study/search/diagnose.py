@@ -207,7 +207,7 @@ class _Search:
         if law is not None:
             found.explained += reference - law.cost
             polished, tighter = self.fitter.settle(law.model, law.noise, 1)
-            return polished, tighter, [replace(law, model=polished), *clear]
+            return polished, tighter, [replace(law, model=polished, term=polished.terms[-1]), *clear]
         best = self._standing(fitted, clear, found.least_gain) if fitted else None
         if best is None:
             return None

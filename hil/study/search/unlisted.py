@@ -15,6 +15,7 @@ from hil.study.search.diagnosis import Diagnosis, Say, Settings
 from hil.study.search.handed_in import Refitted
 from hil.study.search.left_over import FORM, LeftOver
 from hil.study.search.race import Entry, LawRace, best_of_each, least_gain, with_law
+from hil.study.search.shapes import of_another_shape
 
 _CLEARER = 5.0
 """By how much more than the best listed cause a law in no list must explain, log of the odds."""
@@ -58,7 +59,8 @@ class Unlisted:
     def best(self, found: Diagnosis, now: Round) -> Contender | None:
         """The best law where it is ahead of the best listed cause, beyond noise and the model's own error.
 
-        A listed cause that is as far off as it may be is no rival to one that explains more.
+        A listed cause that is as far off as it may be is no rival to one that explains more. One of another shape than
+        the usual (`hil.study.search.shapes`) takes the place of a law that is not ahead of it, too.
         """
         model, reference = now.model, now.reference
         if not self._settings.dictionary or any(isinstance(term.candidate, Piece) for term in model.terms):
@@ -87,24 +89,28 @@ class Unlisted:
         self._say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
         least = self._asked(found, race, best, now.left)
 
-        def ahead() -> bool:
+        def ahead(listed: Contender | None) -> bool:
             known, rival = reference, 0.0
-            if now.listed is not None and law.cost >= now.listed.cost:
+            if listed is not None and law.cost >= listed.cost:
                 return False
-            if now.listed is not None and not at_its_end(now.listed.term):
-                known = min(now.listed.cost, reference)
-                rival = (1.0 + FORM**2) * max(0.5 * (reference - odds(now.listed)), 0.0)
+            if listed is not None and not at_its_end(listed.term):
+                known = min(listed.cost, reference)
+                rival = (1.0 + FORM**2) * max(0.5 * (reference - odds(listed)), 0.0)
             clearly = 0.5 * (reference - odds(law)) >= rival + _CLEARER
             return clearly and known - law.cost >= least * now.error(law, law)
 
-        if ahead() and self._settings.relinearise and not now.bent:
+        if ahead(now.listed) and self._settings.relinearise and not now.bent:
             (law,), without = self._again(model, [replayed(law)], refitted_law, reference, 1, np.inf)
             reference = min(reference, without[0].cost)
-        if not ahead():
+        if not ahead(now.listed):
             return None
         fitted = fitter.fit(fitter.at(law.model.z, law.model.terms, law.noise), law.noise, 3)
         law = refitted_law(law, fitted, law.noise)
-        return law if ahead() else None
+        if not ahead(now.listed):
+            return None
+        listed = [item.candidate for item in found.screened]
+        shaped = of_another_shape(now.contest, fitter, listed, law)
+        return law if shaped is None or ahead(shaped) else shaped
 
     def _seen(self, race: LawRace, now: Round) -> tuple[dict[str, Entry], list[Contender]]:
         """The best laws, by name, and by one linear step with the noise beside each."""

@@ -12,8 +12,10 @@ from hil.study.fitting.own_error import UNLISTED, variance_of_law
 from hil.study.search.basis import Piece, shown
 from hil.study.search.contest import Contender, behind, worse
 from hil.study.search.diagnosis import TIED, Diagnosis
+from hil.study.search.field import number_of
 from hil.study.search.intervals import half_width, intervals
 from hil.study.search.onset import begins, nearest
+from hil.study.search.shapes import Shaped
 from hil.study.verdict.decide import MOST, Advice, decide_with, write
 from hil.study.verdict.measure import Gain, probabilities
 from hil.study.verdict.patterns import WORDS, Wrong
@@ -110,6 +112,10 @@ def _causes(found: Diagnosis) -> list[dict[str, Any]]:
         entry["parameters"][candidate.parameter.name] = {
             "value": term.value, "unit": candidate.parameter.unit, "ci95": list(interval),
         }  # fmt: skip
+        if isinstance(candidate, Shaped):
+            entry["parameters"][candidate.shape.name] = {
+                "value": candidate.at, "unit": candidate.shape.unit, "ci95": list(candidate.interval()),
+            }  # fmt: skip
         entry["probability"] = max(entry["probability"], own)
     return list(merged.values())
 
@@ -173,7 +179,8 @@ def _tied(found: Diagnosis) -> Tied | None:
     term, listed = found.final.terms[0], [score.candidate for score in found.screened]
     total = found.sums.total() if term.onset is None else found.sums.since(nearest(begins(found.case), term.onset))
     projected = project(total, found.sums.nuisances, (), found.base.z, found.fitter.at_their_end(found.base.z))
-    return tied_set(projected.q, listed, listed.index(term.candidate), term.value)
+    named = [number_of(candidate) for candidate in listed].index(number_of(term.candidate))
+    return tied_set(projected.q, listed, named, term.value)
 
 
 def _imitations(found: Diagnosis, tied: Tied | None) -> list[dict[str, Any]]:
