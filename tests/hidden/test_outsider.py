@@ -12,6 +12,7 @@ from hil.study.explain import explain
 from hil.study.logs.table import make_log
 from hil.study.search.diagnosis import Settings
 from hil.study.verdict.extension import load_extension
+from plant.effects.theta import THETA
 
 
 def _plain(speed_mps: float, pressure_pa: np.ndarray) -> np.ndarray:
@@ -109,17 +110,19 @@ class _Fading:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_a_fade_that_begins_elsewhere_has_its_name_and_says_where() -> None:
+def test_a_fade_that_begins_elsewhere_has_its_name_and_says_where(tmp_path: Path) -> None:
     """It was told by its curve: shapes of listed effects were the usual ones."""
     tables = [
         replace(make_log(f"log{k}", log.pop("t_s"), log), disc_temperature_k=disc_k)
         for k, (kind, disc_k) in enumerate((("stops", 380.0), ("mixed", 440.0), ("mixed", 540.0), ("motors", 300.0)))
         for log in (drive(kind, 10 * k + 7, _Fading(disc_k)),)
     ]
-    found = explain(tables, vehicle=VEHICLE).json
+    found = explain(tables, vehicle=VEHICLE, out=tmp_path).json
     assert found["verdict"] == "named"
     (cause,) = found["causes"]
     assert (cause["effect"], cause["wheel"]) == ("pad_temp_fade", "front")
+    begins_k = load_extension(Path(found["extension"])).theta[THETA.slice("pad_temp_fade", "start_k")]
+    assert begins_k == pytest.approx(cause["parameters"]["start_k"]["value"])
     assert cause["parameters"]["fade_1_k"]["value"] == pytest.approx(2e-3, rel=0.2)
     low, high = cause["parameters"]["start_k"]["ci95"]
     assert 440.0 < low < 470.0 < high < 500.0
