@@ -20,7 +20,7 @@ from hil.study.replay.world import World
 from hil.study.search.basis import Piece
 from hil.study.search.contest import Contender, Contest, refitted
 from hil.study.search.intervals import DEVIATION_BY_FORM
-from plant.effects.effect import Parameter, Scope
+from plant.effects.effect import Parameter
 from plant.effects.theta import THETA
 
 _OFFERED = 9
@@ -67,7 +67,7 @@ def of_another_shape(contest: Contest, fitter: Fitter, listed: Sequence[Candidat
         Shaped(one.effect, one.parameter, one.place, one.columns, one.places, shape, at)
         for one in listed
         for shape in one.effect.parameters
-        if shape.shape and piece.law.joint in one.effect.joints and _overlap(one, piece)
+        if shape.shape and piece.law.joint in one.effect.joints and one.place == piece.place
         for at in _values(shape)
     ]
     if not offered:
@@ -86,14 +86,6 @@ def of_another_shape(contest: Contest, fitter: Fitter, listed: Sequence[Candidat
 
     costs = contest.at_once(foreseen, range(len(offered)))
     return _fitted(fitter, bare, offered[int(np.argmin(costs))], law)
-
-
-def _overlap(one: Candidate, piece: Piece) -> bool:
-    """Whether both act on the same wheels."""
-    wheels = {"front": {"fl", "fr"}, "rear": {"rl", "rr"}, "left": {"fl", "rl"}, "right": {"fr", "rr"}}
-    every = set(Scope.WHEEL.members)
-    of = [wheels.get(place, {place} if place in every else every) for place in (one.place, piece.place)]
-    return of[0] == of[1]
 
 
 def _values(shape: Parameter) -> list[float]:
