@@ -19,9 +19,10 @@ _KINKED = ("ehb_dead_time_s",)
 """What acts from step to step, with a kink at each."""
 _COARSE, _FINE = 0.5, 3.0
 """Finite differences: in standard deviations of what is known before, and of what data say."""
-_TURNS, _MOST_ANEW, _SETTLED, _STALE, _STILL, _FAR = 20, 4, 3.0, 0.3, 0.5, 1.0
-_REMEMBERED = 3
-"""Times that sensitivities were taken last: those of the best of several causes serve again when it is accepted."""
+_TURNS, _MOST_ANEW, _SETTLED, _STALE, _FAR = 20, 4, 3.0, 0.3, 1.0
+_REMEMBERED, _STILL = 3, 0.5
+"""Times that sensitivities were taken last, and how far numbers may be from there, in standard deviations, for those of
+the best of several causes to serve again when it is accepted. A fit of the numbers themselves asks for `_STALE`."""
 
 
 def strain(z: Floats, farthest: Floats | float = np.inf, told: float | None = None) -> float:
@@ -56,12 +57,8 @@ class Numbers:
     def anew(self, z: Floats, terms: Sequence[Term] = ()) -> None:
         """Take the sensitivities where the numbers are ``z`` standard deviations off, beside these effects.
 
-        What drives the car is made by that car too (`Rig.quieten`). Those taken lately near there are as good.
+        What drives the car is made by that car too (`Rig.quieten`).
         """
-        for around, beside, fitter in self._taken:
-            if float(np.abs(z - around).max()) <= _STILL and alike(beside, terms):
-                self.fitter = fitter
-                return
 
         def world(of: Floats) -> World:
             found = self._base.shifted(self.nuisances, of)
@@ -80,6 +77,14 @@ class Numbers:
                     columns[:, k] = 0.5 * (columns[:, k] + other[name][:, 0])
         self.fitter = Fitter(self._rig, self._frame, self._base, self.nuisances, tracks)
         self._taken.append((z, tuple(terms), self.fitter))
+
+    def beside(self, z: Floats, terms: Sequence[Term]) -> None:
+        """As `anew`, or those taken lately where a car with these effects was alike."""
+        for around, taken, fitter in self._taken:
+            if float(np.abs(z - around).max()) <= _STILL and alike(taken, terms):
+                self.fitter = fitter
+                return
+        self.anew(z, terms)
 
     def fitted(self, model: Model, noise: Noise) -> tuple[Model, Noise]:
         """Numbers and noise in turn, with sensitivities taken anew until neither moves.

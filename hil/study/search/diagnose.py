@@ -167,7 +167,7 @@ class _Search:
         if not self.numbers.went_far(model, around):
             return model, noise, around
         self.say("sensitivities anew beside it")
-        self.numbers.anew(model.z, model.terms)
+        self.numbers.beside(model.z, model.terms)
         model, noise = self.fitter.settle(self.fitter.at(model.z, model.terms, noise), noise, 2)
         return model, noise, model.z
 

@@ -72,7 +72,7 @@ def test_sensitivities_taken_lately_serve_again_where_cars_are_alike():
 
     def replays(z: np.ndarray, *terms: Term) -> int:
         before = rig.runs
-        numbers.anew(z, terms)
+        numbers.beside(z, terms)
         return rig.runs - before
 
     assert replays(z) > len(z)
@@ -81,6 +81,8 @@ def test_sensitivities_taken_lately_serve_again_where_cars_are_alike():
     beside = numbers.fitter
     assert replays(z + 0.4) == 0
     assert numbers.fitter is bare
+    numbers.anew(z + 0.4)  # a fit of the numbers asks for its own
+    assert numbers.fitter is not bare
     assert replays(z, Term(heavy, 110.0)) == 0
     assert numbers.fitter is beside
     assert replays(z, Term(heavy, 150.0)) > len(z)
