@@ -10,7 +10,7 @@ from plant.contact import rolling_radius
 from plant.effects.apply import extra_states_move
 from plant.equations import derivative
 from plant.fastmath import exp
-from plant.vectors import BASE_RATES, OUTPUT, RATES, STATE, X, Y
+from plant.vectors import BASE_RATES, OUTPUT, RATES, STATE, P, X, Y
 
 Vector = NDArray[np.float64]
 N = BASE_RATES.size
@@ -21,6 +21,14 @@ EXPONENTIAL_4 = 2
 _SMALL = 1e-3
 _GONE = 30.0  # of what decays no more than exp(-30) is left
 WORK_SHAPE = (5, max(STATE.size, OUTPUT.size))
+
+
+@equation
+def _hold_pressure_rates(x: Vector, p: Vector) -> None:
+    """Bring rates of pressure back to their limits: one passes its limit within a step (docs/decisions/0091)."""
+    build, release = p[P.ehb_build_rate_pa_s], p[P.ehb_release_rate_pa_s]
+    for i in range(4):
+        x[X.pressure_rate_pa_s + i] = min(max(x[X.pressure_rate_pa_s + i], -release), build)
 
 
 @section
@@ -55,6 +63,7 @@ def semi_implicit_step(
     if extra_states_move(p):
         for i in range(N, N_ALL):
             x[i] += step_s * y[d + i] / (1.0 + step_s * y[Y.decay_1_s + i])
+    _hold_pressure_rates(x, p)
 
 
 @section
@@ -97,6 +106,7 @@ def exponential_step(
         three = three if z > _SMALL else 1.0 / 6.0 - z / 24.0
         first = one - 3.0 * two + 4.0 * three
         x[i] += step_s * (first * y[Y.rate + i] + 2.0 * (two - 2.0 * three) * total[i] + (4.0 * three - two) * end)
+    _hold_pressure_rates(x, p)
 
 
 @equation
@@ -125,3 +135,4 @@ def runge_kutta_step(
     derivative(trial, u, cut, switch, p, road, stage)
     for i in range(last):
         x[i] += step_s / 6.0 * (total[i] + stage[Y.rate + i])
+    _hold_pressure_rates(x, p)

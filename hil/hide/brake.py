@@ -21,6 +21,13 @@ LINE_STIFFNESS_M3_PA, ATMOSPHERE_PA = 5.0e-13, 1.0e5
 
 
 @equation
+def pressure_rate_limits(i: int, car: Car, e: Vector) -> tuple[float, float]:
+    """How fast the hydraulics of a wheel build and release pressure, Pa/s, with what is hidden in them."""
+    limit = (1.0 + e[E.ehb_rate_limit, i]) / (1.0 + e[E.fluid_temp, i]) ** 2
+    return car.ehb_build_rate_pa_s * limit, car.ehb_release_rate_pa_s * limit
+
+
+@equation
 def brake_pressure_rates(x: Vector, i: int, demand_pa: float, car: Car, e: Vector, dx: Vector) -> None:
     """Rates of the pressure of one wheel: second order behind a rate limit; Lee et al., SAE 2015 (M), values per set.
 
@@ -31,8 +38,7 @@ def brake_pressure_rates(x: Vector, i: int, demand_pa: float, car: Car, e: Vecto
     p = x[S.pressure_pa + i]
     w = 6.283185307 * car.ehb_frequency_hz * (1.0 + e[E.ehb_bandwidth, i]) / (1.0 + e[E.fluid_temp, i])
     zeta = car.ehb_damping
-    limit = (1.0 + e[E.ehb_rate_limit, i]) / (1.0 + e[E.fluid_temp, i]) ** 2
-    build, release = car.ehb_build_rate_pa_s * limit, car.ehb_release_rate_pa_s * limit
+    build, release = pressure_rate_limits(i, car, e)
     ceiling = car.ehb_max_pressure_pa
     target = min(max(demand_pa, 0.0), ceiling) * (
         1.0 - e[E.accumulator, i] * min(x[S.applied_pa_s + i] / DROOP_PA, 1.0)

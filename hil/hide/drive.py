@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.hide.body import rates
+from hil.hide.brake import pressure_rate_limits
 from hil.hide.car import NOMINAL, Car
 from hil.hide.compiled import entry, equation
 from hil.hide.manoeuvres import TICK_S, Manoeuvre
@@ -141,6 +142,8 @@ def _integrate(
                 x[k] += STEP_S / 6.0 * (stages[0, k] + 2.0 * stages[1, k] + 2.0 * stages[2, k] + stages[3, k])
             for i in range(4):
                 width = e[E.pressure_hysteresis, i]
+                build, release = pressure_rate_limits(i, car, e)
+                x[S.pressure_rate_pa_s + i] = min(max(x[S.pressure_rate_pa_s + i], -release), build)
                 p = x[S.pressure_pa + i]
                 play[i] = min(max(play[i], p - width), p + width)
                 since[i] = since[i] + STEP_S if p > APPLIED_PA else 0.0

@@ -146,6 +146,25 @@ def test_long_exponential_steps_beat_short_simple_ones(stop):
     assert (long_steps < 0.2 * short_steps).all(), (long_steps, short_steps)
 
 
+@pytest.mark.parametrize("late_s", [0.0, 0.25e-3, 0.75e-3, 1.25e-3, 1.75e-3])
+def test_a_limited_rate_of_pressure_leaves_its_limit_in_time(stop, late_s):
+    """Wherever in a step it passes the limit; what it exceeded it by would keep it there."""
+    start, inputs, p = stop
+    demand = np.repeat([0.0, 30e5, 8e5, 45e5, 30e5, 0.0], [5, 15, 11, 21, 18, 30])
+    inputs = inputs[: len(demand)].copy()
+    inputs[:, INPUT.slice("pressure_demand_pa")] = demand[:, None]
+    late = p.copy()
+    late[P.ehb_dead_time_s] += late_s
+
+    def pressure(method, steps):
+        return replay(start, inputs, late, ["state.pressure_pa_fl"], steps=steps, step_s=0.01 / steps, method=method)
+
+    exact = pressure(RUNGE_KUTTA_4, 20)
+    for method, steps, rms_pa in ((EXPONENTIAL_4, 4, 1e3), (RUNGE_KUTTA_4, 10, 2e2)):
+        error = pressure(method, steps) - exact
+        assert math.sqrt(float(np.mean(error**2))) < rms_pa, (method, late_s)
+
+
 def test_left_and_right_bends_mirror_each_other(stop):
     start, inputs, p = stop
     left, right = inputs.copy(), inputs.copy()

@@ -48,6 +48,16 @@ def test_deceleration_is_force_over_mass():
     assert found == pytest.approx(expected, rel=0.02)
 
 
+def test_pressure_changes_no_faster_than_the_hydraulics_can():
+    """At the end of every step: what a rate exceeds its limit by would keep it there when the demand is reached."""
+    strength = np.zeros((ROWS, 4))
+    strength[E.ehb_rate_limit] = -0.2
+    for hidden, share in ((None, 1.0), (strength, 0.8)):
+        rate = driven("m10_hold_pressure", hidden).states[:, S.pressure_rate_pa_s : S.pressure_rate_pa_s + 4]
+        assert rate.max() == pytest.approx(share * NOMINAL.ehb_build_rate_pa_s, rel=1e-12)
+        assert rate.min() == pytest.approx(-share * NOMINAL.ehb_release_rate_pa_s, rel=1e-12)
+
+
 def test_actuators_follow_what_the_frames_say():
     """A driver's demand between two quanta: pressure control and motors get the quantum, and settle there."""
     hold, pulses = BY_NAME["m10_hold_pressure"], BY_NAME["m03_motor_20"]
