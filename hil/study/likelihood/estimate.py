@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from hil.study.likelihood.noise import (
 )
 from hil.study.likelihood.whiten import HUBER
 from hil.study.logs.table import Floats
+from hil.study.side_by_side import side_by_side
 
 _FLOOR = {"wheel": 5e-4, "ax": 2e-3, "gps": 2e-3, "ay": 2e-3, "yaw": 2e-4, "pressure": 500.0, "motor": 0.05}
 _SHORTEST_S, _LONGEST_S, _LONGEST_MOVING_S = 0.02, 2.0, 30.0  # what is slower is no noise but wants a cause
@@ -60,9 +62,9 @@ def estimate(tracks: Mapping[str, Floats], frame: Frame, start: Noise) -> Noise:
     """Noise of largest likelihood for residual tracks (samples, 1)."""
     noise = start
     for _ in range(1 if start.scales else 2):
-        for name, values in tracks.items():
-            if name not in LONG:
-                noise = _of_side(name, values, frame, noise)
+        sides = [name for name in tracks if name not in LONG]
+        found = side_by_side(partial(_of_side, tracks, frame, noise), sides)
+        noise = replace(noise, tracks={**noise.tracks, **dict(zip(sides, found, strict=True))})
         noise = _rescaled(tracks, frame, _of_moving(tracks, frame, noise))
     return noise
 
@@ -118,9 +120,9 @@ def _smallest(costs: Costs, starts: Sequence[Floats], low: Floats, high: Floats,
     return now.z
 
 
-def _of_side(name: str, values: Floats, frame: Frame, noise: Noise) -> Noise:
-    """Noise with that of a track that all others say nothing of."""
-    at, floor, known = noise.tracks[name], _floor(name), frame.present[name]
+def _of_side(tracks: Mapping[str, Floats], frame: Frame, noise: Noise, name: str) -> Track:
+    """Noise of a track that all others say nothing of."""
+    values, at, floor, known = tracks[name], noise.tracks[name], _floor(name), frame.present[name]
     scaled = values[:, 0] / scale_of(name, frame, noise)
     common = white_variance(name, Track(0.0, 0.0, 0.0, 1.0), frame)
     faster = np.square(frame.speed_mps / REFERENCE_MPS)
@@ -143,8 +145,7 @@ def _of_side(name: str, values: Floats, frame: Frame, noise: Noise) -> Noise:
     found = np.exp(
         _smallest(costs, [start[:count] for start in starts], low[:count], high[:count], np.zeros(count))
     ).tolist()
-    track = Track(found[0], found[3] if by_speed else 0.0, found[1], found[2])
-    return replace(noise, tracks={**noise.tracks, name: track})
+    return Track(found[0], found[3] if by_speed else 0.0, found[1], found[2])
 
 
 def _of_moving(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> Noise:

@@ -1,13 +1,16 @@
 """The noise model: sensor noise and coloured disturbances, and residuals whitened by them."""
 
-from collections.abc import Mapping
+import operator
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from hil.study.likelihood.whiten import coloured, moving
 from hil.study.logs.case import SINGLES, Case
 from hil.study.logs.table import Floats
+from hil.study.side_by_side import side_by_side
 
 Stack = Mapping[str, Floats]
 REFERENCE_MPS = 20.0
@@ -15,6 +18,7 @@ MODES = np.array([[0.25, 0.25, 0.25, 0.25], [0.25, 0.25, -0.25, -0.25], [0.5, -0
 MODE_NAMES = ("mean", "front-rear", "left-right front", "left-right rear")
 _SWING_S = 0.3
 LONG = ("wheel.mean", "ax", "gps")
+_WIDE = 8  # columns from which on threads are worth their while
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,11 +155,13 @@ def whiten(
     They are written ``into`` arrays by track, where these are given.
     """
     out = {name: np.empty_like(values) for name, values in tracks.items()} if into is None else dict(into)
-    total = _long(tracks, frame, noise, out) if any(name in tracks for name in LONG) else 0.0
-    for name, values in tracks.items():
-        if name not in LONG:
-            total += _side(name, values, frame, noise, out[name])
-    return out, total
+    apart: list[Callable[[], float]] = [
+        partial(_side, name, values, frame, noise, out[name]) for name, values in tracks.items() if name not in LONG
+    ]
+    if any(name in tracks for name in LONG):
+        apart.insert(0, partial(_long, tracks, frame, noise, out))
+    wide = max((values.shape[1] for values in tracks.values()), default=0) >= _WIDE
+    return out, sum(side_by_side(operator.call, apart) if wide else (one() for one in apart))
 
 
 def whitened(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> Floats:

@@ -21,31 +21,20 @@ def cubic(values: Floats, k: int, place: float) -> float:
 
 
 @compiled
-def between(values: Floats, late: Floats, out: Floats) -> None:
-    """Columns of ``values`` (samples, columns) so many samples ``late`` (rows, columns), into ``out``.
+def between(values: Floats, late: float, out: Floats) -> None:
+    """Columns of ``values`` (samples, columns) so many samples ``late``, into ``out``.
 
     Through the two samples on each side (Keys 1981, IEEE Trans. ASSP 29, 1153, a = -1/2): a wheel that swings on its
     tyre passes four samples of 10 ms a period, of which straight lines lose up to a third.
     """
     for t in range(out.shape[0]):
         for k in range(values.shape[1]):
-            out[t, k] = cubic(values, k, t - late[t, k])
-
-
-@compiled
-def straight_between(values: Floats, late: Floats, out: Floats) -> None:
-    """As `between`, on straight lines."""
-    last = values.shape[0] - 1
-    for t in range(out.shape[0]):
-        for k in range(values.shape[1]):
-            place = min(max(t - late[t, k], 0.0), float(last))
-            i = int(place)
-            out[t, k] = values[i, k] + (place - i) * (values[min(i + 1, last), k] - values[i, k])
+            out[t, k] = cubic(values, k, t - late)
 
 
 @compiled
 def straight_at(values: Floats, every: int, late: float, out: Floats) -> None:
-    """As `straight_between`, all so many samples ``late``, at one of ``every`` samples."""
+    """As `between`, on straight lines, at one of ``every`` samples."""
     last = values.shape[0] - 1
     for t in range(out.shape[0]):
         place = min(max(every * t - late, 0.0), float(last))
@@ -69,9 +58,14 @@ def finer(values: Floats, bend: Floats, out: Floats) -> None:
                 out[points * t + j, k] = straight + 4.0 * share * (1.0 - share) * bend[t, k]
 
 
+@compiled
+def _at(values: Floats, places: Floats, out: Floats) -> None:
+    for t in range(out.size):
+        out[t] = cubic(values, 0, places[t])
+
+
 def at_places(values: Floats, at: Floats) -> Floats:
     """One column (samples,) at fractional numbers of samples, (rows,)."""
-    out = np.empty((len(at), 1))
-    late = np.arange(len(at)) - np.asarray(at, np.float64)
-    between(np.ascontiguousarray(values, np.float64)[:, None], late[:, None], out)
-    return out[:, 0]
+    out = np.empty(len(at))
+    _at(np.ascontiguousarray(values, np.float64)[:, None], np.asarray(at, np.float64), out)
+    return out

@@ -32,7 +32,8 @@ class Drive:
     inputs : (rows, INPUT.size), rows of 10 ms.  segments : in order, without gaps.
     measured : group of tracks -> (samples, channels); NaN where nothing is known.  stride : rows a sample.
     moving, resting : (samples,) where speeds, and where the body at rest is compared.
-    speed_mps, pressure_pa : (samples,) about the speed, and the largest pressure.  number : among the drives.
+    speed_mps, pressure_pa : (samples,) about the speed, and the largest pressure.
+    state_of_charge : at the start.  number : among the drives.
     wait_s : standard deviation of what two nodes' frames wait more or less than each other.
     compared : track (`hil.study.likelihood.noise`) -> (samples,) where the simulation follows it; all else, everywhere.
     """
@@ -46,6 +47,7 @@ class Drive:
     resting: Floats
     speed_mps: Floats
     pressure_pa: Floats
+    state_of_charge: float
     number: int = 0
     wait_s: float = 0.0
     compared: Mapping[str, Floats] = field(default_factory=dict)

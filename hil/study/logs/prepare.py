@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from hil.study.compiled import compiled
 from hil.study.logs.between import at_places
 from hil.study.logs.case import ROW_S, SLOW_MPS, Case, Drive, Segment
 from hil.study.logs.stamps import begin_s, wait_s
@@ -29,6 +30,7 @@ STRAIGHT_RAD = 0.02  # of the steering wheel
 _RELEASED_PA, _RELEASED_NM = 1e5, 20.0
 _ASKED_PA = 2e4
 _CONTRADICTED = 0.8
+_CHARGE = 0.7  # where no log tells it
 _SPARSE = 1.5
 """Rows from sample to sample, from which on a log tells less than there was: who asks does so more often, so that a
 demand lies between two samples and was not held from one to the next, and a pressure bends between them."""
@@ -234,6 +236,7 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float, follow
         resting * 1.0,
         slow,
         averaged(brakes[:, None], stride)[:, 0],
+        _charge(log),
         wait_s=wait_s(log.t_s),
         compared=compared,
     )
@@ -256,6 +259,12 @@ def _pressures_known(demand_pa: Floats, stride: int) -> dict[str, Floats]:
     }  # fmt: skip
 
 
+def _charge(log: Log) -> float:
+    """State of charge at the start of a log."""
+    told = log.channels.get("soc")
+    return _CHARGE if told is None else float(np.nanmean(told[:20]))
+
+
 def _sampled(
     log: Log, channel: str, begin: float, samples: int, stride: int
 ) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
@@ -274,11 +283,19 @@ def _sampled(
 
 def averaged(values: Floats, stride: int) -> Floats:
     """Means of ``stride`` rows, (rows // stride, columns)."""
-    rows = len(values) // stride * stride
-    total = values[:rows:stride].copy()
-    for k in range(1, stride):
-        total += values[k:rows:stride]
-    return np.asarray(total / stride)
+    out = np.empty((len(values) // stride, values.shape[1]))
+    _means(values, stride, out)
+    return out
+
+
+@compiled
+def _means(values: Floats, stride: int, out: Floats) -> None:
+    for t in range(out.shape[0]):
+        for k in range(out.shape[1]):
+            total = 0.0
+            for j in range(stride):
+                total += values[stride * t + j, k]
+            out[t, k] = total / stride
 
 
 def _filled(values: Floats) -> Floats:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hil.study.logs.between import between, straight_between
+from hil.study.logs.between import between, straight_at
 from hil.study.logs.case import ROW_S
 from hil.study.logs.table import Floats
 from plant.vectors import INPUT
@@ -11,13 +11,16 @@ _MEASURED = (("pressure_pa", 1), ("motor_torque_nm", 2), ("motor_torque_bend_nm"
 _STEERING = INPUT.slice("steering_wheel_rad")
 
 
-def later(values: Floats, rows: float | Floats, straight: bool = False) -> Floats:
-    """Channels as seen some rows later; ``rows`` for all, or for each value.
+def later(values: Floats, rows: float, straight: bool = False) -> Floats:
+    """Channels as seen some rows later.
 
     ``straight`` lines between rows for what has corners, as a motor at its rate limit; else `hil.study.logs.between`.
     """
     out = np.empty(values.shape)
-    (straight_between if straight else between)(values, np.broadcast_to(rows, values.shape), out)
+    if straight:
+        straight_at(values, 1, rows, out)
+    else:
+        between(values, rows, out)
     return out
 
 

@@ -1,11 +1,8 @@
 """Free replays of cars over all drives of a case, many at once."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cache
-from threading import Semaphore
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +21,7 @@ from hil.study.replay.steps import STEPS, at_once
 from hil.study.replay.telling import SOURCE, Stack, Telling, powers
 from hil.study.replay.vehicle import Vehicle
 from hil.study.replay.world import World, apart, told_alike
+from hil.study.side_by_side import side_by_side
 from plant.effects.plugin import NO_PLUGINS
 from plant.effects.states import EXTRA_STATES
 from plant.effects.theta import THETA
@@ -32,7 +30,6 @@ from plant.model import column_indices, healthy, simulate
 from plant.road import DRY, road_table
 from plant.vectors import INPUT, OUTPUT, STATE, P, U
 
-Of = TypeVar("Of")
 _SLOW = np.concatenate(
     [
         np.arange(STATE.size)[STATE.slice(name)]
@@ -47,26 +44,6 @@ _INPUTS = (("pressure", "pressure_pa"), ("motor", "motor_torque_nm"))
 _SMOOTH = 21  # rows of 10 ms
 _FADING_MPS, _LEAST_NM = 0.3, 1.0
 _GRADE, _TURNS_MPS2, _CHARACTERISTIC_MPS = 0.01, 0.3, (8.0, 200.0)
-
-
-_FREE = Semaphore(max(WORKERS - 1, 0))
-"""Replays that may have others help them at a time: one less than there are processors."""
-
-
-@cache
-def _idle() -> ThreadPoolExecutor:
-    """Threads that replay drives for others."""
-    return ThreadPoolExecutor(WORKERS)
-
-
-def _over_drives(of: Callable[[Drive], Of], drives: Sequence[Drive]) -> list[Of]:
-    """Of each drive; over threads, unless other replays have them (`_FREE`)."""
-    each = _idle().map if (helped := _FREE.acquire(blocking=False)) else map
-    try:
-        return list(each(of, drives))
-    finally:
-        if helped:
-            _FREE.release()
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +123,7 @@ class Rig:
         first: what its node, in this world, scaled or sampled late.
         """
         self._kept = self._made = None
-        made = _over_drives(lambda drive: self._made_by(drive, world), self.case.drives)
+        made = side_by_side(lambda drive: self._made_by(drive, world), self.case.drives)
         self.case = replace(self.case, drives=tuple(drive for drive, _ in made))
         self._made = _Made(world, [told for _, told in made])
 
@@ -231,7 +208,7 @@ class Rig:
     def run(self, world: World) -> Stack:
         """Simulated channels of all drives."""
         self.runs += 1
-        parts = _over_drives(lambda drive: self._drive(drive, world), self.case.drives)
+        parts = side_by_side(lambda drive: self._drive(drive, world), self.case.drives)
         return {group: np.concatenate([part[group] for part in parts]) for group in self._groups}
 
     def keep(self, world: World) -> None:
@@ -242,7 +219,7 @@ class Rig:
             replay = self._replayed(drive, world, self._columns)
             return replay, self.telling.told(drive, world, replay.table)
 
-        replays, told = zip(*_over_drives(kept, self.case.drives), strict=True)
+        replays, told = zip(*side_by_side(kept, self.case.drives), strict=True)
         self._kept = _Kept(world, replays, told)
 
     def run_all(self, worlds: Sequence[World]) -> Iterator[Stack]:

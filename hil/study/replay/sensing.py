@@ -53,10 +53,9 @@ def inverted(inputs: Floats, theta: Floats, row_s: float) -> Floats:
     return true
 
 
-def sensed(stack: Stack, theta: Floats, row_s: float) -> dict[str, Floats]:
+def sensed(stack: Stack, chain: Chain, row_s: float) -> dict[str, Floats]:
     """Channels as the sensors give them."""
     found = dict(stack)
-    chain = Chain(theta)
     time_s: Floats = np.arange(len(next(iter(stack.values())))) * row_s
     for group, node in _NODE.items():
         if group in found and chain.touches(node):

@@ -18,13 +18,10 @@ _BACKWARD_MPS = 0.5
 
 def start(vehicle: Vehicle, drive: Drive, world: World, given: Floats) -> Floats:
     """State at the first row; ``given`` are its inputs, what the sensors add taken off."""
-    log = drive.log
-    soc = log.channels.get("soc")
-    charge = 0.7 if soc is None else float(np.nanmean(soc[:20]))
-    disc = (log.disc_temperature_k or DISC_K) + world.disc_offset_k
+    disc = (drive.log.disc_temperature_k or DISC_K) + world.disc_offset_k
     pad_k = disc if vehicle.pad_temperature_matters else float(world.p[P.friction_brake_ambient_k])
     pad = (float(world.p[at]) for at in (P.pad_a_1_ks, P.pad_b_1_j, P.pad_epsilon_w))
-    x = initial_state(vehicle.parameters, 0.0, disc, charge, mu_equilibrium(0.0, pad_k, *pad))
+    x = initial_state(vehicle.parameters, 0.0, disc, drive.state_of_charge, mu_equilibrium(0.0, pad_k, *pad))
     x[STATE.slice("pad_temperature_k")] = pad_k
     speed = start_speed(drive, drive.segments[0], world)
     x[X.speed_mps] = speed
@@ -39,7 +36,8 @@ def start_speed(drive: Drive, segment: Segment, world: World) -> float:
     if segment.start_speed_mps is not None:
         return _moving(ground_speed_before(segment.start_speed_mps, world.theta_in(drive)))
     told = wheel_speed_before(segment.start_wheel_rad_s, world.theta_in(drive))
-    return _moving(told * float(np.median(_radius_m(world))))
+    radii = sorted(_radius_m(world).tolist())
+    return _moving(told * 0.5 * (radii[1] + radii[2]))
 
 
 def restart(x: Floats, speed_mps: float) -> None:

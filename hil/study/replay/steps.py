@@ -8,7 +8,7 @@ from plant.vectors import INPUT
 
 STEPS = 4
 """Steps in a row where a torque changes quickly; elsewhere they are made as one."""
-_QUICK_NM, _RINGS_ROWS = 3.0, 12
+_QUICK_NM, _RINGS_ROWS = 6.0, 12
 _QUICK_PA, _FOLLOWS_ROWS = 2e4, 20
 _OF_NOISE = 4.0
 _HARD_MPS2, _CREEPS_MPS = 5.0, 3.0

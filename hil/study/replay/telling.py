@@ -13,6 +13,7 @@ from hil.study.logs.table import Floats
 from hil.study.replay.latency import later
 from hil.study.replay.sensing import sensed
 from hil.study.replay.world import World
+from plant.effects.sensing.chain import Chain
 from plant.parameters.plant import PlantParameters
 from plant.vectors import INPUT
 
@@ -65,9 +66,9 @@ class Telling:
 
     def at_rows(self, happened: Stack, drive: Drive, world: World) -> Stack:
         """Channels as sensors and frames give what happened, row by row."""
-        theta = world.theta_in(drive)
+        chain = Chain(world.theta_in(drive))
         others = {group: values for group, values in happened.items() if group != "motor"}
-        stack = sensed(others, theta, ROW_S) if others else {}
+        stack = sensed(others, chain, ROW_S) if others else {}
         for group, values in stack.items():
             late = world.late_s[_NODE[group]] if group in _NODE else 0.0
             if late:
@@ -78,23 +79,22 @@ class Telling:
                 toothed(values, world.window_rows2, half_turned, world.tooth_share, stack[group])
         if "motor" in happened:
             fine = _finer(happened["motor"], drive.inputs[:, INPUT.slice("motor_torque_bend_nm")])
-            fine = sensed({"motor": fine}, theta, ROW_S / _FINER)["motor"]
+            fine = sensed({"motor": fine}, chain, ROW_S / _FINER)["motor"]
             stack["motor"] = np.empty_like(happened["motor"])
             straight_at(fine, _FINER, _FINER * world.late_s[_NODE["motor"]] / ROW_S, stack["motor"])
         return stack
 
     def _at_measured_speed(self, found: Stack, drive: Drive) -> None:
         """The turning of the car as it is at the measured speed."""
-        faster = np.nan_to_num(drive.measured["wheel"] - found["wheel"]).mean(axis=1)
-        turning = found["wheel"].mean(axis=1)
-        turning = np.copysign(np.maximum(np.abs(turning), SLOW_MPS / _USUAL_RADIUS_M), turning)
-        share = np.clip(faster / turning, -0.2, 0.2)
-        both = powers(turning * self.parameters.wheel.rolling_radius_m, self.characteristic_mps)
-        for group, power in zip(("ay", "yaw"), both, strict=True):
+        factors = np.empty((2, len(found["wheel"])))
+        radius_m = self.parameters.wheel.rolling_radius_m
+        faster_turning(drive.measured["wheel"], found["wheel"], radius_m, self.characteristic_mps, factors)
+        for group, factor in zip(("ay", "yaw"), factors, strict=True):
             if group in found:
-                found[group] *= (1.0 + power * share)[:, None]
+                found[group] *= factor[:, None]
 
 
+@compiled
 def powers(speed_mps: Floats, characteristic_mps: float) -> tuple[Floats, Floats]:
     """Powers of the speed that lateral acceleration and yaw rate go with at a given steering angle.
 
@@ -103,6 +103,24 @@ def powers(speed_mps: Floats, characteristic_mps: float) -> tuple[Floats, Floats
     """
     squared = (speed_mps / characteristic_mps) ** 2
     return 2.0 / (1.0 + squared), (1.0 - squared) / (1.0 + squared)
+
+
+@compiled
+def faster_turning(measured: Floats, omega: Floats, radius_m: float, characteristic_mps: float, out: Floats) -> None:
+    """Factors of lateral acceleration and yaw rate, (2, samples), that take a car to the speed its wheels are measured
+    at, into ``out``; both speeds are (samples, wheels)."""
+    wheels = omega.shape[1]
+    for t in range(omega.shape[0]):
+        faster, mean = 0.0, 0.0
+        for k in range(wheels):
+            apart = measured[t, k] - omega[t, k]
+            faster += apart / wheels if apart == apart else 0.0
+            mean += omega[t, k] / wheels
+        turning = np.copysign(max(abs(mean), SLOW_MPS / _USUAL_RADIUS_M), mean)
+        share = min(max(faster / turning, -0.2), 0.2)
+        lateral, yaw = powers(turning * radius_m, characteristic_mps)
+        out[0, t] = 1.0 + lateral * share
+        out[1, t] = 1.0 + yaw * share
 
 
 def _finer(torque_nm: Floats, bend_nm: Floats) -> Floats:

@@ -13,13 +13,13 @@ from plant.layout import Vector
 
 
 @cache
-def _strengths(layout: Theta) -> list[tuple[Effect, NDArray[np.intp]]]:
-    """Where the numbers lie that switch each effect on."""
+def _strengths(layout: Theta) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Where the numbers lie that switch effects on, and where those of each effect begin among them."""
     places = np.arange(layout.size)
-    return [
-        (effect, np.concatenate([places[layout.slice(effect.name, p.name)] for p in effect.strengths]))
-        for effect in SENSING
+    of_each = [
+        np.concatenate([places[layout.slice(effect.name, p.name)] for p in effect.strengths]) for effect in SENSING
     ]
+    return np.concatenate(of_each), np.cumsum([0, *map(len, of_each)])[:-1]
 
 
 class Chain:
@@ -35,16 +35,22 @@ class Chain:
         self._theta = theta
         self._layout = layout
         self._memory: dict[tuple[str, str], Memory] = {}
-        self._active = [effect for effect, strengths in _strengths(layout) if theta[strengths].any()]
+        strengths, begins = _strengths(layout)
+        on = np.logical_or.reduceat(theta[strengths] != 0.0, begins)
+        self._active = [effect for effect, is_on in zip(SENSING, on, strict=True) if is_on]
         self._nodes = {node for effect in self._active for node in effect.nodes}
 
     def _numbers(self, effect: Effect, time_s: Vector) -> Numbers:
         onset, until = (self._theta[self._layout.slice(effect.name, name)][0] for name in ("onset_s", "until_s"))
         within = ((time_s >= onset) & (time_s < until))[:, None]
+        always = bool(within.all())
         numbers = {}
         for parameter in effect.parameters:
             values = self._theta[self._layout.slice(effect.name, parameter.name)]
-            numbers[parameter.name] = np.where(within | parameter.shape, values, 0.0)
+            if always or parameter.shape:
+                numbers[parameter.name] = np.repeat(values[None], len(time_s), axis=0)
+            else:
+                numbers[parameter.name] = np.where(within, values, 0.0)
         return numbers
 
     def touches(self, node: str) -> bool:

@@ -47,16 +47,6 @@ def test_the_steering_wheel_may_act_later_than_it_is_logged():
     assert moved[5:35, INPUT.at.steering_wheel_rad] == pytest.approx(np.arange(5.0, 35.0) - 0.5)
 
 
-def test_each_value_has_a_latency_of_its_own():
-    values = np.arange(20.0).reshape(10, 2)
-    rows = np.zeros((10, 2))
-    rows[4, 1], rows[7, 0] = 1.5, 0.25
-    expected = values.copy()
-    expected[4, 1] -= 2.0 * 1.5
-    expected[7, 0] -= 2.0 * 0.25
-    assert later(values, rows) == pytest.approx(expected)
-
-
 def test_channels_of_a_wider_table_are_shifted_too():
     table = np.random.default_rng(2).standard_normal((12, 6))
     assert later(table[:, 2:4], 1.0)[1:] == pytest.approx(table[:-1, 2:4])
