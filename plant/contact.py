@@ -92,6 +92,13 @@ def slip_decay(slip: float, transport_mps: float, bleeding_mps: float, gain_1_m:
 
 
 @equation
+def left_of_slope(force_n: float, peak_n: float) -> float:
+    """Share of the slip stiffness that is left at a force: 1 - (F/D)^2, within 0.1 of the magic formula's."""
+    used = force_n / peak_n
+    return max(1.0 - used * used, 0.0)
+
+
+@equation
 def near_standstill(speed_mps: float, limit_mps: float) -> float:
     """Share of what acts near standstill only, fading in below ``limit_mps`` (Pacejka 2006, section 8.6)."""
     share = min(speed_mps / limit_mps, 1.0)
@@ -145,6 +152,9 @@ def contacts(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, cos_grade:
         )  # fmt: skip
         carried = load / loaded
         given, made = u[U.longitudinal_force_n + i], at_wheel(force * carried, y, J.tyre_force, i)
+        free = 0.0 if cut[C.force + i] > 0.5 else carried
+        y[Y.slip_stiffness_n + i] = free * stiffness_x * left_of_slope(force, held_x * stiffness_x)
+        y[Y.side_stiffness_n + i] = free * stiffness_y * left_of_slope(cross, held_y * stiffness_y)
         force = given if cut[C.force + i] > 0.5 else made
         y[Y.longitudinal_force_n + i] = force
         y[Y.lateral_force_n + i] = at_wheel(cross * carried, y, J.tyre_side_force, i)

@@ -10,6 +10,7 @@ from plant.contact import rolling_radius
 from plant.effects.apply import extra_states_move
 from plant.equations import derivative
 from plant.fastmath import exp
+from plant.phi import GONE, SMALL, phi_1, phi_2
 from plant.vectors import BASE_RATES, OUTPUT, RATES, STATE, P, X, Y
 
 Vector = NDArray[np.float64]
@@ -17,14 +18,12 @@ N = BASE_RATES.size
 N_ALL = RATES.size  # with the extra states of effects
 SEMI_IMPLICIT = 0
 RUNGE_KUTTA_4 = 1
-EXPONENTIAL_4 = 2
-_SMALL = 1e-3
-_GONE = 30.0  # of what decays no more than exp(-30) is left
+EXPONENTIAL = 2
 WORK_SHAPE = (5, max(STATE.size, OUTPUT.size))
 
 
 @equation
-def _hold_pressure_rates(x: Vector, p: Vector) -> None:
+def hold_pressure_rates(x: Vector, p: Vector) -> None:
     """Bring rates of pressure back to their limits: one passes its limit within a step (docs/decisions/0091)."""
     build, release = p[P.ehb_build_rate_pa_s], p[P.ehb_release_rate_pa_s]
     for i in range(4):
@@ -63,14 +62,14 @@ def semi_implicit_step(
     if extra_states_move(p):
         for i in range(N, N_ALL):
             x[i] += step_s * y[d + i] / (1.0 + step_s * y[Y.decay_1_s + i])
-    _hold_pressure_rates(x, p)
+    hold_pressure_rates(x, p)
 
 
 @section
 def exponential_step(
     x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, step_s: float, work: Vector, y: Vector
 ) -> None:
-    """One step of fourth order that is exact in each state's own decay: for long steps.
+    """One step of fourth order that is exact in each state's own decay: for long steps near standstill.
 
     Exponential Runge-Kutta ETDRK4 (Cox and Matthews 2002, J. Comput. Phys. 176, eqs 26 to 29) with the diagonal of the
     Jacobian, written for the change over the step. Where nothing decays it is `runge_kutta_step`, whose arguments it
@@ -81,8 +80,8 @@ def exponential_step(
     derivative(x, u, cut, switch, p, road, y)
     for i in range(last):
         z = 0.5 * step_s * y[Y.decay_1_s + i]
-        half[i] = exp(-min(z, _GONE))
-        mean[i] = 0.5 * step_s * _mean_decay(z, half[i])
+        half[i] = exp(-min(z, GONE))
+        mean[i] = 0.5 * step_s * phi_1(z, half[i])
         trial[i] = x[i] + mean[i] * y[Y.rate + i]
     derivative(trial, u, cut, switch, p, road, stage)
     for i in range(last):
@@ -97,23 +96,13 @@ def exponential_step(
     for i in range(last):
         end = stage[Y.rate + i] + y[Y.decay_1_s + i] * (trial[i] - x[i])
         z = step_s * y[Y.decay_1_s + i]
-        divisor = max(z, _SMALL)
-        one = (1.0 - half[i] * half[i]) / divisor
-        two = (1.0 - one) / divisor
-        three = (0.5 - two) / divisor
-        one = one if z > _SMALL else 1.0 - z * (0.5 - z / 6.0)
-        two = two if z > _SMALL else 0.5 - z * (1.0 / 6.0 - z / 24.0)
-        three = three if z > _SMALL else 1.0 / 6.0 - z / 24.0
+        one = phi_1(z, half[i] * half[i])
+        two = phi_2(z, one)
+        three = (0.5 - two) / max(z, SMALL)
+        three = three if z > SMALL else 1.0 / 6.0 - z / 24.0
         first = one - 3.0 * two + 4.0 * three
         x[i] += step_s * (first * y[Y.rate + i] + 2.0 * (two - 2.0 * three) * total[i] + (4.0 * three - two) * end)
-    _hold_pressure_rates(x, p)
-
-
-@equation
-def _mean_decay(z: float, decayed: float) -> float:
-    """Mean of exp(-z s) over s from 0 to 1; ``decayed`` is exp(-z)."""
-    mean = (1.0 - decayed) / max(z, _SMALL)
-    return mean if z > _SMALL else 1.0 - z * (0.5 - z / 6.0)
+    hold_pressure_rates(x, p)
 
 
 @section
@@ -135,4 +124,4 @@ def runge_kutta_step(
     derivative(trial, u, cut, switch, p, road, stage)
     for i in range(last):
         x[i] += step_s / 6.0 * (total[i] + stage[Y.rate + i])
-    _hold_pressure_rates(x, p)
+    hold_pressure_rates(x, p)

@@ -15,7 +15,7 @@ from plant.effects.theta import THETA
 from plant.equations import derivative, sensed
 from plant.friction import mu_equilibrium
 from plant.integrate import (
-    EXPONENTIAL_4,
+    EXPONENTIAL,
     SEMI_IMPLICIT,
     WORK_SHAPE,
     exponential_step,
@@ -25,6 +25,7 @@ from plant.integrate import (
 from plant.layout import flatten
 from plant.parameters.plant import PlantParameters
 from plant.road import DRY, road_table
+from plant.rolling import ROLLING_MPS, rolling_step
 from plant.vectors import CUT, DELAY_SLOTS, INPUT, OUTPUT, PARAMETER, STATE, SWITCH, P, U, X
 
 Vector = NDArray[np.float64]
@@ -120,7 +121,7 @@ def simulate(
         ``motor_torque_bend_nm`` in its middle adds to that in a parabola.
     cut, switch, p : vectors ``CUT``, ``SWITCH``, ``PARAMETER``.  road : rows of `plant.road.road_table`.
     step_s : s.  at_once : how many of its steps each row may make as one, (rows,).
-    method : `plant.integrate.SEMI_IMPLICIT`, `RUNGE_KUTTA_4` or `EXPONENTIAL_4`.
+    method : `plant.integrate.SEMI_IMPLICIT`, `RUNGE_KUTTA_4` or `EXPONENTIAL`.
     columns : what to note at the start of each row, as indices into the state followed by the outputs.
     table : the notes, shape (rows, columns), written.  y : outputs (``OUTPUT``) at the end, written.
     theta : numbers of all effects (`plant.effects.theta`); onsets act from row to row.
@@ -159,8 +160,11 @@ def simulate(
                 angles[i] = x[X.wheel_angle_rad + i]
             if method == SEMI_IMPLICIT:
                 semi_implicit_step(x, now, cut, switch, q, road, long_s, y)
-            elif method == EXPONENTIAL_4:
-                exponential_step(x, now, cut, switch, q, road, long_s, work, y)
+            elif method == EXPONENTIAL:
+                if abs(x[X.speed_mps]) > ROLLING_MPS:
+                    rolling_step(x, now, cut, switch, q, road, long_s, work, y)
+                else:
+                    exponential_step(x, now, cut, switch, q, road, long_s, work, y)
             else:
                 runge_kutta_step(x, now, cut, switch, q, road, long_s, work, y)
             x[X.time_s] += long_s

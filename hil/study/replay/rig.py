@@ -25,7 +25,7 @@ from hil.study.side_by_side import side_by_side
 from plant.effects.plugin import NO_PLUGINS
 from plant.effects.states import EXTRA_STATES
 from plant.effects.theta import THETA
-from plant.integrate import EXPONENTIAL_4
+from plant.integrate import EXPONENTIAL
 from plant.model import column_indices, healthy, simulate
 from plant.road import DRY, road_table
 from plant.vectors import INPUT, OUTPUT, STATE, P, U
@@ -165,7 +165,7 @@ class Rig:
         table = np.empty((len(halves), len(columns)))
         simulate(
             start(self.vehicle, drive, world, halves[0]), halves, self.case.cut, healthy(), world.p, self._road,
-            ROW_S / 2, 1, np.ones(len(halves), np.int64), EXPONENTIAL_4, columns, table, OUTPUT.zeros(),
+            ROW_S / 2, 1, np.ones(len(halves), np.int64), EXPONENTIAL, columns, table, OUTPUT.zeros(),
             world.theta_in(drive), world.terms, NO_PLUGINS,
         )  # fmt: skip
         torque, middle = table[::2], table[1::2]
@@ -285,7 +285,7 @@ class Rig:
             if number:
                 restart(x, start_speed(drive, segment, world))
             simulate(
-                x, inputs[rows], cut, switch, world.p, self._road, ROW_S / STEPS, STEPS, pace[rows], EXPONENTIAL_4,
+                x, inputs[rows], cut, switch, world.p, self._road, ROW_S / STEPS, STEPS, pace[rows], EXPONENTIAL,
                 columns, table[rows], y, theta, world.terms, NO_PLUGINS,
             )  # fmt: skip
             states.append(x.copy())

@@ -8,7 +8,7 @@ import pytest
 
 from plant.effects.bank import NO_TERMS
 from plant.effects.plugin import NO_PLUGINS
-from plant.integrate import EXPONENTIAL_4, RUNGE_KUTTA_4, SEMI_IMPLICIT
+from plant.integrate import EXPONENTIAL, RUNGE_KUTTA_4, SEMI_IMPLICIT
 from plant.model import NEUTRAL, advance, column_indices, compile_model, healthy, initial_state, pack, replay, simulate
 from plant.road import DRY, RoadSegment, road_table
 from plant.vectors import BASE_RATES, CUT, INPUT, OUTPUT, STATE, SWITCH, P, U, X, Y
@@ -121,7 +121,7 @@ def test_unknown_columns_are_named():
         column_indices(["speed_mps", "spede_mps"])
 
 
-@pytest.mark.parametrize("method", [SEMI_IMPLICIT, RUNGE_KUTTA_4, EXPONENTIAL_4])
+@pytest.mark.parametrize("method", [SEMI_IMPLICIT, RUNGE_KUTTA_4, EXPONENTIAL])
 def test_a_straight_stop_stays_straight(stop, method):
     start, inputs, p = stop
     table = replay(start, inputs, p, ["lateral_speed_mps", "yaw_rate_rad_s", "y_m"], method=method)[0]
@@ -141,7 +141,7 @@ def test_long_exponential_steps_beat_short_simple_ones(stop):
         return replay(start, smooth, p, columns, steps=steps, step_s=0.01 / steps, method=method)[0]
 
     exact = driven(RUNGE_KUTTA_4, 20)
-    long_steps = np.sqrt(((driven(EXPONENTIAL_4, 2) - exact) ** 2).mean(axis=0))
+    long_steps = np.sqrt(((driven(EXPONENTIAL, 2) - exact) ** 2).mean(axis=0))
     short_steps = np.sqrt(((driven(SEMI_IMPLICIT, 4) - exact) ** 2).mean(axis=0))
     assert (long_steps < 0.2 * short_steps).all(), (long_steps, short_steps)
 
@@ -160,7 +160,7 @@ def test_a_limited_rate_of_pressure_leaves_its_limit_in_time(stop, late_s):
         return replay(start, inputs, late, ["state.pressure_pa_fl"], steps=steps, step_s=0.01 / steps, method=method)
 
     exact = pressure(RUNGE_KUTTA_4, 20)
-    for method, steps, rms_pa in ((EXPONENTIAL_4, 4, 1e3), (RUNGE_KUTTA_4, 10, 2e2)):
+    for method, steps, rms_pa in ((EXPONENTIAL, 4, 1e3), (RUNGE_KUTTA_4, 10, 2e2)):
         error = pressure(method, steps) - exact
         assert math.sqrt(float(np.mean(error**2))) < rms_pa, (method, late_s)
 
@@ -241,7 +241,7 @@ def test_nothing_goes_wild_far_from_the_road(paper_car):
     inputs[:, U.steering_wheel_rad] = 8.0
     start = initial_state(paper_car, 60.0, 423.15, 0.7)
     road = road_table((RoadSegment(-1e9, 0.3, 0.05), RoadSegment(200.0, 1.0, 0.6, 0.1)))
-    for method, steps in ((SEMI_IMPLICIT, 10), (RUNGE_KUTTA_4, 10), (EXPONENTIAL_4, 2)):
+    for method, steps in ((SEMI_IMPLICIT, 10), (RUNGE_KUTTA_4, 10), (EXPONENTIAL, 2)):
         x, y = start.copy(), OUTPUT.zeros()
         for row in inputs:
             advance(x, row, CUT.zeros(), healthy(), pack(paper_car), road, y, steps, 0.01 / steps, method)
@@ -265,7 +265,7 @@ def _run(start, inputs, p, step_s, steps, at_once, cut):
     columns = column_indices(["speed_mps"])
     simulate(
         x, inputs, cut, healthy(), p, road_table(DRY), step_s, steps, np.full(len(inputs), at_once, np.int64),
-        EXPONENTIAL_4, columns, table, OUTPUT.zeros(), NEUTRAL, NO_TERMS, NO_PLUGINS,
+        EXPONENTIAL, columns, table, OUTPUT.zeros(), NEUTRAL, NO_TERMS, NO_PLUGINS,
     )  # fmt: skip
     return x
 

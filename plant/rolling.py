@@ -1,0 +1,143 @@
+# mypy: disable-error-code=no-any-return
+# (elements of a vector are Any to the type checker)
+"""Long steps of a car that rolls: exact in each state's own decay, and in what swings in pairs."""
+
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.compiled import equation, section
+from plant.contact import rolling_radius
+from plant.effects.apply import extra_states_move
+from plant.equations import derivative
+from plant.fastmath import exp
+from plant.integrate import N_ALL, N, hold_pressure_rates
+from plant.phi import GONE, phi_1, phi_2, phi_of_pair
+from plant.vectors import CUT_PARTS, P, X, Y
+
+Vector = NDArray[np.float64]
+ROLLING_MPS = 3.0
+"""Below, wheels on their brakes and tyres swing in threes: `plant.integrate.exponential_step`."""
+_WHEEL, _PRESSURE, _HUB = 0, 24, 48  # where a pair's numbers lie: phi_2 and the matrix, six of each wheel
+
+
+@section
+def rolling_step(
+    x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, step_s: float, work: Vector, y: Vector
+) -> None:
+    """One step of second order with two evaluations; arguments of `plant.integrate.runge_kutta_step`.
+
+    Exponential Runge-Kutta ETD2RK (Cox and Matthews 2002, J. Comput. Phys. 176, eqs 20 to 22). Its linear part is the
+    diagonal of the Jacobian, and in blocks of two: a wheel on its tyre (slip and wheel speed, 20 to 30 Hz), the loop of
+    a pressure inside its limits, a hub on its mount.
+    """
+    trial, mean, stage, pairs, ahead = work[0], work[1], work[2], work[3], work[4]
+    wheels = cut.size // CUT_PARTS
+    extra = extra_states_move(p)
+    last = N_ALL if extra else N
+    derivative(x, u, cut, switch, p, road, y)
+    for i in range(last):
+        z = step_s * y[Y.decay_1_s + i]
+        one = phi_1(z, exp(-min(z, GONE)))
+        mean[i] = phi_2(z, one)
+        trial[i] = x[i] + step_s * one * y[Y.rate + i]
+    for i in range(wheels):
+        radius = rolling_radius(i, p, y)
+        spun = -radius * y[Y.slip_stiffness_n + i] / p[P.wheel_inertia_kg_m2]
+        _begin(
+            _WHEEL, X.slip, X.wheel_speed_rad_s, i, -step_s * y[Y.decay_1_s + X.slip + i],
+            step_s * radius * y[Y.slip_gain_1_m + i], step_s * spun,
+            -step_s * y[Y.decay_1_s + X.wheel_speed_rad_s + i], step_s, x, y, trial, pairs,
+        )  # fmt: skip
+    omega = 2.0 * pi * p[P.ehb_natural_frequency_hz]
+    for i in range(wheels):
+        rate = x[X.pressure_rate_pa_s + i]
+        free = (rate > -p[P.ehb_release_rate_pa_s]) & (rate < p[P.ehb_build_rate_pa_s])
+        on = step_s if free else 0.0
+        _begin(
+            _PRESSURE, X.pressure_pa, X.pressure_rate_pa_s, i, 0.0, on, -on * omega * omega,
+            -on * 2.0 * p[P.ehb_damping_ratio] * omega, step_s, x, y, trial, pairs,
+        )  # fmt: skip
+    if extra:
+        for i in range(wheels):
+            swing = y[Y.hub_swing_1_s + i]
+            _begin(
+                _HUB, X.hub_m, X.hub_rate_mps, i, 0.0, step_s, -step_s * swing * swing,
+                -step_s * y[Y.decay_1_s + X.hub_rate_mps + i], step_s, x, y, trial, pairs,
+            )  # fmt: skip
+    derivative(trial, u, cut, switch, p, road, stage)
+    for i in range(last):
+        grown = stage[Y.rate + i] - y[Y.rate + i] + y[Y.decay_1_s + i] * (trial[i] - x[i])
+        ahead[i] = trial[i] + step_s * mean[i] * grown
+    for i in range(wheels):
+        _end(_WHEEL, X.slip, X.wheel_speed_rad_s, i, step_s, x, y, trial, stage, pairs, ahead)
+        _end(_PRESSURE, X.pressure_pa, X.pressure_rate_pa_s, i, step_s, x, y, trial, stage, pairs, ahead)
+    if extra:
+        for i in range(wheels):
+            _end(_HUB, X.hub_m, X.hub_rate_mps, i, step_s, x, y, trial, stage, pairs, ahead)
+    _carry_body(p, step_s, y, trial, stage, mean, ahead)
+    for i in range(last):
+        x[i] = ahead[i]
+    hold_pressure_rates(x, p)
+
+
+@equation
+def _begin(
+    at: int, one: int, other: int, i: int, m11: float, m12: float, m21: float, m22: float, step_s: float, x: Vector,
+    y: Vector, trial: Vector, pairs: Vector,
+) -> None:  # fmt: skip
+    """The trial state of a pair of states, whose block of the Jacobian, times the step, is m."""
+    mean, mean_m, second_mean, second_m = phi_of_pair(m11 + m22, m11 * m22 - m12 * m21)
+    f, g = step_s * y[Y.rate + one + i], step_s * y[Y.rate + other + i]
+    trial[one + i] = x[one + i] + mean * f + mean_m * (m11 * f + m12 * g)
+    trial[other + i] = x[other + i] + mean * g + mean_m * (m21 * f + m22 * g)
+    pairs[at + i], pairs[at + 4 + i] = second_mean, second_m
+    pairs[at + 8 + i], pairs[at + 12 + i], pairs[at + 16 + i], pairs[at + 20 + i] = m11, m12, m21, m22
+
+
+@equation
+def _end(
+    at: int, one: int, other: int, i: int, step_s: float, x: Vector, y: Vector, trial: Vector, stage: Vector,
+    pairs: Vector, ahead: Vector,
+) -> None:  # fmt: skip
+    """A pair at the end of the step."""
+    mean, mean_m = pairs[at + i], pairs[at + 4 + i]
+    m11, m12, m21, m22 = pairs[at + 8 + i], pairs[at + 12 + i], pairs[at + 16 + i], pairs[at + 20 + i]
+    moved, moved_too = trial[one + i] - x[one + i], trial[other + i] - x[other + i]
+    f = step_s * (stage[Y.rate + one + i] - y[Y.rate + one + i]) - m11 * moved - m12 * moved_too
+    g = step_s * (stage[Y.rate + other + i] - y[Y.rate + other + i]) - m21 * moved - m22 * moved_too
+    ahead[one + i] = trial[one + i] + mean * f + mean_m * (m11 * f + m12 * g)
+    ahead[other + i] = trial[other + i] + mean * g + mean_m * (m21 * f + m22 * g)
+
+
+@equation
+def _carry_body(
+    p: Vector, step_s: float, y: Vector, trial: Vector, stage: Vector, mean: Vector, ahead: Vector
+) -> None:  # fmt: skip
+    """The body goes on with the forces at the slips that are reached.
+
+    Slips of the trial state know nothing of what the body does over the step, which is as stiff: a car that rolls
+    freely would lose a hundredth too little speed.
+    """
+    along, across, turning = 0.0, 0.0, 0.0
+    for i in range(4):
+        axle = 0 if i < 2 else 1
+        wheel_x = p[P.vehicle_cog_to_axle_m] if i < 2 else -p[P.vehicle_cog_to_axle_m + 1]
+        wheel_y = (0.5 - i % 2) * p[P.vehicle_track_m + axle]
+        slip, side_slip = ahead[X.slip + i] - trial[X.slip + i], ahead[X.side_slip + i] - trial[X.side_slip + i]
+        force = 0.5 * (y[Y.slip_stiffness_n + i] + stage[Y.slip_stiffness_n + i]) * slip
+        cross = -0.5 * (y[Y.side_stiffness_n + i] + stage[Y.side_stiffness_n + i]) * side_slip
+        along += force
+        across += cross
+        turning += wheel_x * cross - wheel_y * force
+    mass, height = p[P.vehicle_mass_kg], p[P.vehicle_cog_height_m]
+    half = 0.5 * step_s
+    ahead[X.speed_mps] += half * along / mass
+    ahead[X.lateral_speed_mps] += half * across / mass
+    ahead[X.yaw_rate_rad_s] += half * turning / p[P.vehicle_yaw_inertia_kg_m2]
+    ahead[X.pitch_rate_rad_s] -= half * height * along / p[P.vehicle_pitch_inertia_kg_m2]
+    ahead[X.roll_rate_rad_s] += half * height * across / p[P.vehicle_roll_inertia_kg_m2]
+    forward, side = X.imu_longitudinal_mps2, X.imu_lateral_mps2
+    ahead[forward] += step_s * mean[forward] * y[Y.decay_1_s + forward] * along / mass
+    ahead[side] += step_s * mean[side] * y[Y.decay_1_s + side] * across / mass
