@@ -12,14 +12,34 @@ from plant.contact import rolling_radius
 from plant.effects.apply import extra_states_move
 from plant.equations import derivative
 from plant.fastmath import exp
+from plant.hydraulics import pressure_jerk
 from plant.integrate import N_ALL, N, hold_pressure_rates
 from plant.phi import GONE, phi_1, phi_2, phi_of_pair
-from plant.vectors import CUT_PARTS, P, X, Y
+from plant.vectors import CUT_PARTS, P, U, X, Y
 
 Vector = NDArray[np.float64]
 ROLLING_MPS = 3.0
-"""Below, wheels on their brakes and tyres swing in threes: `plant.integrate.exponential_step`."""
+"""Below, wheels on their brakes and tyres swing in threes."""
+_SLIDES = 0.08  # slip, either way, beyond which a tyre may be past its peak
 _WHEEL, _PRESSURE, _HUB = 0, 24, 48  # where a pair's numbers lie: phi_2 and the matrix, six of each wheel
+
+
+@equation
+def rolls_on(x: Vector, u: Vector, p: Vector, step_s: float) -> bool:
+    """Whether `rolling_step` is good for this step: `plant.integrate.exponential_step` is where a car creeps, a
+    wheel may lock, or a pressure comes to its limits."""
+    free = abs(x[X.speed_mps]) > ROLLING_MPS
+    build, release = p[P.ehb_build_rate_pa_s], p[P.ehb_release_rate_pa_s]
+    for i in range(4):
+        rate = x[X.pressure_rate_pa_s + i]
+        demand = min(max(u[U.pressure_demand_pa + i], 0.0), p[P.ehb_max_pressure_pa])
+        jerk = pressure_jerk(
+            demand, x[X.pressure_pa + i], rate, p[P.ehb_natural_frequency_hz], p[P.ehb_damping_ratio], build, release
+        )
+        ahead = rate + step_s * jerk
+        free &= max(abs(x[X.slip + i]), abs(x[X.side_slip + i])) < _SLIDES
+        free &= (max(rate, ahead) < build) & (min(rate, ahead) > -release)
+    return free
 
 
 @section
@@ -30,7 +50,7 @@ def rolling_step(
 
     Exponential Runge-Kutta ETD2RK (Cox and Matthews 2002, J. Comput. Phys. 176, eqs 20 to 22). Its linear part is the
     diagonal of the Jacobian, and in blocks of two: a wheel on its tyre (slip and wheel speed, 20 to 30 Hz), the loop of
-    a pressure inside its limits, a hub on its mount.
+    a pressure, a hub on its mount.
     """
     trial, mean, stage, pairs, ahead = work[0], work[1], work[2], work[3], work[4]
     wheels = cut.size // CUT_PARTS
@@ -52,12 +72,9 @@ def rolling_step(
         )  # fmt: skip
     omega = 2.0 * pi * p[P.ehb_natural_frequency_hz]
     for i in range(wheels):
-        rate = x[X.pressure_rate_pa_s + i]
-        free = (rate > -p[P.ehb_release_rate_pa_s]) & (rate < p[P.ehb_build_rate_pa_s])
-        on = step_s if free else 0.0
         _begin(
-            _PRESSURE, X.pressure_pa, X.pressure_rate_pa_s, i, 0.0, on, -on * omega * omega,
-            -on * 2.0 * p[P.ehb_damping_ratio] * omega, step_s, x, y, trial, pairs,
+            _PRESSURE, X.pressure_pa, X.pressure_rate_pa_s, i, 0.0, step_s, -step_s * omega * omega,
+            -step_s * 2.0 * p[P.ehb_damping_ratio] * omega, step_s, x, y, trial, pairs,
         )  # fmt: skip
     if extra:
         for i in range(wheels):
@@ -76,7 +93,7 @@ def rolling_step(
     if extra:
         for i in range(wheels):
             _end(_HUB, X.hub_m, X.hub_rate_mps, i, step_s, x, y, trial, stage, pairs, ahead)
-    _carry_body(p, step_s, y, trial, stage, mean, ahead)
+    _carry_body(p, step_s, extra, y, trial, stage, mean, ahead)
     for i in range(last):
         x[i] = ahead[i]
     hold_pressure_rates(x, p)
@@ -113,7 +130,7 @@ def _end(
 
 @equation
 def _carry_body(
-    p: Vector, step_s: float, y: Vector, trial: Vector, stage: Vector, mean: Vector, ahead: Vector
+    p: Vector, step_s: float, extra: bool, y: Vector, trial: Vector, stage: Vector, mean: Vector, ahead: Vector
 ) -> None:  # fmt: skip
     """The body goes on with the forces at the slips that are reached.
 
@@ -121,6 +138,7 @@ def _carry_body(
     freely would lose a hundredth too little speed.
     """
     along, across, turning = 0.0, 0.0, 0.0
+    half = 0.5 * step_s
     for i in range(4):
         axle = 0 if i < 2 else 1
         wheel_x = p[P.vehicle_cog_to_axle_m] if i < 2 else -p[P.vehicle_cog_to_axle_m + 1]
@@ -129,10 +147,11 @@ def _carry_body(
         force = 0.5 * (y[Y.slip_stiffness_n + i] + stage[Y.slip_stiffness_n + i]) * slip
         cross = -0.5 * (y[Y.side_stiffness_n + i] + stage[Y.side_stiffness_n + i]) * side_slip
         along += force
+        if extra:
+            ahead[X.hub_rate_mps + i] += half * y[Y.hub_push_1_kg + i] * force
         across += cross
         turning += wheel_x * cross - wheel_y * force
     mass, height = p[P.vehicle_mass_kg], p[P.vehicle_cog_height_m]
-    half = 0.5 * step_s
     ahead[X.speed_mps] += half * along / mass
     ahead[X.lateral_speed_mps] += half * across / mass
     ahead[X.yaw_rate_rad_s] += half * turning / p[P.vehicle_yaw_inertia_kg_m2]

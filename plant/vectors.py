@@ -90,7 +90,8 @@ OUTPUTS = {
     "slip_gain_1_m": 4,  # 1 / relaxation length
     "slip_stiffness_n": 4,  # by how much a little more slip changes the force, and the lateral one below
     "side_stiffness_n": 4,
-    "hub_swing_1_s": 4,  # natural frequency of a soft hub
+    "hub_swing_1_s": 4,  # natural frequency of a soft hub, and what a force on it makes of its acceleration
+    "hub_push_1_kg": 4,
     "standing_damping_1_s": 4,  # how fast a wheel near standstill loses speed against the road
     "motor_available_nm": 4,
     "motor_derating": 4,

@@ -237,6 +237,7 @@ def _move(x: Vector, u: Vector, q: Vector, y: Vector) -> None:
         y[Y.decay_1_s + k] = 0.0
     for i in range(4):
         y[Y.hub_swing_1_s + i] = 0.0
+        y[Y.hub_push_1_kg + i] = 0.0
     bank.rates(x, q, y, _AT.terms)
     _rates(x, u, q, y)
     plugin.call(x, u, q, y, _AT.plugins, _AT.plugin_rows, _AT.theta, 1)

@@ -33,6 +33,7 @@ def rates(x: Vector, u: Vector, q: Vector, k: int, y: Vector) -> None:
         bent = q[k + L.compliance_m_n + i // 2] * y[Y.longitudinal_force_n + i]
         travel, rate = x[X.hub_m + i], x[X.hub_rate_mps + i]
         y[Y.hub_swing_1_s + i] = omega
+        y[Y.hub_push_1_kg + i] = omega * omega * q[k + L.compliance_m_n + i // 2]
         y[Y.rate + X.hub_m + i] = rate
         y[Y.rate + X.hub_rate_mps + i] = omega * omega * (bent - travel) - 2.0 * DAMPING_RATIO * omega * rate
         y[Y.decay_1_s + X.hub_rate_mps + i] = 2.0 * DAMPING_RATIO * omega + 1e-3 * omega * omega

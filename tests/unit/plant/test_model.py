@@ -8,6 +8,7 @@ import pytest
 
 from plant.effects.bank import NO_TERMS
 from plant.effects.plugin import NO_PLUGINS
+from plant.effects.theta import THETA
 from plant.integrate import EXPONENTIAL, RUNGE_KUTTA_4, SEMI_IMPLICIT
 from plant.model import NEUTRAL, advance, column_indices, compile_model, healthy, initial_state, pack, replay, simulate
 from plant.road import DRY, RoadSegment, road_table
@@ -144,6 +145,45 @@ def test_long_exponential_steps_beat_short_simple_ones(stop):
     long_steps = np.sqrt(((driven(EXPONENTIAL, 2) - exact) ** 2).mean(axis=0))
     short_steps = np.sqrt(((driven(SEMI_IMPLICIT, 4) - exact) ** 2).mean(axis=0))
     assert (long_steps < 0.2 * short_steps).all(), (long_steps, short_steps)
+
+
+def test_long_steps_of_a_rolling_car_keep_its_swing(stop):
+    """Torque in steps, 5 ms at once: the wheel swings on its tyre at 25 Hz, and the body takes all the force."""
+    start, inputs, p = stop
+    inputs[:, INPUT.slice("motor_demand_nm")] = 0.0
+    inputs[:, INPUT.slice("pressure_demand_pa")] = 0.0
+    inputs[:, INPUT.slice("motor_torque_nm")] = np.where(np.arange(ROWS) // 40 % 2, -200.0, 0.0)[:, None]
+    cut = CUT.zeros()
+    cut[CUT.slice("motor_torque")] = 1.0
+    columns = ["state.wheel_speed_rad_s_fl", "state.speed_mps", "state.imu_longitudinal_mps2"]
+
+    def driven(method, steps):
+        return replay(start, inputs, p, columns, cut=cut, steps=steps, step_s=0.01 / steps, method=method)[0]
+
+    exact = driven(RUNGE_KUTTA_4, 20)
+    error = np.abs(driven(EXPONENTIAL, 2) - exact)
+    swing = exact[40:60, 0] - np.linspace(exact[40, 0], exact[59, 0], 20)
+    assert np.ptp(swing) > 0.5
+    assert error[:, 0].max() < 0.05 * np.ptp(swing)
+    assert error[:, 1].max() < 1e-3
+    assert error[:, 2].max() < 0.05 * np.ptp(exact[:, 2])
+
+
+def test_long_steps_keep_the_mark_of_a_soft_hub(stop):
+    start, inputs, p = stop
+    theta = NEUTRAL.copy()
+    theta[THETA.slice("sus_compliance", "compliance_m_n")] = 2.5e-7
+
+    def mark(method, steps):
+        both = [
+            replay(start, inputs, p, ["state.wheel_speed_rad_s_fl"], steps=steps, step_s=0.01 / steps, method=method,
+                   theta=one)[0, :, 0]
+            for one in (NEUTRAL, theta)
+        ]  # fmt: skip
+        return both[1] - both[0]
+
+    exact = mark(RUNGE_KUTTA_4, 20)
+    assert np.linalg.norm(mark(EXPONENTIAL, 4) - exact) < 0.1 * np.linalg.norm(exact)
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.25e-3, 0.75e-3, 1.25e-3, 1.75e-3])
