@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.compiled import equation, section
+from plant.compiled import EFFECTS, equation, section
 from plant.contact import rolling_radius
 from plant.effects.apply import extra_states_move
 from plant.equations import derivative
@@ -21,6 +21,7 @@ Vector = NDArray[np.float64]
 ROLLING_MPS = 3.0
 """Below, wheels on their brakes and tyres swing in threes."""
 _SLIDES = 0.08  # slip, either way, beyond which a tyre may be past its peak
+_HUB_TRAVEL, _HUB_RATE = (X.hub_m, X.hub_rate_mps) if EFFECTS else (0, 0)
 _WHEEL, _PRESSURE, _HUB = 0, 24, 48  # where a pair's numbers lie: phi_2 and the matrix, six of each wheel
 
 
@@ -80,8 +81,8 @@ def rolling_step(
         for i in range(wheels):
             swing = y[Y.hub_swing_1_s + i]
             _begin(
-                _HUB, X.hub_m, X.hub_rate_mps, i, 0.0, step_s, -step_s * swing * swing,
-                -step_s * y[Y.decay_1_s + X.hub_rate_mps + i], step_s, x, y, trial, pairs,
+                _HUB, _HUB_TRAVEL, _HUB_RATE, i, 0.0, step_s, -step_s * swing * swing,
+                -step_s * y[Y.decay_1_s + _HUB_RATE + i], step_s, x, y, trial, pairs,
             )  # fmt: skip
     derivative(trial, u, cut, switch, p, road, stage)
     for i in range(last):
@@ -92,7 +93,7 @@ def rolling_step(
         _end(_PRESSURE, X.pressure_pa, X.pressure_rate_pa_s, i, step_s, x, y, trial, stage, pairs, ahead)
     if extra:
         for i in range(wheels):
-            _end(_HUB, X.hub_m, X.hub_rate_mps, i, step_s, x, y, trial, stage, pairs, ahead)
+            _end(_HUB, _HUB_TRAVEL, _HUB_RATE, i, step_s, x, y, trial, stage, pairs, ahead)
     _carry_body(p, step_s, extra, y, trial, stage, mean, ahead)
     for i in range(last):
         x[i] = ahead[i]
@@ -148,7 +149,7 @@ def _carry_body(
         cross = -0.5 * (y[Y.side_stiffness_n + i] + stage[Y.side_stiffness_n + i]) * side_slip
         along += force
         if extra:
-            ahead[X.hub_rate_mps + i] += half * y[Y.hub_push_1_kg + i] * force
+            ahead[_HUB_RATE + i] += half * y[Y.hub_push_1_kg + i] * force
         across += cross
         turning += wheel_x * cross - wheel_y * force
     mass, height = p[P.vehicle_mass_kg], p[P.vehicle_cog_height_m]
