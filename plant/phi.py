@@ -29,8 +29,8 @@ def phi_of_pair(trace: float, det: float) -> tuple[float, float, float, float]:
     """phi_1 and phi_2 of a 2x2 matrix M of this trace and determinant: a, b of each, as a I + b M.
 
     Power series of phi_2 at M / 16, then doubled: phi_2(2z) = (phi_1(z)^2 + 2 phi_2(z))/4, phi_1(2z) = (e^z + 1)
-    phi_1(z)/2 (Skaflestad and Wright 2009, Appl. Numer. Math. 59, 783). M^2 is tr M - det I. Relative error below 1e-12
-    up to eigenvalues of 4, below 1e-6 up to 30.
+    phi_1(z)/2 (Skaflestad and Wright 2009, Appl. Numer. Math. 59, 783). M^2 is tr M - det I. Relative error below 1e-10
+    up to eigenvalues of 4, below 1e-7 up to 30.
     """
     scale = 0.5**_HALVINGS
     t, d = scale * trace, scale * scale * det
