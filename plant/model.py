@@ -25,7 +25,7 @@ from plant.integrate import (
 from plant.layout import flatten
 from plant.parameters.plant import PlantParameters
 from plant.road import DRY, road_table
-from plant.rolling import rolling_step, rolls_on
+from plant.rolling import CREEPING_S, rolling_step, rolls_on
 from plant.vectors import CUT, DELAY_SLOTS, INPUT, OUTPUT, PARAMETER, STATE, SWITCH, P, U, X
 
 Vector = NDArray[np.float64]
@@ -164,7 +164,9 @@ def simulate(
                 if rolls_on(x, now, q, long_s):
                     rolling_step(x, now, cut, switch, q, road, long_s, work, y)
                 else:
-                    exponential_step(x, now, cut, switch, q, road, long_s, work, y)
+                    parts = 2 if long_s > CREEPING_S else 1
+                    for _ in range(parts):
+                        exponential_step(x, now, cut, switch, q, road, long_s / parts, work, y)
             else:
                 runge_kutta_step(x, now, cut, switch, q, road, long_s, work, y)
             x[X.time_s] += long_s

@@ -20,6 +20,9 @@ from plant.vectors import CUT_PARTS, P, U, X, Y
 Vector = NDArray[np.float64]
 ROLLING_MPS = 3.0
 """Below, wheels on their brakes and tyres swing in threes."""
+CREEPING_S = 5e-3
+"""Longest step of a car that does not roll on: a light wheel on its tyre swings too fast for more, and is hardly damped
+where it is slow."""
 _SLIDES = 0.08  # slip, either way, beyond which a tyre may be past its peak
 _HUB_TRAVEL, _HUB_RATE = (X.hub_m, X.hub_rate_mps) if EFFECTS else (0, 0)
 _WHEEL, _PRESSURE, _HUB = 0, 24, 48  # where a pair's numbers lie: phi_2 and the matrix, six of each wheel

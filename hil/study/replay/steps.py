@@ -13,14 +13,14 @@ _QUICK_NM, _RINGS_ROWS = 6.0, 12
 _QUICK_PA, _FOLLOWS_ROWS = 2e4, 20
 _OF_NOISE = 4.0
 _HARD_MPS2 = 5.0
-_STANDS_MPS, _STOOD_S, _LEAVES_S = 0.02, 1.0, 0.3
 
 
 def at_once(drive: Drive) -> NDArray[np.int64]:
     """How many steps each row of a drive makes as one.
 
     A motor follows a step of its demand within some 0.1 s, the pressure in 0.2 s; the tyres' limit is stiff, and so is
-    a car that comes to rest (docs/decisions/0089), until it has stood for a second. The rest follows any step.
+    a car that comes to rest (docs/decisions/0089), which a simulated one may do later than the measured one. The rest
+    follows any step.
     """
 
     def changes(part: str, much: float, rows: int) -> NDArray[np.bool_]:
@@ -32,13 +32,6 @@ def at_once(drive: Drive) -> NDArray[np.int64]:
         return np.asarray(after)
 
     slope = np.gradient(drive.speed_mps, drive.stride * ROW_S) if drive.samples > 1 else drive.speed_mps
-    stands = drive.speed_mps < _STANDS_MPS
-    moves = np.flatnonzero(~stands)
-    before, after = (round(s / (drive.stride * ROW_S)) for s in (_STOOD_S, _LEAVES_S))
-    settled = stands.copy()
-    for k in range(-after, before + 1):
-        settled[np.clip(moves + k, 0, len(stands) - 1)] = False
-    creeps = (drive.speed_mps < ROLLING_MPS) & ~settled
-    hard, creeps = (np.repeat(at, drive.stride) for at in (np.abs(slope) > _HARD_MPS2, creeps))
+    hard, creeps = (np.repeat(at, drive.stride) for at in (np.abs(slope) > _HARD_MPS2, drive.speed_mps < ROLLING_MPS))
     quick = changes("motor_torque_nm", _QUICK_NM, _RINGS_ROWS) | changes("pressure_demand_pa", _QUICK_PA, _FOLLOWS_ROWS)
     return np.where(quick, 1, np.where(hard | creeps, STEPS // 2, STEPS))
