@@ -66,15 +66,20 @@ def _moving_each(
             step = step_s * rolling[t]
             for k in range(lanes):
                 x[0, k] += step * (x[1, k] + x[2, k])
-                for j in range(states):
+            for j in range(states):
+                for k in range(lanes):
                     cov[0, j, k] += step * (cov[1, j, k] + cov[2, j, k])
+            for k in range(lanes):
                 cov[0, 0, k] += step * (cov[0, 1, k] + cov[0, 2, k])
-                for j in range(count):
+            for j in range(count):
+                for k in range(lanes):
                     x[1 + j, k] *= keep[j, k]
                     cov[0, 1 + j, k] *= keep[j, k]
                     cov[1 + j, 0, k] = cov[0, 1 + j, k]
-                    for i in range(count):
+                for i in range(count):
+                    for k in range(lanes):
                         cov[1 + i, 1 + j, k] *= keep[i, k] * keep[j, k]
+                for k in range(lanes):
                     cov[1 + j, 1 + j, k] += (1.0 - keep[j, k] * keep[j, k]) * colour[j, k]
             if restart[t] > 0.5:
                 x[0] = 0.0

@@ -16,7 +16,7 @@ Three = tuple[Floats, Floats, Floats]
 
 def _coloured(y: Floats, scale: Floats, fresh: Floats, white: Floats, phi: float, colour: float, out: Floats) -> float:
     columns = y.shape[1]
-    state = np.zeros(columns)
+    state, innovation = np.zeros(columns), np.zeros(columns)
     variance, likelihood = colour, 0.0
     for t in range(y.shape[0]):
         if fresh[t] > 0.5:
@@ -30,9 +30,10 @@ def _coloured(y: Floats, scale: Floats, fresh: Floats, white: Floats, phi: float
             total = variance + white[t]
             gain, size, even = variance / total, 1.0 / np.sqrt(total), 1.0 / scale[t]
             for k in range(columns):
-                innovation = y[t, k] * even - state[k]
-                state[k] += gain * innovation
-                out[t, k] = innovation * size
+                innovation[k] = y[t, k] * even - state[k]
+            for k in range(columns):
+                state[k] += gain * innovation[k]
+                out[t, k] = innovation[k] * size
             variance -= gain * variance
             far = max(abs(out[t, 0]) - HUBER, 0.0)
             likelihood -= 0.5 * (out[t, 0] * out[t, 0] - far * far + np.log(total))
@@ -49,7 +50,7 @@ def _moving(
     # states: error of the speed; disturbances: force, slope, accelerometer, wheels, and ground speed if it is measured
     columns, count = tracks[0].shape[1], colours.shape[0]
     size = 1 + count
-    x = np.zeros((size, columns))
+    x, innovation = np.zeros((size, columns)), np.zeros(columns)
     cov = np.zeros((size, size))
     h = np.zeros(size)
     likelihood = 0.0
@@ -66,7 +67,8 @@ def _moving(
             step = step_s * rolling[t]
             for k in range(columns):
                 x[0, k] += step * (x[1, k] + x[2, k])
-                for i in range(count):
+            for i in range(count):
+                for k in range(columns):
                     x[1 + i, k] *= colours[i, 0]
             for i in range(size):
                 for j in range(size):
@@ -102,10 +104,14 @@ def _moving(
                 h[i] = one * cov[i, first] + other * cov[i, second]
             total = white[t, m] + one * h[first] + other * h[second]
             for k in range(columns):
-                innovation = y[t, k] * even - one * x[first, k] - other * x[second, k]
-                for i in range(size):
-                    x[i, k] += h[i] / total * innovation
-                out[t, k] = innovation / np.sqrt(total)
+                innovation[k] = y[t, k] * even - one * x[first, k] - other * x[second, k]
+            for i in range(size):
+                gain = h[i] / total
+                for k in range(columns):
+                    x[i, k] += gain * innovation[k]
+            deviation = np.sqrt(total)
+            for k in range(columns):
+                out[t, k] = innovation[k] / deviation
             for i in range(size):
                 for j in range(size):
                     cov[i, j] -= h[i] * h[j] / total
