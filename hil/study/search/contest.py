@@ -17,6 +17,8 @@ from hil.study.search.screen import Score, rescored, share_of, sized
 _ROUNDS, _SETTLED, _SETTLED_SHARE = 4, 1.0, 0.01
 """Times that a contender and its noise are fitted in turn, and how little less cost ends it: by itself, and as a share
 of all that it explains."""
+_STILL = 2.0
+"""How little less cost other noise makes beside a linear step for that not to be made again."""
 Item = TypeVar("Item")
 Of = TypeVar("Of")
 
@@ -165,11 +167,14 @@ class Contest:
         known = np.zeros(len(begun.terms))
         if len(terms) > 1:
             known[-len(terms) :] = [term.candidate.parameter.typical**-2 for term in terms]
-        first = self._fitter.foreseen(begun, own, self.noise, known)
-        quieter = self._no_worse(first, self._fitter.estimated(first, self.noise), self.noise)
-        again = self._fitter.foreseen(begun, own, quieter, known)
-        quieter = self._no_worse(again, self._fitter.estimated(again, quieter), quieter)
-        return replace(again, cost=self._fitter.cost(again.residual, again.z, quieter)), quieter
+        model, noise = self._fitter.foreseen(begun, own, self.noise, known), self.noise
+        for last in (False, True):
+            noise = self._no_worse(model, self._fitter.estimated(model, noise), noise)
+            before, model = model.cost, replace(model, cost=self._fitter.cost(model.residual, model.z, noise))
+            if last or before - model.cost < _STILL:
+                break
+            model = self._fitter.foreseen(begun, own, noise, known)
+        return model, noise
 
     def profiled(self, item: Score) -> tuple[Score, Noise]:
         """The candidate with the noise that is left beside it: by one linear step, or at the size of its replay."""

@@ -31,7 +31,7 @@ from hil.study.search.diagnosis import Diagnosis, Say, Settings, causes_in
 from hil.study.search.doubt import backward, stands_beside, with_gain
 from hil.study.search.field import Field, number_of
 from hil.study.search.handed_in import Refitted, from_handed_in
-from hil.study.search.leading import fitted_leaders
+from hil.study.search.leading import fitted_leaders, together
 from hil.study.search.left_over import LeftOver
 from hil.study.search.one_for_all import one_for_all
 from hil.study.search.onset import with_onsets
@@ -77,6 +77,7 @@ class _Search:
         """All of it."""
         self.say("replaying the car as handed in")
         self.numbers.anew(np.zeros(len(self.numbers.nuisances)))
+        self.handed_in = self.fitter
         nominal, noise = self.fitter.start(self.settings.noise_model)
         self.say("noise, and the vehicle's numbers within their tolerance")
         model, noise = self.numbers.fitted(nominal, noise)
@@ -200,10 +201,10 @@ class _Search:
         if listed is not None:
             tighter = listed.noise
             reference = min(reference, self.fitter.fit(model, tighter, 3).cost)
-        now = Round(contest, model, tighter, reference, listed, left, error, self._bent(model))
-        law = self.unlisted.best(found, now)
         fitted = gained() if fitted else []
         clear = sorted((c for c in fitted if c.gained >= found.least_gain and worth(c) > 0.0), key=odds)
+        now = Round(contest, model, tighter, reference, listed, bool(clear), left, error, self._bent(model))
+        law = self.unlisted.best(found, now)
         if law is not None:
             found.explained += reference - law.cost
             polished, tighter = self.fitter.settle(law.model, law.noise, 1)
@@ -243,7 +244,25 @@ class _Search:
         bent = self._bent(model)
         plausible = self.field.plausible(self.fitter, listed, sums, model, bent)
         contest = Contest(self.fitter, self.field.tracks, model, noise, self.settings.relinearise)
-        return contest, *fitted_leaders(contest, plausible, left, found, bent, self.say)
+        leading = fitted_leaders(contest, plausible, left, found, bent, self.say)
+        if bent:
+            leading = together(leading, self._leading_handed_in(found, noise, left))
+        return contest, *leading
+
+    def _leading_handed_in(self, found: Diagnosis, noise: Noise, left: LeftOver) -> tuple[list[Score], list[Contender]]:
+        """Leaders as seen from the car as handed in, and their fits.
+
+        Numbers that stand in for a cause leave nothing of it where they stand.
+        """
+        self.say("sensitivities at the car as handed in")
+        fitter = self.handed_in
+        nominal = fitter.at(np.zeros(len(self.numbers.nuisances)), (), noise)
+        field = self.field.at(fitter, nominal)
+        sums = fitter.screen(nominal, field.tracks, noise)
+        listed = field.scores(fitter, sums, nominal, noise)
+        plausible = field.plausible(fitter, listed, sums, nominal, False)
+        contest = Contest(fitter, field.tracks, nominal, noise, self.settings.relinearise)
+        return fitted_leaders(contest, plausible, left, found, False, self.say)
 
     def _fitted_again(
         self, model: Model, fitted: list[Contender], top: list[Score], reference: float

@@ -1,6 +1,7 @@
 """The field of a race: what every candidate shows at a model, how much it explains there, and who is worth a look."""
 
 from collections.abc import Sequence
+from copy import copy
 
 from hil.study.fitting.candidates import Candidate, candidates, columns
 from hil.study.fitting.fit import Fitter, Model, Tracks
@@ -33,6 +34,12 @@ class Field:
         worlds = [column.stepped(world) for column in self._columns]
         steps = [column.step for column in self._columns]
         self.tracks = track_columns(self._rig, self._frame, model.stack, worlds, steps)
+
+    def at(self, fitter: Fitter, model: Model) -> "Field":
+        """The same candidates, their sensitivities taken at another model."""
+        other = copy(self)
+        other.taken_at(fitter, model)
+        return other
 
     def scores(self, fitter: Fitter, sums: Sums, model: Model, noise: Noise) -> list[Score]:
         """What each explains beside a model by one step; what does nothing at first, by a replay at full size."""

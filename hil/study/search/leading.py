@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 
 from hil.study.fitting.own_error import variance_of
-from hil.study.search.contest import Contender, Contest
+from hil.study.search.contest import Contender, Contest, odds
 from hil.study.search.diagnosis import Diagnosis, Say
+from hil.study.search.field import number_of
 from hil.study.search.left_over import LeftOver
 from hil.study.search.screen import LEADERS, Score, leaders
 
@@ -44,6 +45,18 @@ def fitted_leaders(
     if rest and any(_beyond(*one, left) >= least for one in zip(first, gains, strict=True)):
         return [*first, *rest], [*fitted, *fits(rest)]
     return first, fitted
+
+
+def together(
+    some: tuple[list[Score], list[Contender]], others: tuple[list[Score], list[Contender]]
+) -> tuple[list[Score], list[Contender]]:
+    """Leaders and their fits of two races, of what led in both the better fit."""
+    best: dict[tuple[str, str, str], tuple[Score, Contender]] = {}
+    for item, one in (*zip(*some, strict=True), *zip(*others, strict=True)):
+        name = number_of(item.candidate)
+        if name not in best or odds(one) < odds(best[name][1]):
+            best[name] = item, one
+    return [item for item, _ in best.values()], [one for _, one in best.values()]
 
 
 def _beyond(item: Score, gain: float, left: LeftOver) -> float:

@@ -80,12 +80,19 @@ def of_another_shape(contest: Contest, fitter: Fitter, listed: Sequence[Candidat
     worlds = [one.applied(world, step) for one, step in zip(offered, steps, strict=True)]
     columns = track_columns(fitter.rig, fitter.frame, bare.stack, worlds, steps)
 
-    def foreseen(k: int) -> float:
+    def foreseen(k: int) -> Model:
         own = {name: values[:, k : k + 1] for name, values in columns.items()}
-        return contest.foreseen([Term(offered[k], 0.0)], own)[0].cost
+        return contest.foreseen([Term(offered[k], 0.0)], own)[0]
 
-    costs = contest.at_once(foreseen, range(len(offered)))
-    return _fitted(fitter, bare, offered[int(np.argmin(costs))], law)
+    best: dict[str, tuple[Model, Shaped]] = {}  # of each effect, as foreseen by one step, which far off errs
+    for model, one in sorted(zip(contest.at_once(foreseen, range(len(offered))), offered, strict=True), key=_cost):
+        best.setdefault(one.effect.name, (model, one))
+    replayed = contest.at_once(lambda seen: fitter.at(seen[0].z, seen[0].terms, law.noise), list(best.values()))
+    return _fitted(fitter, bare, min(zip(replayed, (one for _, one in best.values()), strict=True), key=_cost)[1], law)
+
+
+def _cost(seen: tuple[Model, Shaped]) -> float:
+    return seen[0].cost
 
 
 def _values(shape: Parameter) -> list[float]:

@@ -29,7 +29,7 @@ Again = Callable[[Model, Sequence[Contender], Refitted, float, int, float], tupl
 class Round:
     """One round of the search: the model so far, the best ``listed`` cause beside it and what that ``left``.
 
-    There is none ``listed`` where none is worth a fit.
+    There is none ``listed`` where none is worth a fit; ``clear`` says whether any listed cause is beyond doubt.
 
     ``reference`` is the cost without a cause more, with the ``noise`` beside one; ``error`` says what a contender's
     gain is divided by; ``bent``, whether something may have bent the vehicle's numbers.
@@ -40,6 +40,7 @@ class Round:
     noise: Noise
     reference: float
     listed: Contender | None
+    clear: bool
     left: LeftOver
     error: Callable[[Contender, Contender], float]
     bent: bool
@@ -59,8 +60,9 @@ class Unlisted:
     def best(self, found: Diagnosis, now: Round) -> Contender | None:
         """The best law where it is ahead of the best listed cause, beyond noise and the model's own error.
 
-        A listed cause that is as far off as it may be is no rival to one that explains more. One of another shape than
-        the usual (`hil.study.search.shapes`) takes the place of a law that is not ahead of it, too.
+        A listed cause that is as far off as it may be is no rival to one that explains more. Where no listed one is
+        beyond doubt, a law is to be likelier than the best, but need not explain so much beside it. One of another
+        shape than the usual (`hil.study.search.shapes`) takes the place of a law that is not ahead of it, too.
         """
         model, reference = now.model, now.reference
         if not self._settings.dictionary or any(isinstance(term.candidate, Piece) for term in model.terms):
@@ -89,28 +91,28 @@ class Unlisted:
         self._say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
         least = self._asked(found, race, best, now.left)
 
-        def ahead(listed: Contender | None) -> bool:
+        def ahead(listed: Contender | None, clear: bool) -> bool:
             known, rival = reference, 0.0
             if listed is not None and law.cost >= listed.cost:
                 return False
             if listed is not None and not at_its_end(listed.term):
-                known = min(listed.cost, reference)
+                known = min(listed.cost, reference) if clear else reference
                 rival = (1.0 + FORM**2) * max(0.5 * (reference - odds(listed)), 0.0)
             clearly = 0.5 * (reference - odds(law)) >= rival + _CLEARER
             return clearly and known - law.cost >= least * now.error(law, law)
 
-        if ahead(now.listed) and self._settings.relinearise and not now.bent:
+        if ahead(now.listed, now.clear) and self._settings.relinearise and not now.bent:
             (law,), without = self._again(model, [replayed(law)], refitted_law, reference, 1, np.inf)
             reference = min(reference, without[0].cost)
-        if not ahead(now.listed):
+        if not ahead(now.listed, now.clear):
             return None
         fitted = fitter.fit(fitter.at(law.model.z, law.model.terms, law.noise), law.noise, 3)
         law = refitted_law(law, fitted, law.noise)
-        if not ahead(now.listed):
+        if not ahead(now.listed, now.clear):
             return None
         listed = [item.candidate for item in found.screened]
         shaped = of_another_shape(now.contest, fitter, listed, law)
-        return law if shaped is None or ahead(shaped) else shaped
+        return law if shaped is None or ahead(shaped, True) else shaped
 
     def _seen(self, race: LawRace, now: Round) -> tuple[dict[str, Entry], list[Contender]]:
         """The best laws, by name, and by one linear step with the noise beside each."""
