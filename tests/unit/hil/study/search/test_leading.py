@@ -1,13 +1,24 @@
-"""Who leads a race for a cause: of two races the better fit of each."""
+"""Who leads a race for a cause: of two races the better fit of each, and the one from the car as handed in."""
 
 from typing import Any
 
+import numpy as np
+import pytest
+from outsider import VEHICLE
+from pulses import log_as_driven
+
 from hil.study.fitting.candidates import candidates, columns
 from hil.study.fitting.fit import Term
+from hil.study.logs.prepare import prepare
+from hil.study.replay.rig import Rig
+from hil.study.replay.vehicle import load_vehicle
+from hil.study.replay.world import nominal
+from hil.study.search import diagnose
 from hil.study.search.contest import Contender
-from hil.study.search.leading import together
+from hil.study.search.leading import fitted_leaders, together
 from hil.study.search.screen import score
 
+_DEVIATIONS = {"wheel": 0.02, "ax": 0.02, "gps": 0.03, "pressure": 1e4, "motor": 0.5}
 CANDIDATES = {c.name: c for c in candidates(columns())}
 
 
@@ -30,3 +41,28 @@ def test_of_what_leads_two_races_the_better_fit_stays() -> None:
 
 def test_nobody_leads_where_nobody_leads_either_race() -> None:
     assert together(([], []), ([], [])) == ([], [])
+
+
+@pytest.mark.slow
+def test_a_cause_that_bent_numbers_leave_nothing_of_leads_as_seen_from_the_car_as_handed_in(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where the numbers stand nobody leads, as if they had stood in for all of it."""
+    vehicle = load_vehicle(VEHICLE)
+    case, base = prepare([log_as_driven(vehicle, 0.318)], 0.318), nominal(vehicle)
+    rng = np.random.default_rng(2)
+    (drive,) = case.drives
+    for group, told in Rig(case, vehicle).run(CANDIDATES["tyre_radius@rl"].applied(base, -0.02)).items():
+        drive.measured[group][:] = told + _DEVIATIONS.get(group, 0.02) * rng.standard_normal(told.shape)
+    races: list[bool] = []
+
+    def blind_at_first(*given: Any) -> tuple[list[Any], list[Contender]]:
+        races.append(True)
+        return ([], []) if len(races) == 1 else fitted_leaders(*given)
+
+    monkeypatch.setattr(diagnose, "fitted_leaders", blind_at_first)
+    monkeypatch.setattr(diagnose, "STRAINED", 0.0)
+    found = diagnose.diagnose(case, vehicle, base)
+    (term,) = found.final.terms
+    assert term.candidate.name == "tyre_radius@rl"
+    assert term.value == pytest.approx(-0.02, abs=0.002)
