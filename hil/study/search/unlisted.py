@@ -46,6 +46,26 @@ class Round:
     bent: bool
 
 
+def ahead(law: Contender, listed: Contender | None, clear: bool, reference: float, asked: float) -> bool:
+    """Whether a law is ahead of the best listed cause, if there is one, and explains what is asked of it.
+
+    A listed cause that is as far off as it may be is no rival to one that explains more. Where no listed one is beyond
+    doubt (``clear``), the law is to be likelier than the best, but need not explain so much beside it.
+
+    Parameters
+    ----------
+    reference : the cost without a cause more.  asked : of chi-squared, by which the law's cost is to be less.
+    """
+    known, rival = reference, 0.0
+    if listed is not None and law.cost >= listed.cost:
+        return False
+    if listed is not None and not at_its_end(listed.term):
+        known = min(listed.cost, reference) if clear else reference
+        rival = (1.0 + FORM**2) * max(0.5 * (reference - odds(listed)), 0.0)
+    clearly = 0.5 * (reference - odds(law)) >= rival + _CLEARER
+    return clearly and known - law.cost >= asked
+
+
 class Unlisted:
     """The laws at a model, simulated once."""
 
@@ -60,9 +80,8 @@ class Unlisted:
     def best(self, found: Diagnosis, now: Round) -> Contender | None:
         """The best law where it is ahead of the best listed cause, beyond noise and the model's own error.
 
-        A listed cause that is as far off as it may be is no rival to one that explains more. Where no listed one is
-        beyond doubt, a law is to be likelier than the best, but need not explain so much beside it. One of another
-        shape than the usual (`hil.study.search.shapes`) takes the place of a law that is not ahead of it, too.
+        A listed cause of another shape than the usual (`hil.study.search.shapes`) takes the place of a law that is not
+        ahead of it.
         """
         model, reference = now.model, now.reference
         if not self._settings.dictionary or any(isinstance(term.candidate, Piece) for term in model.terms):
@@ -91,28 +110,21 @@ class Unlisted:
         self._say(f"best curve: {best.curve.law.name} at {best.curve.place}, gain {reference - law.cost:.0f}")
         least = self._asked(found, race, best, now.left)
 
-        def ahead(listed: Contender | None, clear: bool) -> bool:
-            known, rival = reference, 0.0
-            if listed is not None and law.cost >= listed.cost:
-                return False
-            if listed is not None and not at_its_end(listed.term):
-                known = min(listed.cost, reference) if clear else reference
-                rival = (1.0 + FORM**2) * max(0.5 * (reference - odds(listed)), 0.0)
-            clearly = 0.5 * (reference - odds(law)) >= rival + _CLEARER
-            return clearly and known - law.cost >= least * now.error(law, law)
+        def stands(law: Contender, listed: Contender | None, clear: bool) -> bool:
+            return ahead(law, listed, clear, reference, least * now.error(law, law))
 
-        if ahead(now.listed, now.clear) and self._settings.relinearise and not now.bent:
+        if stands(law, now.listed, now.clear) and self._settings.relinearise and not now.bent:
             (law,), without = self._again(model, [replayed(law)], refitted_law, reference, 1, np.inf)
             reference = min(reference, without[0].cost)
-        if not ahead(now.listed, now.clear):
+        if not stands(law, now.listed, now.clear):
             return None
         fitted = fitter.fit(fitter.at(law.model.z, law.model.terms, law.noise), law.noise, 3)
         law = refitted_law(law, fitted, law.noise)
-        if not ahead(now.listed, now.clear):
+        if not stands(law, now.listed, now.clear):
             return None
         listed = [item.candidate for item in found.screened]
         shaped = of_another_shape(now.contest, fitter, listed, law)
-        return law if shaped is None or ahead(shaped, True) else shaped
+        return law if shaped is None or stands(law, shaped, True) else shaped
 
     def _seen(self, race: LawRace, now: Round) -> tuple[dict[str, Entry], list[Contender]]:
         """The best laws, by name, and by one linear step with the noise beside each."""

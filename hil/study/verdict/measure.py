@@ -1,11 +1,11 @@
 """What the extension gains on manoeuvres that its fit never saw, beside doing nothing and the best wrong cause."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hil.study.fitting.fit import Fitter, Model, Tracks
+from hil.study.fitting.fit import Fitter, Model, Term, Tracks
 from hil.study.fitting.linear import sums
 from hil.study.likelihood.noise import Frame, Noise
 from hil.study.logs.table import Floats
@@ -45,7 +45,11 @@ def folds(frame: Frame) -> list[Floats]:
 
 
 def held_out(fitter: Fitter, noise: Noise, model: Model) -> Tracks:
-    """Residual of every manoeuvre from a fit on the others, in which no number goes farther than it may."""
+    """Residual of every manoeuvre from a fit on the others, in which no number goes farther than it may.
+
+    That fit is the one at hand and what leaving the manoeuvre out changes in one linear step: where tyres near their
+    limit bend the cost, a step goes on from the best fit with all manoeuvres, too.
+    """
     frame = fitter.frame
     trained = folds(frame)
     if len(trained) < 2:
@@ -57,13 +61,22 @@ def held_out(fitter: Fitter, noise: Noise, model: Model) -> Tracks:
     of = sums(model.residual, columns, frame, noise, len(fitter.nuisances))
     out = {name: np.zeros_like(values) for name, values in model.residual.items()}
     blocks = np.asarray(frame.blocks, np.int64)
+    z_of_all, of_all, *_ = fitter.moved(model, of.total())
     for weights in trained:
         z, terms, *_ = fitter.moved(model, of.total(weights))
+        z = np.clip(model.z + z - z_of_all, fitter.lowest, fitter.farthest)
+        terms = tuple(map(_changed, model.terms, terms, of_all))
         residual = fitter.residual(z, terms)
         test = weights[blocks] < 0.5
         for name, values in residual.items():
             out[name][test] = values[test]
     return out
+
+
+def _changed(now: Term, without: Term, of_all: Term) -> Term:
+    """An effect as fitted, with what a step without some manoeuvres changes beside one with all."""
+    parameter = now.candidate.parameter
+    return replace(now, value=float(np.clip(now.value + without.value - of_all.value, parameter.low, parameter.high)))
 
 
 def gains(found: Diagnosis) -> list[Gain]:
