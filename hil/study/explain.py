@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from dbc.database import parse_database
 from hil.study.consistency.check import Consistency, check, unforced
 from hil.study.logs.channel_map import load_map
+from hil.study.logs.driven import with_both_axles
 from hil.study.logs.prepare import prepare
 from hil.study.logs.read import from_frame, read_logs
 from hil.study.logs.straight import kept_straight
@@ -51,7 +52,7 @@ def explain(
         Data or files that nothing can be concluded from: the message says why.
     """
     car = load_vehicle(shipped(Path(vehicle), "vehicle") if isinstance(vehicle, str | Path) else vehicle)
-    read = _logs(logs, car, channel_map, database, about)
+    read = with_both_axles(_logs(logs, car, channel_map, database, about))
     why = unforced(read, float(car.parameters.wheel.rolling_radius_m))
     if why:
         return check(read, car, why, extend, out, say or (lambda _: None))

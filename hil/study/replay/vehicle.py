@@ -1,7 +1,7 @@
 """The vehicle as handed in: files and mappings into a parameter vector and its tolerances."""
 
 import tomllib
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from importlib import resources
@@ -23,10 +23,11 @@ from plant.vectors import PARAMETER, P
 _CONSTANT_B_1_J = 2e-6
 _STATED = 0.01
 _LOOSE = (
-    ("ehb", "pressure_offset", "offset_pa", 7e3), ("ehb", "pressure_gain", "gain", 0.005),
-    ("motor", "iwm_gain", "gain", 0.005),
+    ("pressure_offset", "offset_pa", 1.5e4), ("pressure_gain", "gain", 0.005), ("iwm_gain", "gain", 0.005),
+    ("tyre_radius", "gain", 0.0012),
 )  # fmt: skip
-"""Standard deviations of a pressure sensor of a class of 1 %, for 150 bar or so, and of the torque a motor gives."""
+"""Standard deviations of a pressure sensor's zero and gain, of the torque a motor gives, and of one wheel's radius beside
+the others (0.12 %, comma2k19; docs/decisions/0093)."""
 _THRESHOLD = "friction_brake_threshold_pressure_pa"
 _BALANCE = 0.3
 """Half width of what an axle's cornering stiffness may be off beside the other's, where nobody states the tyres'."""
@@ -210,10 +211,10 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
     )
     if is_number(numbers.get(_THRESHOLD)):
         nuisances = _as_one(nuisances, _THRESHOLD)
-    loose = {section for section in UNLIMITED if any(name.startswith(f"{section}_") for name in unlimited)}
-    if "motor" in unstated:
-        loose -= {"motor"}  # nothing is compared with what is asked of them
-    return replace(vehicle, nuisances=(*nuisances, *_by_wheel(loose)), unstated=tuple(unstated))
+    if unlimited:  # who states every limit has measured the rest as well
+        followed = [one for one in _LOOSE if one[0] != "iwm_gain" or "motor" not in unstated]
+        nuisances = (*nuisances, *_by_wheel(followed))
+    return replace(vehicle, nuisances=nuisances, unstated=tuple(unstated))
 
 
 def _as_one(nuisances: tuple[Nuisance, ...], name: str) -> tuple[Nuisance, ...]:
@@ -223,15 +224,11 @@ def _as_one(nuisances: tuple[Nuisance, ...], name: str) -> tuple[Nuisance, ...]:
     return tuple(both if one is front else one for one in nuisances if one is not rear)
 
 
-def _by_wheel(loose: Collection[str]) -> list[Nuisance]:
-    """What each brake and motor may be off by itself where nobody states all limits of hydraulics or motors.
-
-    Who states them has measured the rest as well.
-    """
+def _by_wheel(loose: Sequence[tuple[str, str, float]]) -> list[Nuisance]:
+    """What each brake, motor and tyre may be off by itself: effect, number and standard deviation."""
     return [
         Nuisance(f"{effect}_{wheel}", (THETA.slice(effect, number).start + k,), (step,), "sensor")
-        for section, effect, number, step in _LOOSE
-        if section in loose
+        for effect, number, step in loose
         for k, wheel in enumerate(("fl", "fr", "rl", "rr"))
     ]
 

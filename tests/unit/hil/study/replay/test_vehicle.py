@@ -150,12 +150,17 @@ MOTORS = {
 }  # fmt: skip
 
 
+BATTERY = {"battery_charge_power_w": 60e3, "battery_discharge_power_w": 80e3}
+PRESSURES = ("pressure_offset", "pressure_gain")
+
+
 @pytest.mark.parametrize(("told", "off"), [
-    ({}, ("pressure_offset", "pressure_gain")), (MOTORS, ("pressure_offset", "pressure_gain")),
-    ({"motor_time_constant_s": 0.02}, ("pressure_offset", "pressure_gain", "iwm_gain")), (HYDRAULICS | MOTORS, ()),
+    ({}, (*PRESSURES, "tyre_radius")), (MOTORS, (*PRESSURES, "iwm_gain", "tyre_radius")),
+    ({"motor_time_constant_s": 0.02}, (*PRESSURES, "iwm_gain", "tyre_radius")),
+    (HYDRAULICS | MOTORS, (*PRESSURES, "iwm_gain", "tyre_radius")), (HYDRAULICS | MOTORS | BATTERY, ()),
 ])  # fmt: skip
 def test_what_nobody_measured_whole_is_off_wheel_by_wheel(told, off):
-    """0.7 % of one pressure, 0.4 % of one motor were told as causes: no sensor is better."""
+    """0.7 % of one pressure, 0.4 % of one motor, 0.1 % of one radius were told as causes: no car is better."""
     car = load_vehicle({**SIX, **told})
     found = [n.name for n in car.nuisances if n.kind == "sensor"]
     assert found == [f"{effect}_{wheel}" for effect in off for wheel in ("fl", "fr", "rl", "rr")]
