@@ -26,8 +26,8 @@ _LOOSE = (
     ("pressure_offset", "offset_pa", 1.5e4), ("pressure_gain", "gain", 0.005), ("iwm_gain", "gain", 0.005),
     ("tyre_radius", "gain", 0.0012),
 )  # fmt: skip
-"""Standard deviations of a pressure sensor's zero and gain, of the torque a motor gives, and of one wheel's radius beside
-the others (0.12 %, comma2k19; docs/decisions/0093)."""
+"""Standard deviations of a pressure sensor's zero and gain, of the torque a motor gives, and of a wheel's radius beside
+the others' (0.12 %, comma2k19; docs/decisions/0093)."""
 _THRESHOLD = "friction_brake_threshold_pressure_pa"
 _BALANCE = 0.3
 """Half width of what an axle's cornering stiffness may be off beside the other's, where nobody states the tyres'."""
