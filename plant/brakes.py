@@ -57,7 +57,8 @@ def brakes(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, wheels: int)
         y[Y.friction_torque_nm + i] = torque
         y[Y.rate + X.windup_rad + i] = (held - x[X.windup_rad + i]) / windup_s
         y[Y.decay_1_s + X.windup_rad + i] = 0.0 if sticks else 1.0 / windup_s
-        y[Y.decay_1_s + X.wheel_speed_rad_s + i] = stiffness * windup_s / p[P.wheel_inertia_kg_m2] if sticks else 0.0
+        damped = stiffness * windup_s / per_axle(i, p, P.wheel_inertia_kg_m2)
+        y[Y.decay_1_s + X.wheel_speed_rad_s + i] = damped if sticks else 0.0
 
         power = force * radius * abs(omega)
         of_disc = p[P.pad_temperature_of_disc]

@@ -136,9 +136,10 @@ def contacts(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, cos_grade:
         gain_x = 1.0 / sliding_relaxation(relaxation_longitudinal(loaded, dfz, p), slip, 3.0 * held_x, least)
         gain_y = 1.0 / sliding_relaxation(relaxation_lateral(loaded, p), side_slip, 3.0 * held_y, least)
         y[Y.slip_gain_1_m + i] = gain_x
+        inertia = per_axle(i, p, P.wheel_inertia_kg_m2)
         standing = near_standstill(transport, p[P.tyre_low_speed_mps])
         bleeding, damping = BLEED_MPS * standing, p[P.tyre_low_speed_damping_ns_m] * standing
-        y[Y.standing_damping_1_s + i] = damping * radius * radius / p[P.wheel_inertia_kg_m2]
+        y[Y.standing_damping_1_s + i] = damping * radius * radius / inertia
         y[Y.rate + X.slip + i] = slip_rate(slip, sliding, transport, bleeding, gain_x, held_x)
         y[Y.rate + X.side_slip + i] = slip_rate(side_slip, across, transport, bleeding, gain_y, held_y)
         y[Y.decay_1_s + X.slip + i] = slip_decay(slip, transport, bleeding, gain_x, held_x)
@@ -164,7 +165,7 @@ def contacts(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, cos_grade:
         )  # fmt: skip
         rolling = at_wheel(load * radius * coefficient, y, J.wheel_rolling_torque, i)
         y[Y.rolling_torque_nm + i] = rolling
-        y[Y.rate + X.wheel_speed_rad_s + i] = (torque - radius * force - rolling) / p[P.wheel_inertia_kg_m2]
+        y[Y.rate + X.wheel_speed_rad_s + i] = (torque - radius * force - rolling) / inertia
         y[Y.rate + X.wheel_angle_rad + i] = omega
     for i in range(wheels):  # a loop of its own, or the one above goes through wheel by wheel
         y[Y.decay_1_s + X.wheel_speed_rad_s + i] += y[Y.standing_damping_1_s + i]

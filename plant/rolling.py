@@ -7,6 +7,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.brakes import per_axle
 from plant.compiled import EFFECTS, equation, section
 from plant.contact import rolling_radius
 from plant.effects.apply import extra_states_move
@@ -68,7 +69,7 @@ def rolling_step(
         trial[i] = x[i] + step_s * one * y[Y.rate + i]
     for i in range(wheels):
         radius = rolling_radius(i, p, y)
-        spun = -radius * y[Y.slip_stiffness_n + i] / p[P.wheel_inertia_kg_m2]
+        spun = -radius * y[Y.slip_stiffness_n + i] / per_axle(i, p, P.wheel_inertia_kg_m2)
         _begin(
             _WHEEL, X.slip, X.wheel_speed_rad_s, i, -step_s * y[Y.decay_1_s + X.slip + i],
             step_s * radius * y[Y.slip_gain_1_m + i], step_s * spun,

@@ -16,8 +16,8 @@ GRAVITY = 9.81
 
 
 def effective_mass_kg(car: PlantParameters) -> float:
-    """Mass with the rotating parts: m + 4 I / R^2."""
-    return car.vehicle.mass_kg + 4.0 * car.wheel.inertia_kg_m2 / car.wheel.rolling_radius_m**2
+    """Mass with the rotating parts: m + 2 (I_f + I_r) / R^2."""
+    return car.vehicle.mass_kg + 2.0 * sum(car.wheel.inertia_kg_m2) / car.wheel.rolling_radius_m**2
 
 
 def coast_down_mps(car: PlantParameters, speed_mps: float, time_s: Vector) -> Vector:

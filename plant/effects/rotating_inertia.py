@@ -13,6 +13,7 @@ L = slots(Scope.CAR, PARAMETERS)
 def static(q: Vector, k: int, y: Vector) -> None:
     """I' = I + dI."""
     q[P.wheel_inertia_kg_m2] += q[k + L.inertia_kg_m2]
+    q[P.wheel_inertia_kg_m2 + 1] += q[k + L.inertia_kg_m2]
 
 
 EFFECT = Effect(

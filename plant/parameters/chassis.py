@@ -43,6 +43,6 @@ class WheelParameters:
     """Wheel with tyre, motor rotor and disc."""
 
     rolling_radius_m: Annotated[float, "m", 0.1, 1.0]
-    inertia_kg_m2: Annotated[float, "kg m2", 0.05, 50.0]
+    inertia_kg_m2: Annotated[tuple[float, float], "kg m2", 0.05, 50.0]
     brake_windup_nm_rad: Annotated[float, "N m/rad", 1e3, 1e6]
     brake_windup_time_s: Annotated[float, "s", 1e-3, 0.1]

@@ -38,7 +38,7 @@ def nominal_braking(vehicle: Vehicle) -> Values:
     """The vehicle's own numbers in the model of `Braking`."""
     car, brake, p = vehicle.parameters.vehicle, vehicle.parameters.friction_brake, vehicle.p
     radius = vehicle.parameters.wheel.rolling_radius_m
-    turning = 4.0 * vehicle.parameters.wheel.inertia_kg_m2 / radius**2
+    turning = 2.0 * sum(vehicle.parameters.wheel.inertia_kg_m2) / radius**2
     mu = rest_friction(vehicle.parameters, float(p[P.friction_brake_ambient_k]))
     gains = [
         2.0 * mu * brake.efficiency * area * r

@@ -90,8 +90,9 @@ def listed(p: Floats, tolerance: Mapping[str, float], thermal: bool, layout: Lay
         "motor_fade_end_mps", "motor_fade_start_mps", "battery_charge_power_w", "sensor_imu_cutoff_hz",
         "tyre_lky", "vehicle_yaw_inertia_kg_m2", "vehicle_steering_ratio",
     ):  # fmt: skip
-        at = layout.slice(name).start
-        add(name, [at], [max(tolerance.get(name, 0.0), _FORM.get(name, 0.0) * float(p[at]))])
+        own = layout.slice(name)
+        half = max(tolerance.get(name, 0.0), _FORM.get(name, 0.0) * float(p[own].mean()))
+        add(name, list(range(own.start, own.stop)), [half] * layout.sizes[name])
     cog = layout.slice("vehicle_cog_to_axle_m").start
     add(
         "vehicle_cog_to_axle_m",

@@ -171,7 +171,7 @@ def test_long_steps_of_a_rolling_car_keep_its_swing(stop):
 
 def test_a_light_wheel_does_not_go_wild_where_a_rolling_car_begins_to_creep(paper_car):
     """10 ms at once, through 3 m/s: steps that damp the wheel at speed let it grow below."""
-    light = replace(paper_car, wheel=replace(paper_car.wheel, inertia_kg_m2=0.35))
+    light = replace(paper_car, wheel=replace(paper_car.wheel, inertia_kg_m2=(0.35, 0.35)))
     inputs = np.zeros((150, INPUT.size))
     inputs[:, INPUT.slice("motor_torque_nm")] = -60.0
     cut = CUT.zeros()
