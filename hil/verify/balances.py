@@ -35,10 +35,14 @@ def topic() -> Topic:
     )
     run = drive(table, 30.0, COLUMNS, method=RUNGE_KUTTA_4)
     moving = run["speed_mps"] > 1.0
-    mass, inertia, yaw_inertia = car.vehicle.mass_kg, car.wheel.inertia_kg_m2, car.vehicle.yaw_inertia_kg_m2
+    mass, inertia, yaw_inertia = (
+        car.vehicle.mass_kg,
+        np.repeat(car.wheel.inertia_kg_m2, 2),
+        car.vehicle.yaw_inertia_kg_m2,
+    )
     omega = run.four("wheel_speed_rad_s")
     kinetic = 0.5 * mass * (run["speed_mps"] ** 2 + run["lateral_speed_mps"] ** 2)
-    kinetic += 0.5 * yaw_inertia * run["yaw_rate_rad_s"] ** 2 + 0.5 * inertia * (omega**2).sum(axis=1)
+    kinetic += 0.5 * yaw_inertia * run["yaw_rate_rad_s"] ** 2 + 0.5 * (inertia * omega**2).sum(axis=1)
     sinks = {
         "friction brakes": _integral(-(run.four("friction_torque_nm") * omega).sum(axis=1)),
         "motors": _integral(-(run.four("motor_torque_nm") * omega).sum(axis=1)),

@@ -10,6 +10,7 @@ from hil.study.consistency.kalman import Linear, innovations
 from hil.study.consistency.model import Model, Number
 from hil.study.consistency.motion import Motion
 from hil.study.logs.table import Floats
+from plant.vehicle import GRAVITY_MPS2
 
 NOISE: Final[Mapping[str, Number]] = {
     "speed_mps": Number(0.02, 1e-4, 1.0, 0.3, True, 2.0),
@@ -40,6 +41,9 @@ SENSOR: Final[Mapping[str, Number]] = {
 }
 """What the accelerometer may do: ax' = (1 + gain) lowpass(a + g slope) + bias + ..., ``delay_s`` after its stamp."""
 
+SLIP = "slip_s2_m"
+"""Slip of the wheels per specific force, s2/m: of a speed v they tell v (1 + slip f). Nobody is accused of it."""
+_MOST_SLIP = 0.03
 _UNKNOWN = 1e4
 _SPEED, _ACCEL, _SLOPE, _FELT, _LAST, _BODY, _PULL = range(7)
 
@@ -66,7 +70,8 @@ class Along(Model):
     noise = NOISE
     channel = "ax_mps2"
 
-    def __init__(self, motion: Motion) -> None:
+    def __init__(self, motion: Motion, slip: Number | None = None) -> None:
+        """``slip`` is what is known of `SLIP` before; None where the speed is that over ground."""
         self.motion = motion
         rows = motion.moving > 0.5
         ay = motion.channels.get("ay_mps2")
@@ -79,6 +84,7 @@ class Along(Model):
             self._added["ahead_m"] = -(turn**2)
             self._added["beside_m"] = -np.gradient(turn, motion.cell_s) * (motion.fresh < 0.5)
         self.numbers = {n: v for n, v in SENSOR.items() if n in {"gain", "filter_s", "delay_s", *self._added}}
+        self.numbers |= {SLIP: slip} if slip else {}
         self.resolution = {"delay_s": 0.5 * motion.cell_s}
         edges = round(SENSOR["delay_s"].high / motion.cell_s) + 1  # the same cells whatever the delay
         inside = 1.0 - np.minimum(np.convolve(_ends(motion), np.ones(2 * edges + 1), "same"), 1.0)
@@ -108,9 +114,10 @@ class Along(Model):
         start[_ACCEL, _PULL] = start[_PULL, _ACCEL] = sizes[0] ** 2
         start[_LAST, [_FELT, _LAST]] = start[_FELT, _LAST] = felt
         gain, (_, share) = 1.0 + sensor.get("gain", 0.0), self._shift(sensor)
-        observe = np.zeros((2, 7))
-        observe[0, _SPEED] = 1.0
-        observe[1, [_FELT, _LAST, _BODY]] = gain * (1.0 - share), gain * share, 1.0
+        observe = np.zeros((len(self.motion.speed_mps), 2, 7))
+        observe[:, 0, _SPEED] = 1.0
+        observe[:, 0, [_ACCEL, _SLOPE]] = sensor.get(SLIP, 0.0) * self.motion.speed_mps[:, None]
+        observe[:, 1, [_FELT, _LAST, _BODY]] = gain * (1.0 - share), gain * share, 1.0
         white = np.array([noise["speed_mps"] ** 2, noise["ax_mps2"] ** 2])
         return Linear(now, into @ driven @ into.T, start, observe, white)
 
@@ -139,7 +146,8 @@ class Along(Model):
         """The accelerometer as the wheels' motion alone foretells it; flat road."""
         motion = self.motion
         phi, old, new = lag(sensor.get("filter_s", 0.0), motion.cell_s)
-        force = motion.accel_mps2
+        slipped = sensor.get(SLIP, 0.0) * motion.speed_mps * motion.accel_mps2
+        force = motion.accel_mps2 - np.gradient(slipped, motion.cell_s) * _inside(motion)
         found = np.empty_like(force)
         now = 0.0
         for k, u in enumerate(force):
@@ -152,6 +160,20 @@ class Along(Model):
             rows = motion.log == k
             found[rows] = np.interp(motion.t_s[rows] - late, motion.t_s[rows], found[rows])
         return found
+
+
+def known_slip(stiffness: float, share: float) -> Number:
+    """What is known of `SLIP` of tyres that give ``stiffness`` times the load per slip, known to a ``share`` of it.
+
+    Slip in proportion to the force (effects 14); all wheels pull or brake as they are loaded.
+    """
+    usual = 1.0 / (GRAVITY_MPS2 * stiffness)
+    return Number(usual, 0.0, _MOST_SLIP, 0.1 * usual, prior=share * usual)
+
+
+def _inside(motion: Motion) -> Floats:
+    """0 in the first and the last cell of every log."""
+    return 1.0 - _ends(motion)
 
 
 def _ends(motion: Motion) -> Floats:

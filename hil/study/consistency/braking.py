@@ -46,13 +46,15 @@ class Braking(Model):
 
     noise = _NOISE
 
-    def __init__(self, motion: Motion) -> None:
+    def __init__(self, motion: Motion, slip_s2_m: float = 0.0) -> None:
+        """``slip_s2_m`` is how far the wheels slip per acceleration (`hil.study.consistency.along.SLIP`)."""
         self.motion = motion
         self.demanded = not motion.has("pressure")
         pressure = motion.channels["pressure_demand" if self.demanded else "pressure"]
         self.offset_pa, self.offset_sigma_pa = _zero(motion, pressure)
         self.pressure = np.nan_to_num(pressure - self.offset_pa)
-        self.speed = motion.channels["speed_mps"] if motion.has("speed_mps") else motion.speed_mps
+        rolled = motion.speed_mps * (1.0 - slip_s2_m * motion.accel_mps2)
+        self.speed = motion.channels["speed_mps"] if motion.has("speed_mps") else rolled
         self.throttle = np.nan_to_num(motion.channels["throttle"]) if motion.has("throttle") else None
         self._known = (np.isfinite(self.speed) * motion.moving)[:, None]
         without = () if self.throttle is not None else ("drive_mps2", "drive_delay_s", "engine_mps2")

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hil.study.consistency.along import Along
+import numpy as np
+
+from hil.study.consistency.along import SLIP, Along, known_slip
 from hil.study.consistency.braking import LEAST_STOPS, Braking
 from hil.study.consistency.limits import missing, needs
 from hil.study.consistency.memory import load_numbers, write_numbers
@@ -21,6 +23,7 @@ from hil.study.replay.vehicle import Vehicle
 from plant.effects.theta import THETA
 
 _ROLL = 0.15  # the body rolls, and its accelerometer with it (effects, 56)
+_DIVE = 0.02  # its nose goes down by 1 to 1.5 deg/g, and the accelerometer with it (effects, 8)
 _TRACK = 0.03
 _PULLED_MPS2, _PULLED_S = 0.7, 5.0
 _NO_ROAD = 0.02
@@ -112,10 +115,14 @@ def check(
 def _models(motion: Motion, vehicle: Vehicle, handed: Mapping[str, Mapping[str, float]], say: Say) -> dict[str, Found]:
     found: dict[str, Found] = {}
     radius = relative_sigma(vehicle, "wheel_rolling_radius_m")
-    if motion.has("ax_mps2"):
-        tolerance = {"gain": 0.0 if motion.has("speed_mps") else radius}
-        found["along"] = search(Along(motion), motion.block, handed.get("along", {}), tolerance, say)
     wheels = motion.has(*(f"wheel_{w}" for w in ("fl", "fr", "rl", "rr")))
+    tyre = vehicle.parameters.tyre
+    slip = known_slip(tyre.lkx * tyre.pkx1, relative_sigma(vehicle, "tyre_lkx"))
+    if motion.has("ax_mps2"):
+        tolerance = {"gain": float(np.hypot(_DIVE, 0.0 if motion.has("speed_mps") else radius))}
+        along = Along(motion, slip if wheels else None)
+        known = handed.get("along", {})
+        found["along"] = search(along, motion.block, known, tolerance, say, always=[SLIP] if wheels else ())
     track = dict(zip("fr", vehicle.parameters.vehicle.track_m, strict=True))
     turn: Floats | None = motion.channels.get("yaw_rate_rad_s")
     if wheels and (turn is not None or motion.has("ay_mps2")):
@@ -130,7 +137,8 @@ def _models(motion: Motion, vehicle: Vehicle, handed: Mapping[str, Mapping[str, 
         say("wheel against wheel")
         found["wheels"] = _wheel_scales(motion, track, turn, handed.get("wheels", {}), say)
     if motion.has("pressure") or motion.has("pressure_demand"):
-        braking = Braking(motion)
+        known = found["along"].numbers if "along" in found else {}
+        braking = Braking(motion, known.get(SLIP, slip.usual) if wheels else 0.0)
         if len(braking.stops) >= LEAST_STOPS:
             say(f"{len(braking.stops)} stops: pressure against deceleration")
             nominal = nominal_braking(vehicle) | dict(handed.get("braking", {}))

@@ -57,7 +57,7 @@ def fit(
         moved, noisy = split(z)
         _, score = model.score({**fixed, **moved}, noisy)
         total = float(score.sum() if weights is None else score @ weights)
-        value = -2.0 * total + _prior(model, noisy)
+        value = -2.0 * total + _prior(model, moved, noisy)
         return value if np.isfinite(value) else 1e12
 
     start = {**noise, **sensor}
@@ -83,9 +83,11 @@ def _value(number: Number, z: float) -> float:
     return float(np.exp(z * number.step)) if number.log else float(z * number.step)
 
 
-def _prior(model: Model, noise: Mapping[str, float]) -> float:
+def _prior(model: Model, sensor: Mapping[str, float], noise: Mapping[str, float]) -> float:
     """Weak knowledge of noise keeps what the data do not show where roads and cars have it."""
-    return sum((float(np.log(noise[n] / number.usual)) / number.prior) ** 2 for n, number in model.noise.items())
+    of_noise = sum((float(np.log(noise[n] / number.usual)) / number.prior) ** 2 for n, number in model.noise.items())
+    known = [(value, model.numbers[n]) for n, value in sensor.items() if model.numbers[n].prior > 0.0]
+    return of_noise + sum(((value - number.usual) / number.prior) ** 2 for value, number in known)
 
 
 def deviations(model: Model, found: Fit, block: Floats, fixed: Mapping[str, float] = NOTHING) -> Values:
@@ -103,9 +105,9 @@ def deviations(model: Model, found: Fit, block: Floats, fixed: Mapping[str, floa
 
     def by_block(at: Floats) -> Floats:
         values = {n: _value(number, v) for n, number, v in zip(names, numbers, at, strict=True)}
-        noise = found.noise | {n: values[n] for n in inside}
-        _, score = model.score({**fixed, **{n: values[n] for n in found.sensor}}, noise)
-        return np.bincount(block, score, count) - 0.5 * _prior(model, noise) / count
+        noise, sensor = found.noise | {n: values[n] for n in inside}, {n: values[n] for n in found.sensor}
+        _, score = model.score({**fixed, **sensor}, noise)
+        return np.bincount(block, score, count) - 0.5 * _prior(model, sensor, noise) / count
 
     size, step = len(z), 0.02
     up = [by_block(z + step * e) for e in np.eye(size)]

@@ -12,7 +12,8 @@ from hil.study.logs.table import Floats
 class Number:
     """One number of the model: usual value, where it may lie, and the step on which it changes something.
 
-    ``log`` numbers are positive and searched in their logarithm; ``prior`` is the standard deviation of that logarithm.
+    ``log`` numbers are positive and searched in their logarithm; ``prior`` is the standard deviation of that logarithm,
+    or of the number itself about its usual value, 0 where nothing is known.
     """
 
     usual: float
@@ -24,7 +25,10 @@ class Number:
 
 
 class Model(ABC):
-    """What can be fitted: ``numbers`` are 0 where nothing is wrong; ``resolution`` is what the cells leave of some."""
+    """What can be fitted: ``numbers`` are as usual, mostly 0, where nothing is wrong.
+
+    ``resolution`` is what the cells leave of some.
+    """
 
     noise: Mapping[str, Number]
     numbers: Mapping[str, Number]

@@ -78,7 +78,7 @@ def search(
     handed : numbers as handed in; the others are 0.  tolerance : see `Found`.
     always : numbers that nobody knows and that are no cause.
     """
-    start = fit(model, dict.fromkeys(always, 0.0), usual(model), fixed=handed)
+    start = fit(model, {n: model.numbers[n].usual for n in always}, usual(model), fixed=handed)
     found = Found(model, dict(handed), start, start, block, {}, tolerance)
     names = [n for n in (candidates or model.numbers) if n not in always]
     while len(found.steps) < most:
