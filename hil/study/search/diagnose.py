@@ -25,10 +25,9 @@ from hil.study.search.contest import (
     instead,
     odds,
     refitted,
-    worth,
 )
 from hil.study.search.diagnosis import Diagnosis, Say, Settings, causes_in
-from hil.study.search.doubt import backward, stands_beside, with_gain
+from hil.study.search.doubt import backward, beyond_doubt, stands_beside, with_gain
 from hil.study.search.field import Field, number_of
 from hil.study.search.handed_in import Refitted, from_handed_in
 from hil.study.search.leading import fitted_leaders, together
@@ -202,7 +201,7 @@ class _Search:
             tighter = listed.noise
             reference = min(reference, self.fitter.fit(model, tighter, 3).cost)
         fitted = gained() if fitted else []
-        clear = sorted((c for c in fitted if c.gained >= found.least_gain and worth(c) > 0.0), key=odds)
+        clear = sorted((c for c in fitted if beyond_doubt(c, found.least_gain, self.fitter, self.told)), key=odds)
         now = Round(contest, model, tighter, reference, listed, bool(clear), left, error, self._bent(model))
         law = self.unlisted.best(found, now)
         if law is not None:

@@ -11,7 +11,7 @@ from hil.study.fitting.own_error import shared_out, variance_of
 from hil.study.fitting.same_number import restated
 from hil.study.logs.table import Floats
 from hil.study.search.basis import Piece
-from hil.study.search.contest import Contender, odds
+from hil.study.search.contest import Contender, at_its_end, odds, worth
 from hil.study.search.diagnosis import TIED, Diagnosis, Say, causes_in
 from hil.study.search.intervals import deviations
 from hil.study.search.screen import threshold
@@ -47,6 +47,15 @@ def with_gain(contender: Contender, reference: float, error: float) -> Contender
     """With its gain against ``reference``, shared out over the model's own error and that here, less its price."""
     gained = (reference - contender.cost) / variance_of(contender.term.candidate)
     return replace(contender, gained=gained / error - contender.price, error=error)
+
+
+def beyond_doubt(contender: Contender, least: float, fitter: Fitter, told: float) -> bool:
+    """Whether a cause gains the ``least`` that is asked and is likelier than none.
+
+    As far off as it may be it explains more than it can be: in a car of another form that is the form.
+    """
+    ended = at_its_end(contender.term) and form_differs(strained(fitter, contender.model.z, told))
+    return contender.gained >= least and worth(contender) > 0.0 and not ended
 
 
 def stands_beside(
