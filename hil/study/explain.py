@@ -57,6 +57,7 @@ def explain(
     if why:
         return check(read, car, why, extend, out, say or (lambda _: None))
     car = car.held_straight() if kept_straight(read) else car
+    car = car.asked(read)
     case = prepare(read, float(car.parameters.wheel.rolling_radius_m), car.unstated)
     handed_in = nominal(car)
     base = handed_in if extend is None else load_extension(Path(extend)).applied(handed_in)

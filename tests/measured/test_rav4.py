@@ -51,9 +51,11 @@ def test_the_accelerometers_read_the_wrong_way_round(answer):
     assert answer["verdict"] == "named"
 
 
-def test_the_accelerometer_is_slow_and_the_gyro_has_a_zero(answer):
-    slow = _cause(answer, "imu_filter", "ax_mps2")["parameters"]["time_s"]
-    assert 0.02 < slow["ci95"][0] < slow["ci95"][1] < 0.2
+def test_the_wheels_slip_and_the_gyro_has_a_zero(answer):
+    """Slip of tyres as any, which leads the car by 0.05 to 0.1 s, was told as a filter of the accelerometer."""
+    assert not [c for c in answer["causes"] if c["effect"] in ("imu_filter", "timestamp_offset")]
+    (said,) = [text for text in answer["remarks"] if "wheels slip" in text]
+    assert 0.002 < float(said.split()[4]) < 0.008
     zero = _cause(answer, "imu_bias", "yaw_rate_rad_s")["parameters"]["yaw_rate_rad_s"]
     assert zero["ci95"][1] < -0.002
 
@@ -78,7 +80,6 @@ def test_with_what_was_taught_nothing_is_left(log, answer):
 @pytest.mark.parametrize(
     ("table", "number", "effect", "channel"),
     [
-        ("along", "filter_s", "imu_filter", "ax_mps2"),
         ("along", "gain", "wrong_scale", "ax_mps2"),
         ("turning", "yaw_bias_rad_s", "imu_bias", "yaw_rate_rad_s"),
     ],

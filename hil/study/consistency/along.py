@@ -8,7 +8,7 @@ import numpy as np
 
 from hil.study.consistency.kalman import Linear, innovations
 from hil.study.consistency.model import Model, Number
-from hil.study.consistency.motion import Motion
+from hil.study.consistency.motion import Motion, slope_of
 from hil.study.logs.table import Floats
 from plant.vehicle import GRAVITY_MPS2
 
@@ -147,7 +147,7 @@ class Along(Model):
         motion = self.motion
         phi, old, new = lag(sensor.get("filter_s", 0.0), motion.cell_s)
         slipped = sensor.get(SLIP, 0.0) * motion.speed_mps * motion.accel_mps2
-        force = motion.accel_mps2 - np.gradient(slipped, motion.cell_s) * _inside(motion)
+        force = motion.accel_mps2 - slope_of(slipped, motion.log, motion.cell_s)
         found = np.empty_like(force)
         now = 0.0
         for k, u in enumerate(force):
@@ -169,11 +169,6 @@ def known_slip(stiffness: float, share: float) -> Number:
     """
     usual = 1.0 / (GRAVITY_MPS2 * stiffness)
     return Number(usual, 0.0, _MOST_SLIP, 0.1 * usual, prior=share * usual)
-
-
-def _inside(motion: Motion) -> Floats:
-    """0 in the first and the last cell of every log."""
-    return 1.0 - _ends(motion)
 
 
 def _ends(motion: Motion) -> Floats:

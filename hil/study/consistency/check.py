@@ -26,7 +26,7 @@ _ROLL = 0.15  # the body rolls, and its accelerometer with it (effects, 56)
 _DIVE = 0.02  # its nose goes down by 1 to 1.5 deg/g, and the accelerometer with it (effects, 8)
 _TRACK = 0.03
 _PULLED_MPS2, _PULLED_S = 0.7, 5.0
-_NO_ROAD = 0.02
+_NO_ROAD = 0.03
 """Slope, m/s2, below which an accelerometer feels no road: roads are 1 to 3 % (effects, 1), 0.1 m/s2 and more."""
 _DEAD = -0.5
 """Scale, of 1, off by which a channel would not show a road it felt."""
@@ -119,7 +119,10 @@ def _models(motion: Motion, vehicle: Vehicle, handed: Mapping[str, Mapping[str, 
     tyre = vehicle.parameters.tyre
     slip = known_slip(tyre.lkx * tyre.pkx1, relative_sigma(vehicle, "tyre_lkx"))
     if motion.has("ax_mps2"):
-        tolerance = {"gain": float(np.hypot(_DIVE, 0.0 if motion.has("speed_mps") else radius))}
+        tolerance = {
+            "gain": float(np.hypot(_DIVE, 0.0 if motion.has("speed_mps") else radius)),
+            "filter_s": 1.0 / (2.0 * np.pi * vehicle.parameters.sensor.imu_cutoff_hz),
+        }
         along = Along(motion, slip if wheels else None)
         known = handed.get("along", {})
         found["along"] = search(along, motion.block, known, tolerance, say, always=[SLIP] if wheels else ())
@@ -163,10 +166,12 @@ def _remarks(models: Mapping[str, Found], causes: Sequence[Cause]) -> list[str]:
         if not limit.low <= c.names[0].factor * c.value <= limit.high:
             said.append(f"{c.names[0].effect}: larger than any sensor's ({limit.low:g} to {limit.high:g} {limit.unit})")
     along = models.get("along")
+    if along is not None and SLIP in along.numbers:
+        said.append(f"the wheels slip by {along.numbers[SLIP]:.4f} s2/m of the specific force: the tyres, no cause")
     if along is not None and along.final.noise["slope_mps2"] < _NO_ROAD and along.numbers.get("gain", 0.0) > _DEAD:
         said.append(
             f"ax_mps2 feels no road: a slope of {along.final.noise['slope_mps2']:.3f} m/s2 at most goes with it. "
-            "An accelerometer feels gravity; this channel is computed from the speed"
+            "An accelerometer feels gravity: unless the road was flat, this channel is computed from the speed"
         )
     turning = models.get("turning")
     if turning is not None and isinstance(turning.model, Turning):

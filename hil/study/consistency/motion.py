@@ -82,7 +82,7 @@ def motion_of(logs: Sequence[Log], radius_m: float) -> Motion:
     fresh = np.concatenate([np.eye(1, len(t))[0] for t, _ in parts])
     wheels = [channels[f"wheel_{w}"] for w in ("fl", "fr", "rl", "rr") if f"wheel_{w}" in channels]
     speed = _filled(np.median(wheels, axis=0) if wheels else channels["speed_mps"])
-    accel = np.concatenate([_slope(speed[number == k], cell) for k in range(len(logs))])
+    accel = slope_of(speed, number, cell)
     near = round(0.5 / cell)
     slow = np.convolve(speed < SLOW_MPS, np.ones(2 * near + 1), mode="same") > 0.5
     if (~slow).sum() * cell < 4.0:
@@ -117,6 +117,11 @@ def _mean(values: Floats, at: Floats, count: int) -> Floats:
 def _filled(values: Floats) -> Floats:
     good = np.isfinite(values)
     return np.interp(np.arange(len(values)), np.flatnonzero(good), values[good])
+
+
+def slope_of(speed: Floats, log: Floats, cell: float) -> Floats:
+    """Slope of every log's speed."""
+    return np.concatenate([_slope(speed[log == k], cell) for k in range(int(log.max()) + 1)])
 
 
 def _slope(speed: Floats, cell: float) -> Floats:

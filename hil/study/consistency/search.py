@@ -17,7 +17,8 @@ _WORTH_A_FIT = 0.5
 """Share of that from which a number that was tried for a few rounds is fitted to the end: it may gain more then."""
 ALPHA = 0.003
 _STARTS: Mapping[str, Sequence[float]] = {
-    "gain": (0.0, -0.5, 0.5, -2.0), "filter_s": (0.02, 0.1, 0.5, 2.0), "delay_s": (0.02, -0.02, 0.15, -0.15),
+    "gain": (0.0, -0.5, 0.5, -2.0), "filter_s": (0.02, 0.1, 0.5, 2.0),
+    "delay_s": (0.02, -0.02, 0.1, -0.1, 0.2, -0.2, 0.35, -0.35),
     "yaw_gain": (0.0, -2.0), "ay_gain": (0.0, -2.0),
 }  # fmt: skip
 Say = Callable[[str], None]
@@ -111,10 +112,14 @@ def _with(found: Found, number: str) -> Fit:
 
 
 def _take(found: Found, tried: Mapping[str, Fit]) -> tuple[Step, Fit, Values] | None:
-    for number in sorted(tried, key=lambda n: tried[n].cost):
-        if found.final.cost - tried[number].cost < _WORTH_A_FIT * ASKED:
-            return None
-        better = fit(found.model, tried[number].sensor, tried[number].noise, fixed=found.handed)
+    worth = [n for n in tried if found.final.cost - tried[n].cost >= _WORTH_A_FIT * ASKED]
+    most = min((tried[n].cost for n in worth), default=0.0)
+    near = [n for n in worth if tried[n].cost < most + ASKED]  # a few rounds more may change which is first
+    with ThreadPoolExecutor(WORKERS) as pool:
+        ended = pool.map(lambda n: fit(found.model, tried[n].sensor, tried[n].noise, fixed=found.handed), near)
+    fitted = dict(zip(near, ended, strict=True))
+    for number in sorted(worth, key=lambda n: fitted[n].cost if n in fitted else tried[n].cost):
+        better = fitted.get(number) or fit(found.model, tried[number].sensor, tried[number].noise, fixed=found.handed)
         if found.final.cost - better.cost < ASKED:
             continue
         deviation = deviations(found.model, better, found.block, found.handed)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hil.parameters import ParameterError, is_number, load_set, override
-from hil.study.logs.table import Floats, UnusableError
+from hil.study.logs.table import MOTOR_DEMAND, Floats, Log, UnusableError
 from hil.study.replay.nuisances import BRAKE_K, CONSTANT_EPSILON_W, Nuisance, guessed, listed
 from hil.study.replay.vehicle_keys import ALIASES, DERIVED, OF_SECTION, SPECIAL, UNLIMITED, WIDE
 from plant.effects.theta import THETA
@@ -59,6 +59,7 @@ class Vehicle:
     pad_temperature_matters : False where the brake has one gain and no friction model.
     remarks : unknown keys and defaults taken, for the report.
     unstated : sections that the set says nothing of (keys of `hil.study.replay.vehicle_keys.OF_SECTION`).
+    unlimited : limits that it does not state, which do not act.
     straight : whether it is held on its line.
     """
 
@@ -68,6 +69,7 @@ class Vehicle:
     pad_temperature_matters: bool
     remarks: tuple[str, ...] = ()
     unstated: tuple[str, ...] = ()
+    unlimited: tuple[str, ...] = ()
     straight: bool = False
 
     @property
@@ -75,6 +77,21 @@ class Vehicle:
         """Effects on sections that are not stated, or on a steering that holds against them: none can be told."""
         unstated = tuple(effect for section in self.unstated for effect in OF_SECTION[section])
         return (*unstated, *_OF_STEERING) if self.straight else unstated
+
+    def asked(self, logs: Sequence[Log]) -> "Vehicle":
+        """The same car, its motors no stronger than what is asked of them in the logs, if the set does not say.
+
+        Fading takes a share of what a motor can, which is of nothing known where that is not.
+        """
+        demands = [log.channels[name] for log in logs for name in MOTOR_DEMAND if name in log.channels]
+        most = max((float(np.nanmax(np.abs(values), initial=0.0)) for values in demands), default=0.0)
+        if "motor_peak_torque_nm" not in self.unlimited or most == 0.0:
+            return self
+        motor = replace(self.parameters.motor, peak_torque_nm=most)
+        parameters = replace(self.parameters, motor=motor)
+        p = self.p.copy()
+        p[P.motor_peak_torque_nm] = most
+        return replace(self, parameters=parameters, p=p)
 
     def held_straight(self) -> "Vehicle":
         """The same car kept on its line by a driver who is not seen: without lateral motion, whatever pulls."""
@@ -214,7 +231,7 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
     if unlimited:  # who states every limit has measured the rest as well
         followed = [one for one in _LOOSE if one[0] != "iwm_gain" or "motor" not in unstated]
         nuisances = (*nuisances, *_by_wheel(followed))
-    return replace(vehicle, nuisances=nuisances, unstated=tuple(unstated))
+    return replace(vehicle, nuisances=nuisances, unstated=tuple(unstated), unlimited=tuple(unlimited))
 
 
 def _as_one(nuisances: tuple[Nuisance, ...], name: str) -> tuple[Nuisance, ...]:

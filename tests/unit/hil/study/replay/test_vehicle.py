@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from hil.study.logs.table import UnusableError
+from hil.study.logs.table import MOTOR_DEMAND, Log, UnusableError, make_log
 from hil.study.replay.nuisances import HALF_WIDTH_TO_SIGMA
 from hil.study.replay.vehicle import Vehicle, load_vehicle, paper_car, rest_friction
+from plant.vectors import P
 
 SIX = {
     "mass_kg": 1800.0,
@@ -174,3 +175,18 @@ def test_what_nobody_measured_whole_is_off_wheel_by_wheel(told, off):
     car = load_vehicle({**SIX, **told})
     found = [n.name for n in car.nuisances if n.kind == "sensor"]
     assert found == [f"{effect}_{wheel}" for effect in off for wheel in ("fl", "fr", "rl", "rr")]
+
+
+def _asks(torque_nm: float) -> Log:
+    t_s = 0.01 * np.arange(300)
+    return make_log("a.csv", t_s, {name: np.where(t_s > 1.0, torque_nm, np.nan) for name in MOTOR_DEMAND})
+
+
+def test_motors_of_unknown_strength_are_as_strong_as_they_are_asked() -> None:
+    """A fading that begins 3 m/s early did nothing to 315 N m: motors could do 5 kN m where nobody stated what."""
+    car = load_vehicle({**SIX, "motor_fade_start_mps": 3.2, "motor_fade_end_mps": 0.9})
+    told = car.asked([_asks(-315.0), _asks(120.0)])
+    assert told.parameters.motor.peak_torque_nm == told.p[P.motor_peak_torque_nm] == 315.0
+    assert car.asked([]) is car
+    stated = load_vehicle({**SIX, "motor_peak_torque_nm": 400.0})
+    assert stated.asked([_asks(-315.0)]) is stated
