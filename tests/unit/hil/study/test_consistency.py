@@ -99,16 +99,16 @@ def test_a_car_that_stands_is_unusable():
 
 
 def test_slip_of_the_tyres_is_no_filter_of_the_accelerometer():
-    """Wheels slip in proportion to the force, as the car slows: they lead it by 0.1 s at 25 m/s."""
+    """Wheels slip in proportion to the force: those of soft tyres lead the car by 0.2 s at 20 m/s."""
     made = _log(5)
     accel = np.gradient(made.channels[WHEEL_SPEED[0]] * RADIUS_M, STEP_S)
     smooth = np.convolve(accel, np.ones(15) / 15, mode="same")
-    slip = 0.0046
+    slip = 0.01
     channels = {n: v * (1.0 + slip * smooth) if n in WHEEL_SPEED else v for n, v in made.channels.items()}
     motion = motion_of([make_log("made", made.t_s, channels)], RADIUS_M)
     blind = search(Along(motion), motion.block, {}, {}, lambda _: None)
     assert {step.number for step in blind.steps} & {"filter_s", "delay_s"}
-    model = Along(motion, known_slip(20.0, 0.2))
+    model = Along(motion, known_slip(10.0, 0.2))
     found = search(model, motion.block, {}, {}, lambda _: None, always=[SLIP])
     assert found.steps == []
     assert found.numbers[SLIP] == pytest.approx(slip, rel=0.3)
