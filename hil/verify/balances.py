@@ -92,7 +92,7 @@ def topic() -> Topic:
         ),
         below(
             "Spin missing",
-            100.0 * float(inertia * (omega[last] - omega[0]).sum() - spin[last]) / float(inertia * omega[0].sum()),
+            100.0 * float((inertia * (omega[last] - omega[0])).sum() - spin[last]) / float((inertia * omega[0]).sum()),
             0.3, "%", "of the wheels' at the start",
         ),
         below("Weight on the wheels", 100.0 * float(weight / (mass * 9.81) - 1.0), 0.01, "%", "at the start"),
