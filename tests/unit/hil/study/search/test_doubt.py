@@ -17,7 +17,7 @@ from hil.study.replay.vehicle import load_vehicle
 from hil.study.replay.world import nominal
 from hil.study.search.contest import Contender, odds, refitted
 from hil.study.search.diagnosis import Diagnosis
-from hil.study.search.doubt import backward, erring, with_gain
+from hil.study.search.doubt import backward, beyond_doubt, erring, with_gain
 
 DEVIATIONS = {"wheel": 0.02, "ax": 0.02, "gps": 0.03, "pressure": 1e4, "motor": 0.5}
 
@@ -78,3 +78,16 @@ def test_a_chosen_beginning_is_paid_in_the_odds_and_in_the_gain():
     always, later = (with_gain(c, one.cost + 100.0, 2.0) for c in (one, begun))
     assert always.gained - later.gained == pytest.approx(13.0)
     assert always.error == 2.0
+
+
+def test_a_cause_at_its_end_is_none_in_a_car_of_another_form():
+    """Hubs as soft as they may be were told of a car with nothing hidden, whose tyres slip by another law."""
+    found = _accepted(12.0)
+    ((one,),) = found.contenders
+    one = replace(one, gained=100.0)
+    ended = replace(one, term=replace(one.term, value=one.term.candidate.parameter.high))
+    bent = replace(one.model, z=np.full_like(one.model.z, 5.0))
+    assert beyond_doubt(ended, 20.0, found.fitter, 20.0)
+    assert beyond_doubt(replace(one, model=bent), 20.0, found.fitter, 20.0)
+    assert not beyond_doubt(replace(ended, model=bent), 20.0, found.fitter, 20.0)
+    assert not beyond_doubt(replace(one, gained=19.0), 20.0, found.fitter, 20.0)
