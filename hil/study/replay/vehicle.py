@@ -23,7 +23,7 @@ from plant.vectors import PARAMETER, P
 _CONSTANT_B_1_J = 2e-6
 _STATED = 0.01
 _LOOSE = (
-    ("pressure_offset", "offset_pa", 1e4), ("pressure_gain", "gain", 0.005), ("iwm_gain", "gain", 0.005),
+    ("pressure_offset", "offset_pa", 7e3), ("pressure_gain", "gain", 0.005), ("iwm_gain", "gain", 0.005),
     ("tyre_radius", "gain", 0.0012),
 )  # fmt: skip
 """Standard deviations of a pressure sensor's zero and gain, of the torque a motor gives, and of a wheel's radius beside
