@@ -43,7 +43,8 @@ SENSOR: Final[Mapping[str, Number]] = {
 
 SLIP = "slip_s2_m"
 """Slip of the wheels per specific force, s2/m: of a speed v they tell v (1 + slip f). Nobody is accused of it."""
-_MOST_SLIP = 0.03
+_MOST_SLIP, _LEAST_SHARE = 0.03, 0.01
+"""Most slip that is looked for; and how well a stiffness is known at best: a share of none would be no knowledge."""
 _UNKNOWN = 1e4
 _SPEED, _ACCEL, _SLOPE, _FELT, _LAST, _BODY, _PULL = range(7)
 
@@ -165,10 +166,10 @@ class Along(Model):
 def known_slip(stiffness: float, share: float) -> Number:
     """What is known of `SLIP` of tyres that give ``stiffness`` times the load per slip, known to a ``share`` of it.
 
-    Slip in proportion to the force (effects 14); all wheels pull or brake as they are loaded.
+    Slip in proportion to the force (effects 16); all wheels pull or brake as they are loaded.
     """
     usual = 1.0 / (GRAVITY_MPS2 * stiffness)
-    return Number(usual, 0.0, _MOST_SLIP, 0.1 * usual, prior=share * usual)
+    return Number(usual, 0.0, _MOST_SLIP, 0.1 * usual, prior=max(share, _LEAST_SHARE) * usual)
 
 
 def _ends(motion: Motion) -> Floats:
