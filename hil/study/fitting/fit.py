@@ -30,6 +30,8 @@ _WORTH = 1.0
 """A step that takes less off the cost is the last."""
 _FOLLOWED = 0.5
 """A step of less, in standard deviations, says too little of how sensitivities change."""
+STRAINED = 1.5
+"""Strain (`Fitter.strain`) beyond which the vehicle's numbers may be bent by what is no number."""
 _ALIKE = 0.2
 """Share by which an effect may change and its sensitivity be what it was."""
 
@@ -81,6 +83,20 @@ def with_term(world: World, term: Term) -> World:
     return replace(world, onsets=(*world.onsets, (term.candidate.effect.name, *term.onset)))
 
 
+def strain(z: Floats, farthest: Floats | float = np.inf, told: float | None = None) -> float:
+    """How much farther the vehicle's numbers went than their tolerance lets them, as a variance, at least 1.
+
+    A model that needs that for these logs errs in what it says of causes too (Birge 1932, Phys. Rev. 40, 207). Where
+    much is strained, a number that went as far as it may (``farthest``) counts as if it wanted to go as far again.
+    ``told`` is how many numbers the data tell (`Fitter.told`), all of them without: one of which they say nothing
+    stays where it is, and is no sign that the others are right.
+    """
+    squares = np.square(z)
+    if squares.sum() >= STRAINED * len(z):
+        squares = squares * np.where(np.abs(z) >= farthest, 4.0, 1.0)
+    return max(1.0, float(squares.sum()) / max(len(z) if told is None else told, 1.0))
+
+
 class Fitter:
     """Fits models of one case; ``nuisance_columns`` are sensitivities to the nuisances in standard deviations."""
 
@@ -93,6 +109,7 @@ class Fitter:
         self.lowest = np.where(
             [nuisance.kind in ("held", "window") for nuisance in self.nuisances], 0.0, -self.farthest
         )
+        self._of_form = np.array([nuisance.kind != "scatter" for nuisance in self.nuisances])
         self._limits = [k for k, nuisance in enumerate(self.nuisances) if nuisance.name in _LIMITS]
         self.radius = float(rig.vehicle.parameters.wheel.rolling_radius_m)
         self._measured = rig.measured()
@@ -255,12 +272,22 @@ class Fitter:
         return self._products
 
     def told(self, noise: Noise) -> float:
-        """How many nuisances the data tell: what squares of right ones, fitted, add up to (MacKay 1992, eq. 4.9).
+        """How many numbers the data tell: what squares of right ones, fitted, add up to (MacKay 1992, eq. 4.9).
 
-        MacKay, D. J. C.: Bayesian interpolation. Neural Computation 4, 415.
+        MacKay, D. J. C.: Bayesian interpolation. Neural Computation 4, 415. Of those that `strain` counts.
         """
         information = self.products(noise)
-        return float(np.trace(np.linalg.solve(information + np.eye(len(information)), information)))
+        shares = np.diag(np.linalg.solve(information + np.eye(len(information)), information))
+        return float(shares[self._of_form].sum())
+
+    def strain(self, z: Floats, told: float | None = None) -> float:
+        """How strained these numbers are (`strain`), at their ends twice if it is known how many data ``told``.
+
+        What single wheels are off is no form of a car: a dozen such numbers, told well and right, would make light of
+        all that the others are.
+        """
+        form = self._of_form
+        return strain(z[form], np.inf if told is None else self.farthest[form], told)
 
     def _of_nuisances(self, noise: Noise) -> tuple[Floats, Floats]:
         """Whitened sensitivities of the nuisances, and their products."""

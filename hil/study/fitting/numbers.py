@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hil.study.fitting.fit import Fitter, Model, Term, alike, with_term
+from hil.study.fitting.fit import STRAINED, Fitter, Model, Term, alike, with_term
 from hil.study.fitting.linear import track_columns
 from hil.study.likelihood.noise import Frame, Noise
 from hil.study.logs.table import Floats
@@ -13,8 +13,6 @@ from hil.study.replay.rig import Rig
 from hil.study.replay.vehicle import Vehicle
 from hil.study.replay.world import World, start_nuisances
 
-STRAINED = 1.5
-"""Strain beyond which the numbers may be bent by what is no number."""
 _KINKED = ("ehb_dead_time_s",)
 """What acts from step to step, with a kink at each."""
 _COARSE, _FINE = 0.5, 3.0
@@ -23,20 +21,6 @@ _TURNS, _MOST_ANEW, _SETTLED, _STALE, _FAR = 20, 4, 3.0, 0.3, 1.0
 _REMEMBERED, _STILL = 3, 0.5
 """Times that sensitivities were taken last, and how far numbers may be from there, in standard deviations, for those of
 the best of several causes to serve again when it is accepted. A fit of the numbers themselves asks for `_STALE`."""
-
-
-def strain(z: Floats, farthest: Floats | float = np.inf, told: float | None = None) -> float:
-    """How much farther the vehicle's numbers went than their tolerance lets them, as a variance, at least 1.
-
-    A model that needs that for these logs errs in what it says of causes too (Birge 1932, Phys. Rev. 40, 207). Where
-    much is strained, a number that went as far as it may (``farthest``) counts as if it wanted to go as far again.
-    ``told`` is how many numbers the data tell (`hil.study.fitting.fit.Fitter.told`), all of them without: one of which
-    they say nothing stays where it is, and is no sign that the others are right.
-    """
-    squares = np.square(z)
-    if squares.sum() >= STRAINED * len(z):
-        squares = squares * np.where(np.abs(z) >= farthest, 4.0, 1.0)
-    return max(1.0, float(squares.sum()) / max(len(z) if told is None else told, 1.0))
 
 
 class Numbers:
@@ -99,7 +83,7 @@ class Numbers:
             model = self.fitter.fit(model, noise, 4, follow=True)
             settled, cost = cost - model.cost < _SETTLED, model.cost
             stale = float(np.abs(model.z - around).max()) > (_STALE * (1 + 2 * times) if settled else _FAR)
-            most = _MOST_ANEW if strain(model.z) < STRAINED else 2 * _MOST_ANEW
+            most = _MOST_ANEW if self.fitter.strain(model.z) < STRAINED else 2 * _MOST_ANEW
             if self._relinearise and stale and times < most:
                 information = np.diag(self.fitter.products(noise))
                 self._steps = np.clip(_FINE / np.sqrt(np.maximum(information, 1e-9)), 0.03, _COARSE)

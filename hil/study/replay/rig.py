@@ -174,12 +174,16 @@ class Rig:
 
     @staticmethod
     def _without_fading(drive: Drive, world: World) -> Stack:
-        """Measured channels without motors whose braking fades: there it answers errors of speed no sensor resolves."""
+        """Measured channels without motors whose braking fades: there it answers errors of speed no sensor resolves.
+
+        Which way a wheel at rest creeps is such an error, too: there any torque may be taken for one that brakes.
+        """
         if not {"motor", "wheel"} <= set(drive.measured):
             return drive.measured
         speed = np.nan_to_num(drive.measured["wheel"]) * float(world.p[P.wheel_rolling_radius_m])
         asked = averaged(drive.inputs[:, INPUT.slice("motor_demand_nm")], drive.stride)
-        fades = (speed < float(world.p[P.motor_fade_start_mps]) + _FADING_MPS) & (asked < -_LEAST_NM)
+        brakes = (speed < float(world.p[P.motor_fade_start_mps]) + _FADING_MPS) & (asked < -_LEAST_NM)
+        fades = brakes | ((np.abs(speed) < _FADING_MPS) & (np.abs(asked) > _LEAST_NM))
         return {**drive.measured, "motor": np.where(fades, np.nan, drive.measured["motor"])}
 
     def _characteristic(self, world: World) -> float:

@@ -28,6 +28,9 @@ _LOOSE = (
 )  # fmt: skip
 """Standard deviations of a pressure sensor's zero and gain, of the torque a motor gives, and of a wheel's radius beside
 the others' (0.12 %, comma2k19; docs/decisions/0093)."""
+_STRAIGHT_AHEAD_RAD = 0.01
+"""Standard deviation of the steering wheel's angle at which a car goes straight. Workshop manuals let the sensor's zero
+be set within 3 to 5 degrees of that (Hyundai Motor, Grandeur 2006: within 5, nonlinear by 2.5); here half a degree."""
 _THRESHOLD = "friction_brake_threshold_pressure_pa"
 _BALANCE = 0.3
 """Half width of what an axle's cornering stiffness may be off beside the other's, where nobody states the tyres'."""
@@ -35,7 +38,7 @@ _HELD_KG_M2 = 1e12
 """Yaw inertia of a car that cannot turn."""
 _TURNING = (
     "vehicle_yaw_inertia_kg_m2", "vehicle_steering_ratio", "tyre_lky", "vehicle_slip_angle_share_front",
-    "vehicle_slip_angle_share_rear", "tyre_side_stiffness_load",
+    "vehicle_slip_angle_share_rear", "tyre_side_stiffness_load", "zero_steering",
 )  # fmt: skip
 _OF_STEERING = ("steer_lateral",)
 _KNOWN = sorted({*ALIASES, *DERIVED, *SPECIAL, *PARAMETER.sizes})
@@ -230,7 +233,7 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
         nuisances = _as_one(nuisances, _THRESHOLD)
     if unlimited:  # who states every limit has measured the rest as well
         followed = [one for one in _LOOSE if one[0] != "iwm_gain" or "motor" not in unstated]
-        nuisances = (*nuisances, *_by_wheel(followed))
+        nuisances = (*nuisances, *_by_wheel(followed), _straight_ahead(vehicle.p))
     return replace(vehicle, nuisances=nuisances, unstated=tuple(unstated), unlimited=tuple(unlimited))
 
 
@@ -244,10 +247,16 @@ def _as_one(nuisances: tuple[Nuisance, ...], name: str) -> tuple[Nuisance, ...]:
 def _by_wheel(loose: Sequence[tuple[str, str, float]]) -> list[Nuisance]:
     """What each brake, motor and tyre may be off by itself: effect, number and standard deviation."""
     return [
-        Nuisance(f"{effect}_{wheel}", (THETA.slice(effect, number).start + k,), (step,), "sensor")
+        Nuisance(f"{effect}_{wheel}", (THETA.slice(effect, number).start + k,), (step,), "scatter")
         for effect, number, step in loose
         for k, wheel in enumerate(("fl", "fr", "rl", "rr"))
     ]
+
+
+def _straight_ahead(p: Floats) -> Nuisance:
+    """At which angle of the steering wheel it goes straight, as one of its front wheels."""
+    at = THETA.slice("steer_lateral", "offset_rad").start
+    return Nuisance("zero_steering", (at,), (_STRAIGHT_AHEAD_RAD / float(p[P.vehicle_steering_ratio]),), "sensor")
 
 
 def _derive(

@@ -70,7 +70,7 @@ class World:
                     tooth += amount * step
                 elif nuisance.kind == "window":
                     window += amount * step
-                elif nuisance.kind == "sensor":
+                elif nuisance.kind in ("sensor", "scatter"):
                     theta[at] += amount * step
                 elif nuisance.kind == "signed":
                     p[at] += amount * step

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from hil.study.fitting.fit import Fitter, Model
-from hil.study.fitting.numbers import STRAINED, Numbers, strain
+from hil.study.fitting.fit import STRAINED, Fitter, Model
+from hil.study.fitting.numbers import Numbers
 from hil.study.fitting.same_number import restated
 from hil.study.likelihood.noise import Frame, Noise
 from hil.study.logs.case import Case
@@ -140,7 +140,7 @@ class _Search:
 
     def _bent(self, model: Model) -> bool:
         """Whether something may have bent the vehicle's numbers."""
-        return self.settings.relinearise and not model.terms and strain(model.z) >= STRAINED
+        return self.settings.relinearise and not model.terms and self.fitter.strain(model.z) >= STRAINED
 
     def _from_handed_in(
         self, model: Model, fitted: Sequence[Contender], with_fit: Refitted, reference: float, anew: int,

@@ -6,7 +6,6 @@ import numpy as np
 from scipy.stats import chi2
 
 from hil.study.fitting.fit import Fitter
-from hil.study.fitting.numbers import strain
 from hil.study.fitting.own_error import shared_out, variance_of
 from hil.study.fitting.same_number import restated
 from hil.study.logs.table import Floats
@@ -26,7 +25,7 @@ how far manoeuvres disagree: a second question beside what a cause explains (dec
 
 def strained(fitter: Fitter, z: Floats, told: float) -> float:
     """What a gain is divided by where the vehicle's numbers ``z``, of which the data tell ``told``, lie far off."""
-    return shared_out(strain(z, fitter.farthest, told))
+    return shared_out(fitter.strain(z, told))
 
 
 def form_differs(strain: float) -> bool:

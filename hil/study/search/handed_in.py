@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from hil.study.fitting.fit import Model
-from hil.study.fitting.numbers import STRAINED, Numbers, strain
+from hil.study.fitting.fit import STRAINED, Model
+from hil.study.fitting.numbers import Numbers
 from hil.study.likelihood.noise import Noise
 from hil.study.search.contest import Contender, Contest, odds
 
@@ -17,6 +17,8 @@ _ROUNDS = 3
 _RIVAL, _AS_GOOD = 1.0 / 3.0, 0.9
 """Shares of what the best explains: below the one, numbers that went far hide no rival; below the other, sensitivities
 taken anew make none of a cause beside which they did not."""
+_OVERTAKES = 25.0
+"""By how much in odds sensitivities taken anew let one overtake another (they gave 0.4 to 20; docs/decisions/0086)."""
 _FIRST = 2
 """How many of the best are fitted before the others, which go on while they explain a third of what those do."""
 Refitted = Callable[[Contender, Model, Noise], Contender]
@@ -43,7 +45,7 @@ def from_handed_in(
         model = own.at(np.zeros(len(numbers.nuisances)), one.model.terms, noise)
         model = own.fit(model, noise, 4, follow=True)
         begun = refitted(one, model, noise)
-        if strain(one.model.z) < STRAINED and begun.cost >= one.cost:
+        if fitter.strain(one.model.z) < STRAINED and begun.cost >= one.cost:
             return one  # numbers that are not bent are found from either side
         if not near(begun, best):
             return min(one, begun, key=odds)
@@ -62,8 +64,9 @@ def from_handed_in(
     best, bare, around = min(best, odds(found[leading[0]])), [], beside.z
     for k in leading:
         one = found[k]
-        bent = strain(one.model.z) >= STRAINED
-        far = near(one, best) if bent else near(one, best, _AS_GOOD) and numbers.went_far(one.model, around)
+        bent = fitter.strain(one.model.z) >= STRAINED
+        as_good = near(one, best, _AS_GOOD) and odds(one) - best < _OVERTAKES
+        far = near(one, best) if bent else as_good and numbers.went_far(one.model, around)
         if k != leading[0] and not far:
             continue
         model, noise = one.model, one.noise

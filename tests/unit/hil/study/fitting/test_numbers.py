@@ -7,12 +7,12 @@ import pytest
 from pulses import log_of_pulses
 
 from hil.study.fitting.candidates import candidates, columns
-from hil.study.fitting.fit import Term
-from hil.study.fitting.numbers import Numbers, strain
+from hil.study.fitting.fit import Fitter, Term, strain
+from hil.study.fitting.numbers import Numbers
 from hil.study.likelihood.noise import Frame
 from hil.study.logs.prepare import prepare
 from hil.study.replay.rig import Rig
-from hil.study.replay.vehicle import paper_car
+from hil.study.replay.vehicle import load_vehicle, paper_car
 from hil.study.replay.world import DISC_GUESSED_K, DISC_TOLD_K, nominal
 
 NOISE_PA = 2e3
@@ -61,6 +61,18 @@ def test_a_strained_number_at_its_end_wants_to_go_on():
     assert strain(z) == pytest.approx(3.0)
     assert strain(z, np.full(4, 3.0)) == pytest.approx((4 * 9.0 + 3.0) / 4)
     assert strain(z / 3.0, np.full(4, 1.0)) == 1.0  # little strained
+
+
+def test_what_single_wheels_are_off_makes_light_of_no_strain():
+    """A car whose set states six numbers: each of its brakes, motors and tyres has numbers of its own beside those."""
+    stated = {"mass_kg": 1500.0, "wheelbase_m": 2.5, "rolling_radius_m": 0.3, "brake_gain_front_nm_pa": 2e-4}
+    vehicle = load_vehicle(stated)
+    case = prepare([log_of_pulses()], 0.3)
+    fitter = Fitter(Rig(case, vehicle), Frame.of(case), nominal(vehicle), vehicle.nuisances, {})
+    of_wheels = np.array([one.kind == "scatter" for one in vehicle.nuisances])
+    assert 12 <= of_wheels.sum() <= 16
+    assert fitter.strain(np.where(of_wheels, 0.0, 2.0)) == pytest.approx(4.0)
+    assert fitter.strain(np.where(of_wheels, 3.0, 0.0)) == 1.0
 
 
 def test_sensitivities_taken_lately_serve_again_where_cars_are_alike():

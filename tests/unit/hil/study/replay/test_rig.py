@@ -55,6 +55,25 @@ def test_a_motor_at_its_limit_does_not_answer_an_error_of_the_speed(rig):
     assert np.array_equal(steep["motor"], flat["motor"])
 
 
+def test_a_motor_that_pulls_away_is_not_compared_before_the_wheels_turn():
+    """A simulated wheel that crept back by less than any sensor resolves made a fading of the torque that pulled."""
+    t = np.arange(1500) * 0.01
+    pulls = t > 5.0
+    speed = np.clip(t - 5.2, 0.0, None)
+    asked = {f"motor_torque_demand_{w}_nm": 200.0 * pulls for w in WHEELS}
+    told = {f"motor_torque_{w}_nm": 200.0 * pulls for w in WHEELS}
+    turning = {f"wheel_speed_{w}_rad_s": speed / 0.308 for w in WHEELS}
+    pressed = {f"pressure_{w}_pa": 5e5 * ~pulls for w in WHEELS}
+    case = prepare([make_log("log", t, turning | asked | told | pressed)], 0.308)
+    car = paper_car()
+    (drive,) = Rig(case, car).quieted(nominal(car)).case.drives
+    at = np.arange(len(drive.measured["motor"])) * 0.01 * drive.stride
+    rests = (at > 5.1) & (at < 5.4)
+    assert rests.any()
+    assert np.isnan(drive.measured["motor"][rests]).all()
+    assert np.isfinite(drive.measured["motor"][(at > 7.0) & (at < 14.0)]).all()
+
+
 @pytest.mark.parametrize(("effect", "number", "value"), [
     ("pad_mu_gain", "gain", 0.1), ("iwm_gain", "gain", 0.1), ("ehb_dead_time", "time_s", 0.01),
     ("road_grade", "grade", 0.01), ("imu_bias", "ax_mps2", 0.1), ("pressure_offset", "offset_pa", 1e4),

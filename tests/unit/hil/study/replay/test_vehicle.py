@@ -6,6 +6,8 @@ import pytest
 from hil.study.logs.table import MOTOR_DEMAND, Log, UnusableError, make_log
 from hil.study.replay.nuisances import HALF_WIDTH_TO_SIGMA
 from hil.study.replay.vehicle import Vehicle, load_vehicle, paper_car, rest_friction
+from hil.study.replay.world import nominal
+from plant.effects.theta import THETA
 from plant.vectors import P
 
 SIX = {
@@ -173,8 +175,19 @@ PRESSURES = ("pressure_offset", "pressure_gain")
 def test_what_nobody_measured_whole_is_off_wheel_by_wheel(told, off):
     """0.7 % of one pressure, 0.4 % of one motor, 0.1 % of one radius were told as causes: no car is better."""
     car = load_vehicle({**SIX, **told})
-    found = [n.name for n in car.nuisances if n.kind == "sensor"]
+    found = [n.name for n in car.nuisances if n.kind == "scatter"]
     assert found == [f"{effect}_{wheel}" for effect in off for wheel in ("fl", "fr", "rl", "rr")]
+
+
+@pytest.mark.parametrize(("told", "known"), [({}, False), (HYDRAULICS | MOTORS | BATTERY, True)])
+def test_nobody_knows_to_a_mrad_where_a_wheel_points_straight_ahead(told, known):
+    """Sensors of the steering wheel half a degree to 0.8 off were told as causes, beside the right ones."""
+    car = load_vehicle({**SIX, **told, "steering_ratio": 20.0})
+    assert [one.step for one in car.nuisances if one.name == "zero_steering"] == ([] if known else [(5e-4,)])
+    off = np.array([float(one.name == "zero_steering") for one in car.nuisances])
+    theta = nominal(car).shifted(car.nuisances, off).theta
+    assert theta[THETA.slice("steer_lateral", "offset_rad")] == pytest.approx(0.0 if known else 5e-4)
+    assert "zero_steering" not in {one.name for one in car.held_straight().nuisances}
 
 
 def _asks(torque_nm: float) -> Log:
