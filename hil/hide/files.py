@@ -30,7 +30,8 @@ _TOLD = (
     "threshold_pressure_pa", "pad_a_1_ks", "pad_b_1_j", "pad_c_1_s", "pad_epsilon_w", "ambient_k", "ehb_frequency_hz",
     "ehb_damping", "ehb_dead_time_s", "ehb_build_rate_pa_s", "ehb_release_rate_pa_s", "ehb_max_pressure_pa",
     "motor_time_constant_s", "motor_rate_limit_nm_s", "motor_peak_torque_nm", "motor_peak_power_w",
-    "motor_fade_start_mps", "motor_fade_end_mps", "battery_charge_power_w", "imu_cutoff_hz",
+    "motor_fade_start_mps", "motor_fade_end_mps", "motor_derating_start_k", "motor_derating_end_k",
+    "battery_charge_power_w", "imu_cutoff_hz",
 )  # fmt: skip
 
 

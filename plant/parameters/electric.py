@@ -19,8 +19,8 @@ class MotorParameters:
     copper_loss_w_nm2: Annotated[float, "W/(N m)2", 0.0, 1.0]
     winding_resistance_k_w: Annotated[float, "K/W", 0.0, 10.0]
     winding_time_s: Annotated[float, "s", 1.0, 3600.0]
-    derating_start_k: Annotated[float, "K", 300.0, 500.0]
-    derating_end_k: Annotated[float, "K", 300.0, 550.0]
+    derating_start_k: Annotated[float, "K", 300.0, 1e4]
+    derating_end_k: Annotated[float, "K", 300.0, 1e4]  # so hot: no derating
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from hil.study.logs.prepare import prepare
 from hil.study.logs.table import Log, make_log
 from hil.study.replay.rig import Rig
 from hil.study.replay.steps import STEPS
-from hil.study.replay.vehicle import paper_car
+from hil.study.replay.vehicle import load_vehicle, paper_car
 from hil.study.replay.world import World, nominal
 from plant.effects.effect import NODES
 from plant.effects.theta import THETA
@@ -72,6 +72,19 @@ def test_a_motor_that_pulls_away_is_not_compared_before_the_wheels_turn():
     assert rests.any()
     assert np.isnan(drive.measured["motor"][rests]).all()
     assert np.isfinite(drive.measured["motor"][(at > 7.0) & (at < 14.0)]).all()
+
+
+def test_motors_of_which_nobody_says_how_hot_they_get_are_not_derated():
+    """Twice the torque of the shipped car's heated its windings, in another car's motors, until they gave less."""
+    t = np.arange(6000) * 0.01
+    pulls = 900.0 * (t > 2.0)
+    channels = {f"wheel_speed_{w}_rad_s": np.clip(0.5 * (t - 2.0), 0.0, None) / 0.33 for w in WHEELS}
+    channels |= {f"motor_torque_{w}_nm": pulls for w in WHEELS} | {f"motor_torque_demand_{w}_nm": pulls for w in WHEELS}
+    channels |= {f"pressure_{w}_pa": np.zeros(len(t)) for w in WHEELS}
+    stated = {"mass_kg": 3900.0, "wheelbase_m": 2.9, "rolling_radius_m": 0.33, "motor_peak_torque_nm": 1200.0}
+    car = load_vehicle({**stated, "brake_gain_front_nm_pa": 3e-4, "brake_gain_rear_nm_pa": 2e-4})
+    simulated = Rig(prepare([make_log("log", t, channels)], 0.33), car).run(nominal(car))["motor"]
+    assert simulated[-500:] == pytest.approx(900.0, rel=1e-3)
 
 
 @pytest.mark.parametrize(("effect", "number", "value"), [

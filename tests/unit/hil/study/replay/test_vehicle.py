@@ -139,6 +139,7 @@ def test_what_a_set_says_nothing_of_is_not_judged() -> None:
     assert motor.peak_torque_nm == 400.0
     assert min(motor.peak_power_w, motor.rate_limit_nm_s, ehb.build_rate_pa_s, ehb.release_rate_pa_s) > 2e5
     assert motor.fade_start_mps < 0.5
+    assert motor.derating_start_k > 5e3
     assert any("no such limit is simulated: ehb_build_rate_pa_s" in text for text in told.remarks)
     assert not {"ehb_build_rate_pa_s", "motor_peak_power_w"} & {one.name for one in told.nuisances}
     assert paper_car().unstated == ()
@@ -160,6 +161,7 @@ HYDRAULICS = {"ehb_build_rate_pa_s": 25e6, "ehb_release_rate_pa_s": 40e6}
 MOTORS = {
     "motor_time_constant_s": 0.02, "motor_peak_torque_nm": 700.0, "motor_peak_power_w": 75e3,
     "motor_rate_limit_nm_s": 12e3, "motor_fade_start_mps": 2.0, "motor_fade_end_mps": 0.5,
+    "motor_derating_start_k": 390.0, "motor_derating_end_k": 420.0,
 }  # fmt: skip
 
 
