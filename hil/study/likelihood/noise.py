@@ -90,12 +90,22 @@ class Frame:
             name: np.where((swings if name in ("ay", "yaw") else begun) > 0.5, 0.0, known)
             for name, known in present.items()
         }
-        present = {name: known for name, known in present.items() if known.sum() > 50}
+        twice = _told_twice(case)
+        present = {name: known for name, known in present.items() if known.sum() > 50 and name not in twice}
         return cls(
             np.concatenate(fresh), np.concatenate(restart), np.concatenate([d.moving for d in case.drives]) * 1.0,
             np.concatenate([d.speed_mps for d in case.drives]), case.blocks(), case.sample_s, present, tuple(present),
             _waited(case),
         )  # fmt: skip
+
+
+def _told_twice(case: Case) -> set[str]:
+    """Tracks of the torques where motors act at one axle alone: what front and rear differ by is the mean again."""
+    torques = [np.nan_to_num(drive.measured["motor"]) for drive in case.drives if "motor" in drive.measured]
+    acts = [any(one[:, axle].any() for one in torques) for axle in (slice(0, 2), slice(2, 4))]
+    if acts[0] == acts[1]:
+        return set()
+    return {"motor.front-rear", f"motor.left-right {'rear' if acts[0] else 'front'}"}
 
 
 def _waited(case: Case) -> dict[str, Floats]:

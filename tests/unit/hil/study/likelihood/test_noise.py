@@ -163,3 +163,17 @@ def test_no_noise_nearby_is_likelier_than_the_one_found() -> None:
         (size, tau_s), *others = found.disturbances
         for first in ((size * change, tau_s), (size, tau_s * change)):
             assert whiten(tracks, frame, replace(found, disturbances=(first, *others)))[1] < best + 0.2
+
+
+@pytest.mark.parametrize(("act", "tracks"), [
+    (WHEELS, {"mean", "front-rear", "left-right front", "left-right rear"}), (WHEELS[:2], {"mean", "left-right front"}),
+    (WHEELS[2:], {"mean", "left-right rear"}),
+])  # fmt: skip
+def test_motors_of_one_axle_tell_a_torque_and_a_difference_once(act, tracks):
+    """What front and rear differed by counted the mean twice, and two zeros were told with no noise at all."""
+    t = np.arange(1000) * 0.01
+    channels = {f"wheel_speed_{w}_rad_s": np.full(len(t), 60.0) for w in WHEELS}
+    for name in ("motor_torque", "motor_torque_demand"):
+        channels |= {f"{name}_{w}_nm": -200.0 * np.sin(t) ** 2 * (w in act) for w in WHEELS}
+    names = Frame.of(prepare([make_log("log", t, channels)], 0.3)).names
+    assert {name.removeprefix("motor.") for name in names if name.startswith("motor.")} == tracks
