@@ -94,7 +94,7 @@ WIDE: Final = {
 UNLIMITED: Final = {
     "ehb": ({"build_rate_pa_s": 5e8, "release_rate_pa_s": 5e8},),
     "motor": (
-        {"peak_torque_nm": 5e3}, {"peak_power_w": 5e5}, {"rate_limit_nm_s": 1e6},
+        {"peak_torque_nm": 5e3}, {"peak_power_w": 5e5, "max_speed_rad_s": 1e3}, {"rate_limit_nm_s": 1e6},
         {"fade_end_mps": 0.0, "fade_start_mps": 0.1}, {"derating_start_k": 9e3, "derating_end_k": 1e4},
     ),
     "battery": ({"charge_power_w": 1e6, "discharge_power_w": 1e6},),

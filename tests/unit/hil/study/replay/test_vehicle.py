@@ -140,6 +140,7 @@ def test_what_a_set_says_nothing_of_is_not_judged() -> None:
     assert min(motor.peak_power_w, motor.rate_limit_nm_s, ehb.build_rate_pa_s, ehb.release_rate_pa_s) > 2e5
     assert motor.fade_start_mps < 0.5
     assert motor.derating_start_k > 5e3
+    assert motor.max_speed_rad_s > 300.0
     assert any("no such limit is simulated: ehb_build_rate_pa_s" in text for text in told.remarks)
     assert not {"ehb_build_rate_pa_s", "motor_peak_power_w"} & {one.name for one in told.nuisances}
     assert paper_car().unstated == ()
