@@ -24,10 +24,10 @@ _CONSTANT_B_1_J = 2e-6
 _STATED = 0.01
 _LOOSE = (
     ("pressure_offset", "offset_pa", 7e3), ("pressure_gain", "gain", 0.005), ("iwm_gain", "gain", 0.005),
-    ("tyre_radius", "gain", 0.0012),
+    ("iwm_gain", "unseen", 0.005), ("pad_mu_gain", "gain", 0.01), ("tyre_radius", "gain", 0.0012),
 )  # fmt: skip
-"""Standard deviations of a pressure sensor's zero and gain, of the torque a motor gives, and of a wheel's radius beside
-the others' (0.12 %, comma2k19; docs/decisions/0093)."""
+"""Standard deviations of a pressure sensor's zero and gain, of the torque a motor gives of what is asked and of what it
+tells, of the pads' friction, and of a wheel's radius beside the others' (docs/decisions/0093 and 0094)."""
 _STRAIGHT_AHEAD_RAD = 0.01
 """Standard deviation of the steering wheel's angle at which a car goes straight. Workshop manuals let the sensor's zero
 be set within 3 to 5 degrees of that (Hyundai Motor, Grandeur 2006: within 5, nonlinear by 2.5); here half a degree."""
@@ -232,7 +232,7 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
     if is_number(numbers.get(_THRESHOLD)):
         nuisances = _as_one(nuisances, _THRESHOLD)
     if unlimited:  # who states every limit has measured the rest as well
-        followed = [one for one in _LOOSE if one[0] != "iwm_gain" or "motor" not in unstated]
+        followed = [one for one in _LOOSE if one[:2] != ("iwm_gain", "gain") or "motor" not in unstated]
         nuisances = (*nuisances, *_by_wheel(followed), _straight_ahead(vehicle.p))
     return replace(vehicle, nuisances=nuisances, unstated=tuple(unstated), unlimited=tuple(unlimited))
 
@@ -247,7 +247,7 @@ def _as_one(nuisances: tuple[Nuisance, ...], name: str) -> tuple[Nuisance, ...]:
 def _by_wheel(loose: Sequence[tuple[str, str, float]]) -> list[Nuisance]:
     """What each brake, motor and tyre may be off by itself: effect, number and standard deviation."""
     return [
-        Nuisance(f"{effect}_{wheel}", (THETA.slice(effect, number).start + k,), (step,), "scatter")
+        Nuisance(f"{effect}.{number}_{wheel}", (THETA.slice(effect, number).start + k,), (step,), "scatter")
         for effect, number, step in loose
         for k, wheel in enumerate(("fl", "fr", "rl", "rr"))
     ]

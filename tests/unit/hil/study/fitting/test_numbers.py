@@ -70,7 +70,7 @@ def test_what_single_wheels_are_off_makes_light_of_no_strain():
     case = prepare([log_of_pulses()], 0.3)
     fitter = Fitter(Rig(case, vehicle), Frame.of(case), nominal(vehicle), vehicle.nuisances, {})
     of_wheels = np.array([one.kind == "scatter" for one in vehicle.nuisances])
-    assert 12 <= of_wheels.sum() <= 16
+    assert of_wheels.sum() >= 16
     assert fitter.strain(np.where(of_wheels, 0.0, 2.0)) == pytest.approx(4.0)
     assert fitter.strain(np.where(of_wheels, 3.0, 0.0)) == 1.0
 

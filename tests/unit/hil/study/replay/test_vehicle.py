@@ -167,19 +167,20 @@ MOTORS = {
 
 
 BATTERY = {"battery_charge_power_w": 60e3, "battery_discharge_power_w": 80e3}
-PRESSURES = ("pressure_offset", "pressure_gain")
+BRAKES = ("pressure_offset.offset_pa", "pressure_gain.gain")
+REST = ("iwm_gain.unseen", "pad_mu_gain.gain", "tyre_radius.gain")
+ALL = (*BRAKES, "iwm_gain.gain", *REST)
 
 
 @pytest.mark.parametrize(("told", "off"), [
-    ({}, (*PRESSURES, "tyre_radius")), (MOTORS, (*PRESSURES, "iwm_gain", "tyre_radius")),
-    ({"motor_time_constant_s": 0.02}, (*PRESSURES, "iwm_gain", "tyre_radius")),
-    (HYDRAULICS | MOTORS, (*PRESSURES, "iwm_gain", "tyre_radius")), (HYDRAULICS | MOTORS | BATTERY, ()),
+    ({}, (*BRAKES, *REST)), (MOTORS, ALL), ({"motor_time_constant_s": 0.02}, ALL), (HYDRAULICS | MOTORS, ALL),
+    (HYDRAULICS | MOTORS | BATTERY, ()),
 ])  # fmt: skip
 def test_what_nobody_measured_whole_is_off_wheel_by_wheel(told, off):
-    """0.7 % of one pressure, 0.4 % of one motor, 0.1 % of one radius were told as causes: no car is better."""
+    """0.7 % of one pressure or brake, 0.4 % of one motor, 0.1 % of one radius were told as causes: no car is better."""
     car = load_vehicle({**SIX, **told})
     found = [n.name for n in car.nuisances if n.kind == "scatter"]
-    assert found == [f"{effect}_{wheel}" for effect in off for wheel in ("fl", "fr", "rl", "rr")]
+    assert found == [f"{number}_{wheel}" for number in off for wheel in ("fl", "fr", "rl", "rr")]
 
 
 @pytest.mark.parametrize(("told", "known"), [({}, False), (HYDRAULICS | MOTORS | BATTERY, True)])
