@@ -51,8 +51,8 @@ brake_gain_rear_nm_pa = 1.7e-4
   derating of the motors; power of the battery) are not simulated: another car's would be wrong. Motors whose torque is
   not stated are as strong as they are asked in the logs. Where any of these limits is missing, wheels differ, too (one
   standard deviation): zeros of the pressures by 7 kPa, their gains by 0.5 %, pads by 1 %, motors by 0.5 % of what is
-  asked of them and of what they tell, radii by 0.12 %; and the steering wheel may stand half a degree off where the
-  car goes straight.
+  asked of them and of what they tell, radii by 0.12 %; clocks of the nodes by 50 ppm, and the steering wheel may stand
+  half a degree off where the car goes straight.
 - Without a `pad_` key the friction of the pads is one constant, which the brake gains contain.
 - Unknown keys are told in the remarks and left out.
 """

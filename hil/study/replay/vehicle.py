@@ -14,6 +14,7 @@ from hil.parameters import ParameterError, is_number, load_set, override
 from hil.study.logs.table import MOTOR_DEMAND, Floats, Log, UnusableError
 from hil.study.replay.nuisances import BRAKE_K, CONSTANT_EPSILON_W, Nuisance, guessed, listed
 from hil.study.replay.vehicle_keys import ALIASES, DERIVED, OF_SECTION, SPECIAL, UNLIMITED, WIDE
+from plant.effects.effect import NODES
 from plant.effects.theta import THETA
 from plant.friction import mu_equilibrium
 from plant.model import pack
@@ -28,6 +29,8 @@ _LOOSE = (
 )  # fmt: skip
 """Standard deviations of a pressure sensor's zero and gain, of the torque a motor gives of what is asked and of what it
 tells, of the pads' friction, and of a wheel's radius beside the others' (docs/decisions/0093 and 0094)."""
+_CLOCK_SHARE = 5e-5
+"""Standard deviation of the rate of one node's clock: quartz is good to 20 to 100 ppm (plant/effects/sensing)."""
 _STRAIGHT_AHEAD_RAD = 0.01
 """Standard deviation of the steering wheel's angle at which a car goes straight. Workshop manuals let the sensor's zero
 be set within 3 to 5 degrees of that (Hyundai Motor, Grandeur 2006: within 5, nonlinear by 2.5); here half a degree."""
@@ -233,7 +236,7 @@ def _from_flat(table: dict[str, Any], where: str) -> Vehicle:
         nuisances = _as_one(nuisances, _THRESHOLD)
     if unlimited:  # who states every limit has measured the rest as well
         followed = [one for one in _LOOSE if one[:2] != ("iwm_gain", "gain") or "motor" not in unstated]
-        nuisances = (*nuisances, *_by_wheel(followed), _straight_ahead(vehicle.p))
+        nuisances = (*nuisances, *_by_wheel(followed), *_clocks(), _straight_ahead(vehicle.p))
     return replace(vehicle, nuisances=nuisances, unstated=tuple(unstated), unlimited=tuple(unlimited))
 
 
@@ -250,6 +253,16 @@ def _by_wheel(loose: Sequence[tuple[str, str, float]]) -> list[Nuisance]:
         Nuisance(f"{effect}.{number}_{wheel}", (THETA.slice(effect, number).start + k,), (step,), "scatter")
         for effect, number, step in loose
         for k, wheel in enumerate(("fl", "fr", "rl", "rr"))
+    ]
+
+
+def _clocks() -> list[Nuisance]:
+    """By how much the clock of each node that measures may run fast."""
+    first = THETA.slice("clock_drift", "share").start
+    measure = [node for node in NODES if node != "driver"]
+    return [
+        Nuisance(f"clock_drift.share_{node}", (first + NODES.index(node),), (_CLOCK_SHARE,), "scatter")
+        for node in measure
     ]
 
 

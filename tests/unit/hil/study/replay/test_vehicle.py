@@ -177,10 +177,11 @@ ALL = (*BRAKES, "iwm_gain.gain", *REST)
     (HYDRAULICS | MOTORS | BATTERY, ()),
 ])  # fmt: skip
 def test_what_nobody_measured_whole_is_off_wheel_by_wheel(told, off):
-    """0.7 % of one pressure or brake, 0.4 % of one motor, 0.1 % of one radius were told as causes: no car is better."""
+    """0.7 % of one pressure or brake, 0.4 % of one motor, 0.1 % of one radius, 46 ppm of a clock were told as causes."""
     car = load_vehicle({**SIX, **told})
     found = [n.name for n in car.nuisances if n.kind == "scatter"]
-    assert found == [f"{number}_{wheel}" for number in off for wheel in ("fl", "fr", "rl", "rr")]
+    clocks = [f"clock_drift.share_{node}" for node in ("wheel", "imu", "pressure", "motor") if off]
+    assert found == [f"{number}_{wheel}" for number in off for wheel in ("fl", "fr", "rl", "rr")] + clocks
 
 
 @pytest.mark.parametrize(("told", "known"), [({}, False), (HYDRAULICS | MOTORS | BATTERY, True)])
