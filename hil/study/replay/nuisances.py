@@ -43,8 +43,8 @@ class Nuisance:
     ``farthest`` is how many standard deviations it may be off at most; farther off it is a cause to be named.
     ``kind`` says of what: a number of the vehicle (``signed`` if it may be below zero), the discs' temperature at the
     start, the latency of a node, or of what holds a demand (never below zero), zero of a sensor, what one brake, motor,
-    tyre or clock is off beside the others (``scatter``), the lag of a toothed wheel, or the time over which it is a mean
-    (never below zero).
+    tyre or clock is off beside the others (``scatter``), the lag of a toothed wheel, or the time over which it is a
+    mean (never below zero).
     """
 
     name: str
