@@ -21,7 +21,8 @@ def test_every_number_of_the_vehicle_moves_without_a_corner(vehicle):
     for nuisance in vehicle.nuisances:
         for at, step in zip(nuisance.at, nuisance.step, strict=True):
             worlds = [base.shifted([nuisance], np.array([z])) for z in nuisance.farthest * STEPS]
-            values = np.array([(world.theta if nuisance.kind in ("sensor", "scatter") else world.p)[at] for world in worlds])
+            told = nuisance.kind in ("sensor", "scatter")
+            values = np.array([(world.theta if told else world.p)[at] for world in worlds])
             moved = np.diff(values) * np.sign(step)
             assert (moved > 0.0).all(), nuisance.name
             assert moved.max() < 30.0 * moved.min(), nuisance.name  # from a fifth to five times
