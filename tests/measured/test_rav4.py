@@ -14,7 +14,15 @@ from hil.study.logs.channel_map import load_map
 from hil.study.logs.read import read_logs
 from hil.study.logs.table import WHEEL_SPEED, Log
 
-pytestmark = pytest.mark.slow
+_CPU = Path("/proc/cpuinfo")
+_WIDE = _CPU.exists() and "avx512f" in _CPU.read_text(encoding="utf-8")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.xfail(
+        _WIDE, strict=False,
+        reason="with AVX-512 the noise of the body goes to nothing, where deviations are not known (decision 0094)",
+    ),
+]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
