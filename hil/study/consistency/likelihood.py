@@ -16,6 +16,8 @@ NOTHING: Mapping[str, float] = MappingProxyType({})
 _WIDEST = 3.0
 _NO_STEP = 2
 """Status of a search along which no step was good enough."""
+_UNKNOWN = 1e-3
+"""Information before any data on a number of which nothing is known, per step of it squared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +95,8 @@ def _prior(model: Model, sensor: Mapping[str, float], noise: Mapping[str, float]
 def deviations(model: Model, found: Fit, block: Floats, fixed: Mapping[str, float] = NOTHING) -> Values:
     """Standard deviation of every sensor number: curvature, widened where manoeuvres disagree more than they should.
 
-    The sandwich of White, Econometrica 50 (1982), with the scores of whole manoeuvres; noise moves along.
+    The sandwich of White, Econometrica 50 (1982), with the scores of whole manoeuvres; noise moves along. Where the
+    likelihood is flat, or the fit stopped on a slope, what is known before is what is left.
     """
     inside = [n for n, v in found.noise.items() if 1.05 * model.noise[n].low < v < 0.95 * model.noise[n].high]
     names = [*found.sensor, *inside]  # noise at its bound stays there
@@ -107,7 +110,7 @@ def deviations(model: Model, found: Fit, block: Floats, fixed: Mapping[str, floa
         values = {n: _value(number, v) for n, number, v in zip(names, numbers, at, strict=True)}
         noise, sensor = found.noise | {n: values[n] for n in inside}, {n: values[n] for n in found.sensor}
         _, score = model.score({**fixed, **sensor}, noise)
-        return np.bincount(block, score, count) - 0.5 * _prior(model, sensor, noise) / count
+        return np.bincount(block, score, count)
 
     size, step = len(z), 0.02
     up = [by_block(z + step * e) for e in np.eye(size)]
@@ -123,7 +126,8 @@ def deviations(model: Model, found: Fit, block: Floats, fixed: Mapping[str, floa
             mixed = (by_block(z + e) - by_block(z + f) - by_block(z - f) + by_block(z - e)).sum() / (4.0 * step**2)
             hessian[i, j] = hessian[j, i] = -mixed
     values, vectors = np.linalg.eigh(hessian)
-    inverse = (vectors / np.maximum(values, 1e-3)) @ vectors.T
+    known = [(number.step / number.prior) ** 2 if number.prior > 0.0 else _UNKNOWN for number in numbers]
+    inverse = np.linalg.inv((vectors * np.maximum(values, 0.0)) @ vectors.T + np.diag(known))
     curvature = np.sqrt(np.maximum(np.diag(inverse), 0.0))
     centred = gradient - gradient.mean(axis=1, keepdims=True)
     robust = np.sqrt(np.maximum(np.diag(inverse @ (centred @ centred.T) @ inverse), 0.0))
