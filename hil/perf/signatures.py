@@ -14,7 +14,7 @@ from hil.study.logs.prepare import prepare
 from hil.study.logs.read import read_logs
 from hil.study.logs.table import Floats
 from hil.study.replay.rig import Rig
-from hil.study.replay.vehicle import load_vehicle
+from hil.study.replay.vehicle_set import load_vehicle
 from hil.study.replay.world import nominal
 
 _LEAST_REACH = 1e-3

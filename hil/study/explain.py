@@ -17,7 +17,8 @@ from hil.study.logs.prepare import prepare
 from hil.study.logs.read import from_frame, read_logs
 from hil.study.logs.straight import kept_straight
 from hil.study.logs.table import Log
-from hil.study.replay.vehicle import Vehicle, load_vehicle
+from hil.study.replay.vehicle import Vehicle
+from hil.study.replay.vehicle_set import load_vehicle
 from hil.study.replay.world import nominal
 from hil.study.search.diagnose import diagnose
 from hil.study.search.diagnosis import Say, Settings

@@ -14,8 +14,6 @@ from hil.study.logs.channel_map import load_map
 from hil.study.logs.read import read_logs
 from hil.study.logs.table import WHEEL_SPEED, Log
 
-_CPU = Path("/proc/cpuinfo")
-_WIDE = _CPU.exists() and "avx512f" in _CPU.read_text(encoding="utf-8")
 pytestmark = pytest.mark.slow
 
 
@@ -98,7 +96,6 @@ def test_a_term_left_out_is_found_again_by_name(log, answer, tmp_path, table, nu
     assert entry["ci95"][0] <= whole <= entry["ci95"][1]
 
 
-@pytest.mark.xfail(_WIDE, strict=False, reason="with AVX-512 a filter is told for the delay (decision 0094)")
 def test_a_late_accelerometer_is_named(log, answer):
     ax, late = log.channels["ax_mps2"], 20  # rows of 10 ms
     felt = np.concatenate((np.full(late, ax[0]), ax[:-late]))

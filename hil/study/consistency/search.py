@@ -1,8 +1,9 @@
 """One number at a time: which of a model's numbers the data ask for, and which others would have done as well."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from scipy.stats import t as student
 
@@ -18,7 +19,6 @@ _WORTH_A_FIT = 0.5
 ALPHA = 0.003
 _STARTS: Mapping[str, Sequence[float]] = {
     "gain": (0.0, -0.5, 0.5, -2.0), "filter_s": (0.02, 0.1, 0.5, 2.0),
-    "delay_s": (0.02, -0.02, 0.1, -0.1, 0.2, -0.2, 0.35, -0.35),
     "yaw_gain": (0.0, -2.0), "ay_gain": (0.0, -2.0),
 }  # fmt: skip
 Say = Callable[[str], None]
@@ -97,18 +97,34 @@ def search(
 
 
 def _with(found: Found, number: str) -> Fit:
-    """The model with one more number free, from several starts: first the noise alone, then all together."""
-    now, tried = found.handed.get(number, 0.0), []
-    for start in _STARTS.get(number, (0.0,)):
-        sensor = {**found.final.sensor, number: now + start}
-        noises = [found.final.noise]
-        if not found.steps:  # what was taken for noise is none with the cause in place
-            noises.append(usual(found.model))
-        firsts = [fit(found.model, sensor, noise, fixed=found.handed, rounds=3) for noise in noises]
-        tried.append(min(firsts, key=lambda f: f.cost))
-    tried.sort(key=lambda f: f.cost)
-    further = [fit(found.model, f.sensor, f.noise, fixed=found.handed, rounds=12) for f in tried[:2]]
-    return min(further, key=lambda f: f.cost)
+    """The model with one more number free, from several starts: a few rounds, then more for those near the best."""
+    noises = [found.final.noise]
+    if not found.steps:  # what was taken for noise is none with the cause in place
+        noises.append(usual(found.model))
+    firsts = []
+    for start in _starts(found, number):
+        sensor = {**found.final.sensor, number: start}
+        firsts.append(min((_some_rounds(found, number, sensor, n, 3) for n in noises), key=lambda f: f.cost))
+    firsts.sort(key=lambda f: f.cost)
+    near = [f for k, f in enumerate(firsts) if k < 2 or f.cost < firsts[0].cost + ASKED]
+    return min((_some_rounds(found, number, f.sensor, f.noise, 12) for f in near), key=lambda f: f.cost)
+
+
+def _starts(found: Found, number: str) -> list[float]:
+    """Where a number begins: in the middle of every cell, of what cells resolve."""
+    of, cell = found.model.numbers[number], 2.0 * found.model.resolution.get(number, 0.0)
+    if cell:
+        return [float(cell * (k + 0.5)) for k in range(math.ceil(of.low / cell), math.floor(of.high / cell))]
+    return [found.handed.get(number, 0.0) + start for start in _STARTS.get(number, (0.0,))]
+
+
+def _some_rounds(found: Found, number: str, sensor: Values, noise: Values, rounds: int) -> Fit:
+    """A fit that is not ended. What cells resolve stays where it is: far from an end, no search passes their edges."""
+    if number not in found.model.resolution:
+        return fit(found.model, sensor, noise, fixed=found.handed, rounds=rounds)
+    others = {n: v for n, v in sensor.items() if n != number}
+    held = fit(found.model, others, noise, fixed={**found.handed, number: sensor[number]}, rounds=rounds)
+    return replace(held, sensor=held.sensor | {number: sensor[number]})
 
 
 def _take(found: Found, tried: Mapping[str, Fit]) -> tuple[Step, Fit, Values] | None:

@@ -27,7 +27,8 @@ from hil.study.logs.prepare import prepare
 from hil.study.logs.table import CHANNELS, MOTOR_DEMAND, PRESSURE_DEMAND, Floats, Log, make_log
 from hil.study.replay.rig import Rig
 from hil.study.replay.telling import Stack
-from hil.study.replay.vehicle import Vehicle, paper_car
+from hil.study.replay.vehicle import Vehicle
+from hil.study.replay.vehicle_set import paper_car
 from hil.study.replay.world import World, nominal
 from hil.study.verdict.tied import APART, remaining, summed
 from plant.effects.effect import GROUND, Scope

@@ -12,7 +12,7 @@ from hil.study.fitting.numbers import Numbers
 from hil.study.likelihood.noise import Frame
 from hil.study.logs.prepare import prepare
 from hil.study.replay.rig import Rig
-from hil.study.replay.vehicle import load_vehicle, paper_car
+from hil.study.replay.vehicle_set import load_vehicle, paper_car
 from hil.study.replay.world import DISC_GUESSED_K, DISC_TOLD_K, nominal
 
 NOISE_PA = 2e3

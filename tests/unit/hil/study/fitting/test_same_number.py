@@ -6,7 +6,7 @@ import pytest
 from hil.study.fitting.candidates import candidates, columns
 from hil.study.fitting.fit import Model, Term
 from hil.study.fitting.same_number import restated, same_number
-from hil.study.replay.vehicle import paper_car
+from hil.study.replay.vehicle_set import paper_car
 from hil.study.replay.world import nominal, start_nuisances
 
 VEHICLE = paper_car()

@@ -9,7 +9,7 @@ from hil.study.logs.prepare import prepare
 from hil.study.logs.table import Log, make_log
 from hil.study.replay.rig import Rig
 from hil.study.replay.steps import STEPS
-from hil.study.replay.vehicle import load_vehicle, paper_car
+from hil.study.replay.vehicle_set import load_vehicle, paper_car
 from hil.study.replay.world import World, nominal
 from plant.effects.effect import NODES
 from plant.effects.theta import THETA

@@ -5,7 +5,8 @@ import pytest
 
 from hil.study.logs.table import MOTOR_DEMAND, Log, UnusableError, make_log
 from hil.study.replay.nuisances import HALF_WIDTH_TO_SIGMA
-from hil.study.replay.vehicle import Vehicle, load_vehicle, paper_car, rest_friction
+from hil.study.replay.vehicle import Vehicle, rest_friction
+from hil.study.replay.vehicle_set import load_vehicle, paper_car
 from hil.study.replay.world import nominal
 from plant.effects.theta import THETA
 from plant.vectors import P

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hil.study.replay.vehicle import load_vehicle, paper_car
+from hil.study.replay.vehicle_set import load_vehicle, paper_car
 from hil.study.replay.world import ZEROS, nominal, start_nuisances
 from plant.effects.theta import THETA
 

@@ -12,7 +12,7 @@ from hil.study.fitting.linear import track_columns
 from hil.study.likelihood.noise import Frame
 from hil.study.logs.prepare import prepare
 from hil.study.replay.rig import Rig
-from hil.study.replay.vehicle import paper_car
+from hil.study.replay.vehicle_set import paper_car
 from hil.study.replay.world import nominal
 from hil.study.search.behind import replayed, silent
 from hil.study.search.contest import Contest

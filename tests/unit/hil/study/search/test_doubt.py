@@ -13,7 +13,7 @@ from hil.study.fitting.numbers import Numbers
 from hil.study.likelihood.noise import Frame
 from hil.study.logs.prepare import prepare
 from hil.study.replay.rig import Rig
-from hil.study.replay.vehicle import load_vehicle
+from hil.study.replay.vehicle_set import load_vehicle
 from hil.study.replay.world import nominal
 from hil.study.search.contest import Contender, odds, refitted
 from hil.study.search.diagnosis import Diagnosis

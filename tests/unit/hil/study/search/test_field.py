@@ -9,7 +9,7 @@ from hil.study.likelihood.noise import Frame
 from hil.study.logs.prepare import prepare
 from hil.study.logs.table import make_log
 from hil.study.replay.rig import Rig
-from hil.study.replay.vehicle import load_vehicle
+from hil.study.replay.vehicle_set import load_vehicle
 from hil.study.replay.world import nominal
 from hil.study.search.field import Field
 

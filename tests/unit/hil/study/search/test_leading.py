@@ -11,7 +11,7 @@ from hil.study.fitting.candidates import candidates, columns
 from hil.study.fitting.fit import Term
 from hil.study.logs.prepare import prepare
 from hil.study.replay.rig import Rig
-from hil.study.replay.vehicle import load_vehicle
+from hil.study.replay.vehicle_set import load_vehicle
 from hil.study.replay.world import nominal
 from hil.study.search import diagnose
 from hil.study.search.contest import Contender

@@ -13,7 +13,7 @@ from hil.study.fitting.numbers import Numbers
 from hil.study.likelihood.noise import Frame, Noise
 from hil.study.logs.prepare import prepare
 from hil.study.replay.rig import Rig
-from hil.study.replay.vehicle import paper_car
+from hil.study.replay.vehicle_set import paper_car
 from hil.study.replay.world import nominal
 from hil.study.search.contest import Contender, from_the_best, odds, refitted
 from hil.study.search.diagnosis import Diagnosis

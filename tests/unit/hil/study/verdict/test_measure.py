@@ -8,7 +8,7 @@ from hil.study.fitting.numbers import Numbers
 from hil.study.likelihood.noise import Frame
 from hil.study.logs.prepare import prepare
 from hil.study.replay.rig import Rig
-from hil.study.replay.vehicle import paper_car
+from hil.study.replay.vehicle_set import paper_car
 from hil.study.replay.world import nominal
 from hil.study.verdict.measure import folds, held_out
 
