@@ -12,6 +12,9 @@ from hil.study.logs.table import Floats
 
 Values = dict[str, float]
 _STEP = 1e-3
+"""Of gradients, in steps of the numbers."""
+_WIDE_STEP = 0.3
+"""Of curvatures: across the bends that samples make which begin to count less (4 standard deviations off)."""
 NOTHING: Mapping[str, float] = MappingProxyType({})
 _WIDEST = 3.0
 _NO_STEP = 2
@@ -112,7 +115,7 @@ def deviations(model: Model, found: Fit, block: Floats, fixed: Mapping[str, floa
         _, score = model.score({**fixed, **sensor}, noise)
         return np.bincount(block, score, count)
 
-    size, step = len(z), 0.02
+    size, step = len(z), _WIDE_STEP
     up = [by_block(z + step * e) for e in np.eye(size)]
     down = [by_block(z - step * e) for e in np.eye(size)]
     middle = by_block(z)

@@ -1,6 +1,6 @@
 """Candidates for one more cause of a model, each fitted with the noise that is left beside it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -62,6 +62,13 @@ def worse(one: Contender, best: Contender) -> float:
 
 def _shared_by(best: Contender) -> float:
     return best.error if np.isfinite(best.error) else 1.0
+
+
+def alternatives(listed: Sequence[Contender], named: Collection[str]) -> list[Contender]:
+    """The best of a race and what may be in its place, less what is named beside it: that is there anyway."""
+    own = listed[0].term.candidate.effect.name
+    others = [c for c in listed[1:] if (name := c.term.candidate.effect.name) == own or name not in named]
+    return [listed[0], *others]
 
 
 def at_its_end(term: Term) -> bool:

@@ -10,7 +10,7 @@ from hil.study.fitting.fit import Term
 from hil.study.fitting.linear import project
 from hil.study.fitting.own_error import UNLISTED, variance_of_law
 from hil.study.search.basis import Piece, shown
-from hil.study.search.contest import Contender, behind, worse
+from hil.study.search.contest import Contender, alternatives, behind, worse
 from hil.study.search.diagnosis import TIED, Diagnosis
 from hil.study.search.field import number_of
 from hil.study.search.intervals import half_width, intervals
@@ -78,21 +78,27 @@ def _verdict(found: Diagnosis, causes: list[dict[str, Any]], tied: Tied | None) 
         return "not_testable" if len(effects.intersection(found.untestable)) > _SILENT * len(effects) else "none"
     if any(isinstance(term.candidate, Piece) for term in found.final.terms):
         return "unlisted"
-    if tied is not None and tied.indices:
+    named = _named(found)
+    if tied is not None and any(found.screened[k].candidate.effect.name not in named for k in tied.indices):
         return "cannot_tell_apart"
     for listed in found.races:
-        best = listed[0]
-        for other in listed[1:]:
+        best, *others = alternatives(listed, named)
+        for other in others:
             another = other.term.candidate.effect.name != best.term.candidate.effect.name
             if another and behind(other, best) < _CERTAIN:
                 return "cannot_tell_apart"
     return "named"
 
 
+def _named(found: Diagnosis) -> set[str]:
+    return {term.candidate.effect.name for term in found.final.terms}
+
+
 def _causes(found: Diagnosis) -> list[dict[str, Any]]:
     """One entry an effect: its numbers together."""
     merged: dict[str, dict[str, Any]] = {}
-    for term, interval, listed in zip(found.final.terms, intervals(found), found.contenders, strict=True):
+    races = [alternatives(listed, _named(found)) for listed in found.contenders]
+    for term, interval, listed in zip(found.final.terms, intervals(found), races, strict=True):
         effect, candidate = term.candidate.effect, term.candidate
         if isinstance(candidate, Piece):
             merged.setdefault(effect.name, _unlisted(found, candidate, listed))
@@ -148,8 +154,9 @@ def _unlisted(found: Diagnosis, piece: Piece, listed: list[Contender]) -> dict[s
 def _rivals(found: Diagnosis) -> list[tuple[Contender, float]]:
     """Contenders of other effects that fit nearly as well, with their probability."""
     rivals = []
-    named = {term.candidate.effect.name for term in found.final.terms}
-    for listed in found.races:
+    named = _named(found)
+    for race in found.races:
+        listed = alternatives(race, named)
         for contender, chance in list(zip(listed, probabilities(listed), strict=True))[1:]:
             near = worse(contender, listed[0]) < TIED
             if near and contender.term.candidate.effect.name not in named:

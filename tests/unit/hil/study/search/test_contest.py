@@ -7,7 +7,7 @@ import pytest
 
 from hil.study.fitting.candidates import candidates, columns
 from hil.study.fitting.fit import Term
-from hil.study.search.contest import Contender, at_its_end, behind, worse
+from hil.study.search.contest import Contender, alternatives, at_its_end, behind, worse
 
 CANDIDATES = {c.name: c for c in candidates(columns())}
 
@@ -18,9 +18,9 @@ def test_a_value_as_far_off_as_it_may_be_is_at_its_end(share: float, ended: bool
     assert at_its_end(Term(drag, share * drag.parameter.high)) is ended
 
 
-def _fitted(cost: float, evidence: float, error: float) -> Contender:
+def _fitted(cost: float, evidence: float, error: float, name: str = "mass_offset@car") -> Contender:
     nothing: Any = None
-    return Contender(Term(CANDIDATES["mass_offset@car"], 100.0), nothing, cost, evidence, 1.0, nothing, error=error)
+    return Contender(Term(CANDIDATES[name], 100.0), nothing, cost, evidence, 1.0, nothing, error=error)
 
 
 @pytest.mark.parametrize(("error", "shared_by"), [(np.inf, 1.0), (1.0, 1.0), (4.0, 4.0)])
@@ -30,3 +30,16 @@ def test_what_divides_gains_divides_their_difference(error: float, shared_by: fl
     assert worse(other, best) == pytest.approx(40.0 / shared_by)
     assert behind(other, best) == pytest.approx(38.0 / shared_by)
     assert worse(best, best) == behind(best, best) == 0.0
+
+
+def test_what_is_named_beside_a_cause_is_no_rival_of_it() -> None:
+    """Ground speed 2 % off and a drag of one wheel: both were named, and could not be told from each other."""
+    names = ["speed_scale@car", "residual_drag@rr", "residual_drag@rear", "mass_offset@car"]
+    listed = [_fitted(10.0 * k, 0.0, 1.0, name) for k, name in enumerate(names)]
+    left = alternatives(listed, {"speed_scale", "residual_drag"})
+    assert [c.term.candidate.name for c in left] == ["speed_scale@car", "mass_offset@car"]
+
+
+def test_other_places_of_a_cause_stay_in_its_race() -> None:
+    listed = [_fitted(10.0 * k, 0.0, 1.0, name) for k, name in enumerate(["residual_drag@rr", "residual_drag@rear"])]
+    assert alternatives(listed, {"residual_drag"}) == listed
