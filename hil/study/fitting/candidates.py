@@ -30,6 +30,8 @@ _KINDS = {
     "front": "axle", "rear": "axle", "left": "side", "right": "side",
     "fl": "wheel", "fr": "wheel", "rl": "wheel", "rr": "wheel",
 }  # fmt: skip
+_MOTOR = "motor."
+"""Joints of the motors."""
 USUAL = 1.5
 """Standard deviation before any data, in sizes met on real cars."""
 
@@ -111,14 +113,19 @@ def columns(without: Collection[str] = ()) -> list[Column]:
     return found
 
 
-def candidates(of: list[Column]) -> list[Candidate]:
-    """All places of all strengths that have columns."""
+def candidates(of: list[Column], undriven: Collection[int] = ()) -> list[Candidate]:
+    """All places of all strengths that have columns; of motors, those with one at every wheel.
+
+    Where the rear wheels are ``undriven``, the motor on the right is the one front right.
+    """
     index: Mapping[tuple[str, str, int], int] = {
         (column.effect.name, column.parameter.name, column.member): k for k, column in enumerate(of)
     }
     found = []
     for effect in dict.fromkeys(column.effect for column in of):
         groups = PLACES[effect.scope]
+        if effect.scope is Scope.WHEEL and all(joint.startswith(_MOTOR) for joint in effect.joints):
+            groups = {place: members for place, members in groups.items() if not {*members} & {*undriven}}
         for parameter in effect.strengths:
             for place, members in groups.items():
                 at = tuple(index[effect.name, parameter.name, member] for member in members)

@@ -1,6 +1,6 @@
 """Motors at one axle alone: logs that tell torques of two wheels."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,3 +30,15 @@ def with_both_axles(logs: Sequence[Log]) -> Sequence[Log]:
         )
         for log in logs
     ]
+
+
+def undriven(logs: Iterable[Log]) -> set[int]:
+    """Wheels of one axle whose motors, as told and as asked, never do anything in logs where those of the other do."""
+    driven = {
+        k
+        for log in logs
+        for names in (MOTOR_TORQUE, MOTOR_DEMAND)
+        for k, name in enumerate(names)
+        if name in log.channels and np.any(np.nan_to_num(log.channels[name]))
+    }
+    return {2, 3} if driven and driven <= {0, 1} else {0, 1} if driven and driven <= {2, 3} else set()

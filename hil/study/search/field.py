@@ -7,6 +7,7 @@ from hil.study.fitting.candidates import Candidate, candidates, columns
 from hil.study.fitting.fit import Fitter, Model, Tracks
 from hil.study.fitting.linear import Sums, project, project_later, track_columns
 from hil.study.likelihood.noise import Frame, Noise
+from hil.study.logs.driven import undriven
 from hil.study.replay.rig import Rig
 from hil.study.search.behind import replayed, silent
 from hil.study.search.contest import Contest
@@ -24,7 +25,7 @@ class Field:
     def __init__(self, rig: Rig, frame: Frame, untold: Sequence[str]) -> None:
         self._rig, self._frame = rig, frame
         self._columns = columns(untold)
-        self.candidates: list[Candidate] = candidates(self._columns)
+        self.candidates: list[Candidate] = candidates(self._columns, undriven(drive.log for drive in rig.case.drives))
         self.tracks: Tracks = {}
 
     def taken_at(self, fitter: Fitter, model: Model) -> None:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from hil.study.logs.driven import with_both_axles
+from hil.study.fitting.candidates import candidates, columns
+from hil.study.logs.driven import undriven, with_both_axles
 from hil.study.logs.table import MOTOR_DEMAND, MOTOR_TORQUE, make_log
 
 
@@ -41,3 +42,19 @@ def test_all_logs_tell_alike():
     assert with_both_axles(logs) is logs
     logs = [_log(*MOTOR_TORQUE[2:]), _log()]
     assert with_both_axles(logs) is logs
+
+
+@pytest.mark.parametrize(("told", "wheels"), [
+    (MOTOR_TORQUE[2:], {0, 1}), (MOTOR_TORQUE[:2], {2, 3}), (MOTOR_TORQUE, set()), ((), set()),
+])  # fmt: skip
+def test_the_places_of_a_motor_are_those_of_wheels_that_have_one(told, wheels):
+    """The motor front right was named as those of the right side, in a car with none at the rear."""
+    without = undriven(with_both_axles([_log(*told)]))
+    assert without == wheels
+    listed = [one for one in candidates(columns(), without) if one.effect.name == "iwm_gain"]
+    members = {one.place: {*one.members()} for one in listed}
+    assert not any(those & wheels for those in members.values())
+    assert {one.places for one in listed} == {2 * len(members)}
+    assert len(members) == (3 if wheels else 9)
+    brakes = {one.place for one in candidates(columns(), without) if one.effect.name == "pad_mu_gain"}
+    assert len(brakes) == 9

@@ -4,10 +4,21 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from outsider import VEHICLE
+from pulses import log_as_driven
 
+from hil.study.fitting.candidates import candidates, columns
+from hil.study.fitting.fit import Fitter, Term
+from hil.study.fitting.numbers import Numbers
 from hil.study.likelihood.noise import Frame
 from hil.study.logs.case import Segment
-from hil.study.search.onset import begin_of, moments_of, nearest, price
+from hil.study.logs.prepare import prepare
+from hil.study.replay.rig import Rig
+from hil.study.replay.vehicle_set import load_vehicle
+from hil.study.replay.world import nominal
+from hil.study.search.onset import begin_of, begins, moments_of, nearest, price, with_onsets
+
+DEVIATIONS = {"wheel": 0.02, "ax": 0.02, "gps": 0.03, "pressure": 1e4, "motor": 0.5}
 
 
 def _products(value: float, begin: int, strength: list[float], seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -55,3 +66,36 @@ def test_the_manoeuvre_nearest_to_a_moment_is_of_its_own_drive():
     starts = [(0, 0.0), (0, 30.0), (1, 10.0)]
     moments = [(0, 1.0), (0, 14.0), (0, 16.0), (0, 99.0), (1, 0.0)]
     assert [nearest(starts, moment) for moment in moments] == [0, 0, 1, 1, 2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("always", [True, False])
+def test_what_was_taken_to_begin_and_was_always_there_has_no_beginning(always):
+    """A wind seemed to begin in the second log: where it was screened, what it does was not yet what it did there."""
+    vehicle = load_vehicle(VEHICLE)
+    log = log_as_driven(vehicle, 0.318)
+    case = prepare([log, log], 0.318)
+    rig, base = Rig(case, vehicle), nominal(vehicle)
+    (pads,) = [one for one in candidates(columns()) if one.name == "pad_mu_gain@car"]
+    second = next(moment for moment in begins(case) if moment[0] == 1)
+
+    def fitter() -> Fitter:
+        numbers = Numbers(rig, Frame.of(case), vehicle, base, relinearise=True)
+        numbers.anew(np.zeros(len(numbers.nuisances)))
+        return numbers.fitter
+
+    there = Term(pads, -0.2, onset=None if always else second)
+    as_handed_in = fitter().start()[0].z
+    told = rig.run(fitter().world(as_handed_in, (there,)))
+    rng, first = np.random.default_rng(5), 0
+    for drive in case.drives:
+        for group, values in told.items():
+            own = values[first : first + drive.samples]
+            drive.measured[group][:] = own + DEVIATIONS.get(group, 0.02) * rng.standard_normal(own.shape)
+        first += drive.samples
+    fresh = fitter()
+    noise = fresh.settle(fresh.at(as_handed_in, (there,), fresh.start()[1]), fresh.start()[1], 2)[1]
+    taken = fresh.at(as_handed_in, (Term(pads, -0.2, onset=second),), noise)
+    (term,) = with_onsets(fresh, taken, noise).terms
+    assert (term.onset is None) is always
+    assert term.value == pytest.approx(-0.2, abs=0.02)
