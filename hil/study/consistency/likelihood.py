@@ -13,8 +13,9 @@ from hil.study.logs.table import Floats
 Values = dict[str, float]
 _STEP = 1e-3
 """Of gradients, in steps of the numbers."""
-_WIDE_STEP = 0.3
-"""Of curvatures: across the bends that samples make which begin to count less (4 standard deviations off)."""
+_WIDE_STEP, _IN_A_CELL = 0.3, 0.02
+"""Of curvatures: across the bends that samples make which begin to count less (4 standard deviations off); and of what
+cells resolve, whose edges are steps."""
 NOTHING: Mapping[str, float] = MappingProxyType({})
 _WIDEST = 3.0
 _NO_STEP = 2
@@ -115,19 +116,18 @@ def deviations(model: Model, found: Fit, block: Floats, fixed: Mapping[str, floa
         _, score = model.score({**fixed, **sensor}, noise)
         return np.bincount(block, score, count)
 
-    size, step = len(z), _WIDE_STEP
-    up = [by_block(z + step * e) for e in np.eye(size)]
-    down = [by_block(z - step * e) for e in np.eye(size)]
+    size, steps = len(z), np.array([_IN_A_CELL if n in model.resolution else _WIDE_STEP for n in names])
+    each = np.diag(steps)
+    up, down = [by_block(z + e) for e in each], [by_block(z - e) for e in each]
     middle = by_block(z)
-    gradient = np.array([(u - d) / (2.0 * step) for u, d in zip(up, down, strict=True)])
+    gradient = np.array([(u - d) / (2.0 * step) for u, d, step in zip(up, down, steps, strict=True)])
     hessian = np.zeros((size, size))
     for i in range(size):
-        hessian[i, i] = -(up[i] - 2.0 * middle + down[i]).sum() / step**2
+        hessian[i, i] = -(up[i] - 2.0 * middle + down[i]).sum() / steps[i] ** 2
         for j in range(i):
-            e = step * (np.eye(size)[i] + np.eye(size)[j])
-            f = step * (np.eye(size)[i] - np.eye(size)[j])
-            mixed = (by_block(z + e) - by_block(z + f) - by_block(z - f) + by_block(z - e)).sum() / (4.0 * step**2)
-            hessian[i, j] = hessian[j, i] = -mixed
+            e, f = each[i] + each[j], each[i] - each[j]
+            mixed = (by_block(z + e) - by_block(z + f) - by_block(z - f) + by_block(z - e)).sum()
+            hessian[i, j] = hessian[j, i] = -mixed / (4.0 * steps[i] * steps[j])
     values, vectors = np.linalg.eigh(hessian)
     known = [(number.step / number.prior) ** 2 if number.prior > 0.0 else _UNKNOWN for number in numbers]
     inverse = np.linalg.inv((vectors * np.maximum(values, 0.0)) @ vectors.T + np.diag(known))
