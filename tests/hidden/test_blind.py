@@ -92,6 +92,14 @@ _MISSED = (
         9927935,
         "tyres' dependence on load explains more of it, and is taken back: 3.3 deviations from nothing",
     ),
+    ("pitch_dive", 16068464, "curves of tyre and springs that no set states do the same"),
+    ("aero_lift", 16068464, "an axle's lift may be off by 0.1 by what two models of loads do not have in common"),
+    ("wrong_scale", 16068464, "wheel speeds 1.3 % too large are radii of all tyres, 5 in chi-squared behind"),
+    (
+        "pad_mu_gain",
+        16068464,
+        "rear pads 8 % weak: rear gain, height and springs take all but 18 in chi-squared; why so much is not known",
+    ),
     ("bedding", 1903544, "all four brakes; why is not known: 3.8 of 28.4 asked once the search began again"),
 )
 
