@@ -27,7 +27,7 @@ def with_onsets(fitter: Fitter, model: Model, noise: Noise) -> Model:
     """The model with a beginning for each cause that was clearly absent before, and for no other.
 
     A time that may be chosen is one more way to fit what the model gets wrong, and is asked for more than that.
-    What seemed to begin far from where it ended may always have been there.
+    What was taken to begin, where the numbers still stood in for it, may always have been there.
     """
     starts = begins(fitter.rig.case)
     for k, term in enumerate(model.terms):
@@ -40,8 +40,7 @@ def with_onsets(fitter: Fitter, model: Model, noise: Noise) -> Model:
             moments = _about(fitter, starts.index(term.onset))
             begun = min(model, _begun(fitter, model, noise, k, moments, term.value), key=_cost)
             always = fitter.fit(fitter.at(model.z, _since(model, k, term.value, None), noise), noise, 3)
-            gained = always.cost - begun.cost
-            model = begun if gained > _least(term, len(starts), len(moments)) else always
+            model = begun if begun.cost + price(fitter.frame) < always.cost else always
     return model
 
 
@@ -78,13 +77,9 @@ def _later(fitter: Fitter, model: Model, noise: Noise, k: int) -> Model | None:
         return None
     value = float(np.clip(b[block:].sum() / q[block:].sum(), *_bounds(model.terms[k])))
     moments = _about(fitter, block)
+    least = float(chi2.isf(_ALPHA / (len(b) * len(moments)), 1)) * variance_of(model.terms[k].candidate)
     fitted = _begun(fitter, model, noise, k, moments, value)
-    return fitted if model.cost - fitted.cost > _least(model.terms[k], len(b), len(moments)) else None
-
-
-def _least(term: Term, manoeuvres: int, moments: int) -> float:
-    """What a beginning must take off the cost: more than chance and the model's own error, were it always there."""
-    return float(chi2.isf(_ALPHA / (manoeuvres * moments), 1)) * variance_of(term.candidate)
+    return fitted if model.cost - fitted.cost > least else None
 
 
 def _about(fitter: Fitter, block: int) -> list[Moment]:
