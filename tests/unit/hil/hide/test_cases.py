@@ -103,6 +103,7 @@ def test_magnitude_is_scaled_for_the_snr():
     assert expected_snr(scaled)[1] >= expected_snr(scaled)[0]
 
 
+@pytest.mark.slow
 def test_a_bound_ends_the_search():
     scaled = scaled_case(make_case((Hidden("pad_temp_fade", "car", 0.0001),), 5, "high", "stops"), 1000.0)
     assert not scaled.reached
@@ -116,6 +117,7 @@ def test_what_tolerances_imitate_counts_less():
     assert alone > 2.0 * beside
 
 
+@pytest.mark.slow
 def test_how_late_a_node_sends_is_a_tolerance_too():
     """A lag of the pressure's sensor is a latency as long as it is short."""
     late = make_case((Hidden("timestamp_offset", "imu", 0.001),), 5, "low", "stops")

@@ -98,6 +98,7 @@ def test_a_car_that_stands_is_unusable():
         explain({"t_s": t, "speed_mps": np.zeros(1000), "ax_mps2": np.zeros(1000)})
 
 
+@pytest.mark.slow
 def test_slip_of_the_tyres_is_no_filter_of_the_accelerometer():
     """Wheels slip in proportion to the force: those of soft tyres lead the car by 0.2 s at 20 m/s."""
     made = _log(5)

@@ -32,6 +32,7 @@ def test_numbers_that_data_say_nothing_of_do_not_hide_a_strain():
     assert strain(z, told=10.0) == pytest.approx(4.0)
 
 
+@pytest.mark.slow
 def test_squares_of_right_numbers_add_up_to_what_the_data_tell_of_them():
     """Fitted to data made with numbers drawn by their tolerance; three times as far, the sum is many times that."""
     vehicle = paper_car()

@@ -90,12 +90,14 @@ def _singles(driven: _Driven, names: Sequence[str], values: Sequence[float]) -> 
     return one_for_all(driven.fitter, driven.field, found, model, driven.noise)
 
 
+@pytest.mark.slow
 def test_one_cause_takes_the_place_of_two_that_imitate_it(driven):
     first, *_ = _singles(driven, ["tyre_radius@fl", "rolling_resistance@car"], [0.001, 0.2])
     assert first.term.candidate.effect.name in ("residual_drag", "stuck_corner")
     assert first.term.candidate.place == "fl"
 
 
+@pytest.mark.slow
 def test_two_that_are_there_stay():
     hidden = {"residual_drag@fl": 25.0, "pressure_offset@rr": 1e5}
     assert _singles(_Driven(hidden), list(hidden), list(hidden.values())) == []
