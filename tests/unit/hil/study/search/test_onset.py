@@ -71,7 +71,7 @@ def test_the_manoeuvre_nearest_to_a_moment_is_of_its_own_drive():
 @pytest.mark.slow
 @pytest.mark.parametrize("always", [True, False])
 def test_what_was_taken_to_begin_and_was_always_there_has_no_beginning(always):
-    """A wind seemed to begin in the second log: where it was screened, what it does was not yet what it did there."""
+    """The screen may give a cause a beginning where numbers of the car still stand in for it."""
     vehicle = load_vehicle(VEHICLE)
     log = log_as_driven(vehicle, 0.318)
     case = prepare([log, log], 0.318)
