@@ -102,7 +102,7 @@ _MISSED = (
     ),
     ("imu_filter", 807153, "4.3 ms: a late stamp of the sensor does nearly the same"),
     ("aero_lift", 807153, "not looked into; an axle's lift may be off by 0.1, as two models of loads are"),
-    ("slip_stiffness", 807153, "front tyres 4 % softer; not looked into: its own error is 1.6 times the noise, as at the rear (docs/trials.md)"),
+    ("slip_stiffness", 807153, "not looked into; of the rear axle the model errs by 1.6 times the noise"),
     ("hot_spot", 807153, "its tenth order needs the angle of the wheel better than a free replay keeps it"),
     ("bedding", 1903544, "all four brakes; why is not known: 3.8 of 28.4 asked once the search began again"),
 )
