@@ -69,10 +69,10 @@ def run(args: argparse.Namespace) -> int:
     from hil.trials.score import table_of
 
     if args.own_error is not None:
-        from hil.trials.own_error import as_toml, measure, ratios
+        from hil.trials.own_error import as_toml, measure, tables
 
         return _measured(
-            args.own_error, lambda: as_toml(ratios(measure(args.count, args.seed, _say)), args.count, args.seed)
+            args.own_error, lambda: as_toml(tables(*measure(args.count, args.seed, _say)), args.count, args.seed)
         )
     if args.apart is not None:
         from hil.trials import apart

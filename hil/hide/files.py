@@ -1,7 +1,9 @@
 """What is handed over (logs, logs.toml, vehicle.toml) and what is sealed (answer.json in a folder beside it)."""
 
 import json
+from collections.abc import Iterable
 from dataclasses import asdict
+from math import hypot, pi
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +12,12 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from hil.errors import BrakebenchError
-from hil.hide.car import NOMINAL, TOLERANCE
+from hil.hide.body import LINKS
+from hil.hide.car import NOMINAL, TOLERANCE, Car
 from hil.hide.case import Case, Hidden, logs
 from hil.hide.catalogue import find
 from hil.hide.manoeuvres import TICK_S
+from hil.hide.noise import USUALLY_LATE_S
 
 _RENAMED = {
     "ehb_frequency_hz": "ehb_natural_frequency_hz", "ehb_damping": "ehb_damping_ratio",
@@ -31,8 +35,12 @@ _TOLD = (
     "ehb_damping", "ehb_dead_time_s", "ehb_build_rate_pa_s", "ehb_release_rate_pa_s", "ehb_max_pressure_pa",
     "motor_time_constant_s", "motor_rate_limit_nm_s", "motor_peak_torque_nm", "motor_peak_power_w",
     "motor_fade_start_mps", "motor_fade_end_mps", "motor_derating_start_k", "motor_derating_end_k",
-    "battery_charge_power_w", "imu_cutoff_hz",
+    "battery_charge_power_w", "imu_cutoff_hz", "disc_heat_front_j_k", "disc_heat_rear_j_k", "disc_cooling_front_w_k",
+    "disc_cooling_rear_w_k",
 )  # fmt: skip
+_SUPPORT, _ROLL_CENTRE_M = 0.06, 0.03
+"""Half-widths of the links' support, whose share of an axle's braking force is not the pads' where motors brake, too,
+and of the roll centres, as drawings tell them."""
 
 
 def sealed_folder(folder: Path) -> Path:
@@ -91,7 +99,58 @@ def vehicle_toml() -> str:
     for name, (key, value) in _SCALES.items():
         lines.append(f"{key} = {value!r}")
         lines.append(f"{key}_tolerance = {value * TOLERANCE[name] / float(getattr(NOMINAL, name)):.4f}")
+    lines.append("# frames of the other nodes beside the wheel speeds'")
+    lines.append(f"node_latency_s_tolerance = {2.0 * USUALLY_LATE_S:.5f}")
+    lines.append("# suspension at the wheel, [front, rear]; linear springs, roll centres on the road")
+    for key, (values, half) in _suspension(NOMINAL).items():
+        lines.append(f"{key} = {values!r}")
+        lines.append(f"{key}_tolerance = {half!r}")
     return "\n".join(lines) + "\n"
+
+
+def _suspension(car: Car) -> dict[str, tuple[float | list[float], float]]:
+    """Springs, dampers, bars and links of a car that dives, pitches and rolls as ``car``, each with its half-width.
+
+    Pitch and heave are not coupled: c_f a = c_r b, dampers alike (Mitschke/Wallentowitz, Dynamik der Kraftfahrzeuge).
+    Pitch stiffness is what of m h the links do not carry, over the dive; inertia and damping follow from frequency and
+    damping ratio. Support: tan = share h / (L b), b the axle's share of the braking force, between that of the pads and
+    the motors' half. Bars are what the roll needs beyond the springs, shared so that loads across are, by weight.
+    """
+    front_m, rear_m = car.cog_to_front_axle_m, car.wheelbase_m - car.cog_to_front_axle_m
+    moment = car.mass_kg * car.cog_height_m
+    stiffness = (1.0 - LINKS) * moment / car.dive_rad_s2_m
+    w = 2.0 * pi * car.pitch_frequency_hz
+    inertia = stiffness / w**2
+    springs = [stiffness / (2.0 * m * car.wheelbase_m) for m in (front_m, rear_m)]
+    pads = car.brake_gain_front_nm_pa / (car.brake_gain_front_nm_pa + car.brake_gain_rear_nm_pa)
+    braking = [0.5 * (pads + 0.5), 0.5 * (1.5 - pads)]
+    weight = [rear_m / car.wheelbase_m, front_m / car.wheelbase_m]
+    roll = [share * moment / car.roll_rad_s2_m for share in weight]
+    dive, frequency, damping, rolling = (
+        TOLERANCE[name] / float(getattr(car, name))
+        for name in ("dive_rad_s2_m", "pitch_frequency_hz", "pitch_damping", "roll_rad_s2_m")
+    )
+    return {
+        "suspension_ride_rate_n_m": (_rounded(springs), round(dive * max(springs))),
+        "suspension_progression_n_m3": (0.0, 0.0),
+        "suspension_damping_ns_m": (
+            _rounded(2.0 * car.pitch_damping / w * c for c in springs),
+            round(2.0 * car.pitch_damping / w * max(springs) * hypot(damping, dive, frequency)),
+        ),
+        "suspension_brake_support_tangent": (
+            [round(LINKS * car.cog_height_m / (car.wheelbase_m * b), 3) for b in braking], _SUPPORT,
+        ),
+        "suspension_anti_roll_nm_rad": (
+            _rounded(k - 0.5 * c * car.track_m**2 for k, c in zip(roll, springs, strict=True)),
+            round(rolling * max(roll)),
+        ),
+        "suspension_roll_centre_height_m": (0.0, _ROLL_CENTRE_M),
+        "vehicle_pitch_inertia_kg_m2": (round(inertia), round(inertia * hypot(dive, 2.0 * frequency))),
+    }  # fmt: skip
+
+
+def _rounded(values: Iterable[float]) -> list[float]:
+    return [float(round(value, -1)) for value in values]
 
 
 def answer(case: Case) -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """How far apart causes are: d' of an effect and the listed one that comes nearest, by the hidden car's own equations.
 
 ``apart.toml`` holds d' for one car and drive of the full set (``brakebench trials --apart``), by effect, place, noise
-level and signal-to-noise ratio: the distance of two whitened signatures where the other effect has the size that brings
-it nearest, no tolerance or latency known better than the car's set states it.
+level and signal-to-noise ratio: the distance of two whitened signatures where the other effect, at any place the plant
+lists it at, has the size that brings it nearest, no tolerance or latency known better than the car's set states it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -17,6 +17,9 @@ from hil.hide.cases import SEPARABLE
 from hil.hide.catalogue import Hideable, find
 from hil.hide.noise import LEVELS
 from hil.hide.snr import WHEELS, difference, signal_to_noise, whitened
+from hil.study.fitting.candidates import PLACES
+from plant.effects.effect import Scope
+from plant.effects.theta import THETA
 
 _SIZES = (8.0, 15.0)
 """Signal-to-noise ratios at which the first name is asked for."""
@@ -49,7 +52,7 @@ def measure(seed: int, say: Callable[[str], None]) -> dict[tuple[str, str, str],
         signatures, products = _shown(case)
         for k, size in product(range(len(signatures)), _SIZES):
             own = signatures[k]
-            if own.effect not in _ALIKE.values():
+            if own.effect not in _ALIKE.values() and own.place in find(own.effect).where:
                 found.setdefault((own.effect, own.place, level), {})[size] = nearest(k, signatures, products, size)
         say(f"{level} noise")
     return found
@@ -66,7 +69,7 @@ def _shown(case: Case) -> tuple[list[Signature], Vector]:
         kind, ratio = find(one.effect), min(signal_to_noise(column, unknown)[0], as_number(hidden))
         return Signature(one.effect, one.wheel, _bounds(kind, one.magnitude), ratio), column
 
-    found = [_well_seen(shown, kind, place) for kind in SEPARABLE for place in kind.where]
+    found = [_well_seen(shown, kind, place) for kind in SEPARABLE for place in _places(kind)]
     found += [(replace(own, effect=_ALIKE[own.effect]), column) for own, column in found if _driven_forward(own)]
     columns = np.stack([column for _, column in found], axis=1)
     along = unknown.T @ columns
@@ -89,6 +92,12 @@ def _well_seen(
         size = 0.5 * (under + over) if under and over else float(np.clip(size / share, kind.low, kind.high))
     _, own, column = min(found, key=lambda one: one[0])
     return own, column
+
+
+def _places(kind: Hideable) -> tuple[str, ...]:
+    """Where it may be hidden, and where else the plant lists it: all four radii are the scale of the wheel speeds."""
+    scopes = [effect.scope for effect in THETA.effects if effect.name == kind.name and effect.scope is not Scope.NODE]
+    return tuple(dict.fromkeys([*kind.where, *(place for scope in scopes for place in PLACES[scope])]))
 
 
 def _driven_forward(own: Signature) -> bool:

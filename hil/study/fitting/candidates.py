@@ -1,7 +1,7 @@
 """What may be wrong: every listed effect, each of its numbers, at each place where it can act."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from hil.study.logs.table import Floats
 from hil.study.replay.world import World
@@ -69,13 +69,14 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A listed effect's number at a place; its columns move together."""
+    """A listed effect's number at a place; its columns move together. ``sprung``: the set states the car's springs."""
 
     effect: Effect
     parameter: Parameter
     place: str
     columns: tuple[int, ...]
     places: int
+    sprung: bool = field(default=True, kw_only=True)
 
     @property
     def name(self) -> str:
@@ -113,10 +114,11 @@ def columns(without: Collection[str] = ()) -> list[Column]:
     return found
 
 
-def candidates(of: list[Column], undriven: Collection[int] = ()) -> list[Candidate]:
+def candidates(of: list[Column], undriven: Collection[int] = (), sprung: bool = True) -> list[Candidate]:
     """All places of all strengths that have columns; of motors, those with one at every wheel.
 
-    Where the rear wheels are ``undriven``, the motor on the right is the one front right.
+    Where the rear wheels are ``undriven``, the motor on the right is the one front right. ``sprung``: whether the set
+    states the suspension.
     """
     index: Mapping[tuple[str, str, int], int] = {
         (column.effect.name, column.parameter.name, column.member): k for k, column in enumerate(of)
@@ -129,5 +131,7 @@ def candidates(of: list[Column], undriven: Collection[int] = ()) -> list[Candida
         for parameter in effect.strengths:
             for place, members in groups.items():
                 at = tuple(index[effect.name, parameter.name, member] for member in members)
-                found.append(Candidate(effect, parameter, place, at, len(groups) * len(effect.strengths)))
+                found.append(
+                    Candidate(effect, parameter, place, at, len(groups) * len(effect.strengths), sprung=sprung)
+                )
     return found

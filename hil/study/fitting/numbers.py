@@ -34,7 +34,7 @@ class Numbers:
     def __init__(self, rig: Rig, frame: Frame, vehicle: Vehicle, base: World, relinearise: bool) -> None:
         self._rig, self._frame, self._base, self._relinearise = rig, frame, base, relinearise
         told = all(drive.log.disc_temperature_k is not None for drive in rig.case.drives)
-        self.nuisances = (*vehicle.nuisances, *start_nuisances(told))
+        self.nuisances = (*vehicle.nuisances, *start_nuisances(told, vehicle.node_latency_s))
         self._steps: Floats = np.full(len(self.nuisances), _COARSE)
         self._taken: deque[tuple[Floats, tuple[Term, ...], Fitter]] = deque(maxlen=_REMEMBERED)
 

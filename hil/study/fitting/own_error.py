@@ -5,7 +5,7 @@ the root mean square of each number's estimate over its standard deviation, on d
 the plant and has nothing hidden (``brakebench trials --own-error``); 1 would be a perfect model. Whole car, axle, side
 and wheel have each their own: what the form does to all wheels alike it does not do to one. A gain in chi-squared is
 divided by its square before it is called beyond noise. The same is measured for the laws in no list, of all their
-coefficients together.
+coefficients together. It holds more of what errs more where a set says nothing of the car's springs (``unsprung``).
 """
 
 import tomllib
@@ -25,26 +25,37 @@ UNLISTED = "unlisted"
 """Name of all laws in no list."""
 
 
+Table = Mapping[str, Mapping[str, Mapping[str, float]]]
+"""Ratios by effect, number and kind of place."""
+
+
 @cache
-def _table() -> Mapping[str, Mapping[str, Mapping[str, float]]]:
+def _tables() -> Mapping[str, Table]:
     source = resources.files("hil.study.fitting") / "own_error.toml"
-    table: Mapping[str, Mapping[str, Mapping[str, float]]] = tomllib.loads(source.read_text(encoding="utf-8"))["ratio"]
-    return table
+    tables: Mapping[str, Table] = tomllib.loads(source.read_text(encoding="utf-8"))
+    return tables
 
 
 def variance_of(candidate: Candidate) -> float:
     """What the gain of a candidate is divided by, at least 1."""
-    return _variance(candidate.effect.name, candidate.parameter.name, candidate.place)
+    return _variance(candidate.effect.name, candidate.parameter.name, candidate.place, candidate.sprung)
 
 
 def variance_of_law(name: str, place: str) -> float:
-    """The same for a law in no list, by `hil.study.search.basis.Law.name`."""
-    return _variance(UNLISTED, name, place)
+    """The same for a law in no list, by `hil.study.search.basis.Law.name`, whatever is known of the springs."""
+    return _variance(UNLISTED, name, place, sprung=False)
 
 
-def _variance(effect: str, number: str, place: str) -> float:
-    by_kind = _table().get(effect, {}).get(number, {})
-    return shared_out(max(by_kind.get(kind_of(place), USUAL), 1.0) ** 2)
+def _variance(effect: str, number: str, place: str, sprung: bool) -> float:
+    kind = kind_of(place)
+    ratio = _ratio("ratio", effect, number, kind, USUAL)
+    if not sprung:
+        ratio = max(ratio, _ratio("unsprung", effect, number, kind, 1.0))
+    return shared_out(max(ratio, 1.0) ** 2)
+
+
+def _ratio(table: str, effect: str, number: str, kind: str, otherwise: float) -> float:
+    return _tables().get(table, {}).get(effect, {}).get(number, {}).get(kind, otherwise)
 
 
 def shared_out(variance: float) -> float:

@@ -1,6 +1,6 @@
 """Numbers of the vehicle that may be off, and by how much: what the set states, and forms of curves that none does."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,13 +25,16 @@ _SUSPENSION = {
     "suspension_brake_support_tangent": 0.6, "suspension_anti_roll_nm_rad": 0.7, "suspension_roll_centre_height_m": 3.0,
     "vehicle_pitch_inertia_kg_m2": 0.6, "vehicle_roll_inertia_kg_m2": 0.2,
 }  # fmt: skip
-_LIFT = 0.1
-"""The same of an axle's lift coefficient: it takes what two models of the axles' loads do not have in common. Known to
-0.03, it was off by 1.9 of what noise explains on drives with nothing hidden."""
+_SPRINGS = 0.05
+"""The same share of a number of the suspension that a set states."""
+_LIFT = 0.06
+"""Least half-width of an axle's lift coefficient: it takes what two models of the axles' loads do not have in common.
+Known to 0.03, it was off by 1.9 of what noise explains on drives with nothing hidden."""
 _SIDE = 0.5
 """Share that the load may be off at which a tyre's cornering stiffness is largest: whether it grows with the load."""
 _THERMAL = {"friction_brake_heat_capacity_j_k": 0.2, "friction_brake_cooling_w_k": 0.3}
-"""Heat store of the discs; where the friction does not depend on temperature it does not matter."""
+"""Heat store of the discs, if a set does not state it; where the friction does not depend on temperature it does not
+matter."""
 _SIGNED = ("suspension_progression_n_m3", "suspension_brake_support_tangent", "suspension_roll_centre_height_m")
 """Numbers that a car may have of either sign."""
 
@@ -69,12 +72,15 @@ def factor_of(now: float, step: float) -> float:
     return min(1.0 + abs(step) / now, _MOST_FACTOR) if wide else 1.0
 
 
-def listed(p: Floats, tolerance: Mapping[str, float], thermal: bool, layout: Layout) -> list[Nuisance]:
+def listed(
+    p: Floats, tolerance: Mapping[str, float], thermal: bool, layout: Layout, stated: Collection[str]
+) -> list[Nuisance]:
     """One a parameter; what acts alike is one (radius and area, pad numbers), axles are moved together or apart.
 
     Parameters
     ----------
     tolerance : half-widths of numbers of the flat vehicle ``p``.  thermal : whether the discs' heat matters.
+    stated : numbers that the set gives.
     """
     found: list[Nuisance] = []
 
@@ -141,8 +147,11 @@ def listed(p: Floats, tolerance: Mapping[str, float], thermal: bool, layout: Lay
             [max(tolerance.get("vehicle_lift_coefficient", 0.0), _LIFT)],
         )
         found[-1] = replace(found[-1], kind="signed")
-    # the same for suspension and discs: a vehicle set states dive and roll at best, never the curves behind them
-    for name, share in (_SUSPENSION | (_THERMAL if thermal else {})).items():
+    # the same for suspension and discs, where a set does not state them
+    shares = {name: _SPRINGS if name in stated else share for name, share in _SUSPENSION.items()}
+    if thermal:
+        shares |= {name: 0.0 if name in stated else share for name, share in _THERMAL.items()}
+    for name, share in shares.items():
         at, size = layout.slice(name).start, layout.sizes[name]
         for k in range(size):
             half = max(tolerance.get(name, 0.0), share * float(p[at + k]))

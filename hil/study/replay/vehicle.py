@@ -7,7 +7,7 @@ import numpy as np
 
 from hil.study.logs.table import MOTOR_DEMAND, Floats, Log
 from hil.study.replay.nuisances import BRAKE_K, CONSTANT_EPSILON_W, Nuisance
-from hil.study.replay.vehicle_keys import OF_SECTION
+from hil.study.replay.vehicle_keys import LATENCY_S, OF_SECTION
 from plant.friction import mu_equilibrium
 from plant.parameters.plant import PlantParameters
 from plant.vectors import P
@@ -35,6 +35,8 @@ class Vehicle:
     unstated : sections that the set says nothing of (keys of `hil.study.replay.vehicle_keys.OF_SECTION`).
     unlimited : limits that it does not state, which do not act.
     straight : whether it is held on its line.
+    sprung : whether the set states its suspension, every number of it.
+    node_latency_s : half-width of how much later than the wheel speeds the frames of other nodes are sent.
     """
 
     parameters: PlantParameters
@@ -45,6 +47,8 @@ class Vehicle:
     unstated: tuple[str, ...] = ()
     unlimited: tuple[str, ...] = ()
     straight: bool = False
+    sprung: bool = True
+    node_latency_s: float = LATENCY_S
 
     @property
     def untold(self) -> tuple[str, ...]:

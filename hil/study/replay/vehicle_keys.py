@@ -68,6 +68,11 @@ SPECIAL: Final = {
 }  # fmt: skip
 """Names that are no single number of the plant; brake gains are N m at one wheel per Pa."""
 
+LATENCY: Final = "node_latency_s"
+"""Of it a set states the tolerance alone: how much later or earlier than the wheel speeds a node's frames are sent."""
+LATENCY_S: Final = 4e-3
+"""Half-width of that where a set does not say."""
+
 WIDE: Final = {
     "vehicle_mass_kg": 0.1,
     "vehicle_cog_height_m": 0.15,

@@ -1,7 +1,7 @@
 """Vehicle sets: files and mappings into a parameter vector and its tolerances."""
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from importlib import resources
@@ -15,7 +15,7 @@ from hil.study.logs.table import UnusableError
 from hil.study.replay.nuisances import Nuisance, guessed, listed
 from hil.study.replay.scatter import scattered
 from hil.study.replay.vehicle import Vehicle, with_constant_friction, with_gains
-from hil.study.replay.vehicle_keys import ALIASES, DERIVED, SPECIAL, UNLIMITED, WIDE
+from hil.study.replay.vehicle_keys import ALIASES, DERIVED, LATENCY, LATENCY_S, SPECIAL, UNLIMITED, WIDE
 from plant.model import pack
 from plant.parameters.plant import PlantParameters
 from plant.vectors import PARAMETER
@@ -59,7 +59,7 @@ class _Stated:
 def paper_car() -> Vehicle:
     """The shipped set with its own tolerances."""
     parameters = load_set(_SHIPPED, PlantParameters)
-    return _vehicle(parameters, _shipped_tolerances(), True, ())
+    return _vehicle(parameters, _shipped_tolerances(), True, (), ())
 
 
 def load_vehicle(source: Path | Mapping[str, Any] | None) -> Vehicle:
@@ -113,7 +113,7 @@ def _from_flat(table: Mapping[str, Any], where: str) -> Vehicle:
     missing = [name for name in WIDE if name not in stated.names]
     tolerance = _tolerance(stated, parameters, gains, missing, unlimited)
     remarks = (*stated.remarks, *_left_open(where, unlimited, unstated, missing))
-    vehicle = _vehicle(parameters, tolerance, friction or not gains, remarks)
+    vehicle = _vehicle(parameters, tolerance, friction or not gains, remarks, stated.names)
     silent = tuple(s for s in _FORMS if not any(n.startswith(s) for n in (*stated.names, *stated.tolerances)))
     nuisances = tuple(
         guessed(one, vehicle.p) if one.name.startswith(silent) or _of_both(one.name) in missing else one
@@ -123,7 +123,11 @@ def _from_flat(table: Mapping[str, Any], where: str) -> Vehicle:
         nuisances = _as_one(nuisances, _THRESHOLD)
     if unlimited:  # who states every limit has measured the rest as well
         nuisances = (*nuisances, *scattered(vehicle.p, motors="motor" not in unstated))
-    return replace(vehicle, nuisances=nuisances, unstated=unstated, unlimited=unlimited)
+    sprung = {name for name in PARAMETER.sizes if name.startswith("suspension_")} <= stated.names
+    return replace(
+        vehicle, nuisances=nuisances, unstated=unstated, unlimited=unlimited, sprung=sprung,
+        node_latency_s=stated.tolerances.get(LATENCY, LATENCY_S),
+    )  # fmt: skip
 
 
 def _stated(table: Mapping[str, Any], where: str, base: PlantParameters) -> _Stated:
@@ -134,7 +138,7 @@ def _stated(table: Mapping[str, Any], where: str, base: PlantParameters) -> _Sta
             _derive(stem, float(value), key != stem, base, stated)
             continue
         name = ALIASES.get(stem, stem)
-        if name not in SPECIAL and name not in PARAMETER.sizes:
+        if name not in SPECIAL and name not in PARAMETER.sizes and key != f"{LATENCY}_tolerance":
             if not isinstance(value, str):
                 near = get_close_matches(stem, _KNOWN, 1)
                 hint = f"; did you mean {near[0]!r}?" if near else ""
@@ -180,7 +184,7 @@ def _tolerance(
     if "tyre_lky" in missing:
         tolerance["vehicle_slip_angle_share"] = max(tolerance["vehicle_slip_angle_share"], _BALANCE)
     return tolerance | {
-        name: max(half, shipped.get(name, 0.0)) if name.startswith("suspension") else half
+        name: max(half, shipped.get(name, 0.0)) if name.startswith("suspension") and name not in stated.names else half
         for name, half in stated.tolerances.items()
     }
 
@@ -279,7 +283,8 @@ def _changes(numbers: Mapping[str, Any], base: PlantParameters, where: str) -> t
 
 
 def _vehicle(
-    parameters: PlantParameters, tolerance: Mapping[str, float], thermal: bool, remarks: tuple[str, ...]
-) -> Vehicle:
+    parameters: PlantParameters, tolerance: Mapping[str, float], thermal: bool, remarks: tuple[str, ...],
+    stated: Collection[str],
+) -> Vehicle:  # fmt: skip
     p = pack(parameters)
-    return Vehicle(parameters, p, tuple(listed(p, tolerance, thermal, PARAMETER)), thermal, remarks)
+    return Vehicle(parameters, p, tuple(listed(p, tolerance, thermal, PARAMETER, stated)), thermal, remarks)

@@ -9,10 +9,12 @@ from hil.study.logs.case import Drive
 from hil.study.logs.table import Floats
 from hil.study.replay import acting
 from hil.study.replay.acting import Acting
-from hil.study.replay.nuisances import Nuisance, factor_of
+from hil.study.replay.nuisances import HALF_WIDTH_TO_SIGMA, Nuisance, factor_of
 from hil.study.replay.sensing import SENSORS
 from hil.study.replay.vehicle import Vehicle
+from hil.study.replay.vehicle_keys import LATENCY_S
 from plant.effects.bank import NO_TERMS
+from plant.effects.effect import NODES
 from plant.effects.theta import THETA
 
 _OF_THE_ROAD = (("road_grade", "grade"), ("headwind", "wind_mps"))
@@ -81,14 +83,18 @@ class World:
         )
 
 
-def start_nuisances(disc_told: bool) -> list[Nuisance]:
+def start_nuisances(disc_told: bool, latency_s: float) -> list[Nuisance]:
     """What the logs, not the vehicle, leave open: temperature of the discs, latency of the nodes, zeros.
 
-    ``disc_told``: all logs tell the discs' temperature at the start.
+    ``disc_told``: all logs tell the discs' temperature at the start. ``latency_s``: half-width of the latency of a node
+    that measures.
     """
-    found = [
-        Nuisance(f"late_{node}", (k,), (2e-3,), "held" if node == "demand" else "late") for k, node in enumerate(LATE)
-    ]
+    found = []
+    for k, node in enumerate(LATE):
+        half = latency_s if node in NODES else LATENCY_S
+        found.append(
+            Nuisance(f"late_{node}", (k,), (HALF_WIDTH_TO_SIGMA * half,), "held" if node == "demand" else "late")
+        )
     found += [
         Nuisance(f"zero_{name}", (THETA.slice("imu_bias", name).start,), (step,), "sensor")
         for name, step in ZEROS.items()

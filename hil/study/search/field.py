@@ -25,7 +25,8 @@ class Field:
     def __init__(self, rig: Rig, frame: Frame, untold: Sequence[str]) -> None:
         self._rig, self._frame = rig, frame
         self._columns = columns(untold)
-        self.candidates: list[Candidate] = candidates(self._columns, undriven(drive.log for drive in rig.case.drives))
+        without = undriven(drive.log for drive in rig.case.drives)
+        self.candidates: list[Candidate] = candidates(self._columns, without, rig.vehicle.sprung)
         self.tracks: Tracks = {}
 
     def taken_at(self, fitter: Fitter, model: Model) -> None:

@@ -64,7 +64,7 @@ def of_another_shape(contest: Contest, fitter: Fitter, listed: Sequence[Candidat
     piece = law.term.candidate
     assert isinstance(piece, Piece)
     offered = [
-        Shaped(one.effect, one.parameter, one.place, one.columns, one.places, shape, at)
+        Shaped(one.effect, one.parameter, one.place, one.columns, one.places, shape, at, sprung=one.sprung)
         for one in listed
         for shape in one.effect.parameters
         if shape.shape and piece.law.joint in one.effect.joints and one.place == piece.place

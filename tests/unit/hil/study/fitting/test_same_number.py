@@ -6,6 +6,7 @@ import pytest
 from hil.study.fitting.candidates import candidates, columns
 from hil.study.fitting.fit import Model, Term
 from hil.study.fitting.same_number import restated, same_number
+from hil.study.replay.vehicle_keys import LATENCY_S
 from hil.study.replay.vehicle_set import paper_car
 from hil.study.replay.world import nominal, start_nuisances
 
@@ -45,7 +46,7 @@ def test_a_cause_is_found_to_be_a_number_of_the_vehicle(name, number, slope):
 @pytest.mark.parametrize("node", ["imu", "pressure", "motor"])
 def test_stamps_of_a_node_that_are_late_are_its_latency(node):
     """45 ms were told as 39, with six by a latency that went as far as it may."""
-    nuisances = (*VEHICLE.nuisances, *start_nuisances(True))
+    nuisances = (*VEHICLE.nuisances, *start_nuisances(True, LATENCY_S))
     at = next(k for k, nuisance in enumerate(nuisances) if nuisance.name == f"late_{node}")
     z = np.zeros(len(nuisances))
     z[at] = 3.0
@@ -61,7 +62,7 @@ def test_stamps_of_a_node_that_are_late_are_its_latency(node):
 
 def test_stamps_of_the_wheels_are_no_latency():
     """All others are told against them."""
-    nuisances = (*VEHICLE.nuisances, *start_nuisances(True))
+    nuisances = (*VEHICLE.nuisances, *start_nuisances(True, LATENCY_S))
     assert same_number(Term(CANDIDATES["timestamp_offset@wheel"], 0.02), nuisances, BASE) is None
 
 

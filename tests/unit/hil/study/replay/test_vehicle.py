@@ -7,7 +7,7 @@ from hil.study.logs.table import MOTOR_DEMAND, Log, UnusableError, make_log
 from hil.study.replay.nuisances import HALF_WIDTH_TO_SIGMA
 from hil.study.replay.vehicle import Vehicle, rest_friction
 from hil.study.replay.vehicle_set import load_vehicle, paper_car
-from hil.study.replay.world import nominal
+from hil.study.replay.world import nominal, start_nuisances
 from plant.effects.theta import THETA
 from plant.vectors import P
 
@@ -109,6 +109,50 @@ def test_a_stated_tolerance_is_kept_to_as_far_as_an_equation_is_that_good() -> N
     assert step["vehicle_cog_height_m"] == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.04 * 0.5)
     step = {n.name: n.step[0] for n in load_vehicle(SIX).nuisances}
     assert step["vehicle_cog_height_m"] > 0.03
+
+
+SPRINGS = {
+    "suspension_ride_rate_n_m": [32000.0, 28000.0], "suspension_progression_n_m3": 0.0,
+    "suspension_damping_ns_m": [2200.0, 1900.0], "suspension_anti_roll_nm_rad": [28000.0, 24000.0],
+    "suspension_brake_support_tangent": [0.14, 0.2], "suspension_roll_centre_height_m": 0.0,
+}  # fmt: skip
+
+
+def test_springs_that_are_stated_are_as_far_off_as_stated_and_at_least_a_twentieth() -> None:
+    told = {"suspension_ride_rate_n_m_tolerance": 4800.0, "suspension_damping_ns_m_tolerance": 10.0}
+    by_name = {one.name: one for one in load_vehicle(SIX | SPRINGS | told).nuisances}
+    assert by_name["suspension_ride_rate_n_m_front"].step[0] == pytest.approx(HALF_WIDTH_TO_SIGMA * 4800.0)
+    assert by_name["suspension_damping_ns_m_front"].step[0] == pytest.approx(HALF_WIDTH_TO_SIGMA * 110.0)
+    assert "suspension_progression_n_m3_front" not in by_name  # linear springs, and known to be
+    silent = {one.name: one for one in load_vehicle(SIX).nuisances}
+    assert silent["suspension_ride_rate_n_m_front"].step[0] > 5.0 * by_name["suspension_ride_rate_n_m_front"].step[0]
+
+
+def test_discs_that_are_stated_are_as_far_off_as_stated() -> None:
+    pads = {"pad_a_1_ks": 3e-5, "pad_b_1_j": 9e-7, "pad_c_1_s": 4e-3, "pad_epsilon_w": 35510.0}
+    told = {"disc_heat_front_j_k": 3000.0, "disc_heat_front_j_k_tolerance": 60.0}
+    for given, half in ((told, 60.0), ({}, 600.0)):
+        by_name = {one.name: one for one in load_vehicle(SIX | pads | given).nuisances}
+        assert by_name["friction_brake_heat_capacity_j_k_front"].step[0] == pytest.approx(HALF_WIDTH_TO_SIGMA * half)
+
+
+def test_how_late_a_node_may_be_is_as_stated_or_four_milliseconds() -> None:
+    assert load_vehicle(SIX).node_latency_s == 4e-3
+    vehicle = load_vehicle(SIX | {"node_latency_s_tolerance": 1e-3})
+    assert vehicle.node_latency_s == 1e-3
+    assert not any("node_latency" in remark for remark in vehicle.remarks)
+    late = {one.name: one.step[0] for one in start_nuisances(True, vehicle.node_latency_s) if "late_" in one.name}
+    assert late == {
+        "late_imu": 5e-4, "late_pressure": 5e-4, "late_motor": 5e-4, "late_demand": 2e-3, "late_steering": 2e-3,
+    }  # fmt: skip
+    assert any("node_latency_s" in remark for remark in load_vehicle(SIX | {"node_latency_s": 1e-3}).remarks)
+
+
+@pytest.mark.parametrize("missing", [None, *SPRINGS])
+def test_the_suspension_is_stated_if_every_number_of_it_is(missing: str | None) -> None:
+    told = {name: value for name, value in SPRINGS.items() if name != missing}
+    assert load_vehicle(SIX | told).sprung == (missing is None)
+    assert not load_vehicle(SIX).sprung
 
 
 def test_the_shipped_car_keeps_its_own_numbers() -> None:

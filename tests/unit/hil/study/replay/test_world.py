@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hil.study.replay.vehicle_keys import LATENCY_S
 from hil.study.replay.vehicle_set import load_vehicle, paper_car
 from hil.study.replay.world import ZEROS, nominal, start_nuisances
 from plant.effects.theta import THETA
@@ -40,7 +41,7 @@ def test_one_standard_deviation_is_what_the_set_says():
 
 def test_an_inertial_unit_has_zeros_across():
     """0.012 m/s2, a tenth of a degree, were told as a cause."""
-    nuisances = start_nuisances(True)
+    nuisances = start_nuisances(True, LATENCY_S)
     base = nominal(paper_car())
     z = np.array([1.0 if one.kind == "sensor" else 0.0 for one in nuisances])
     theta = base.shifted(nuisances, z).theta
