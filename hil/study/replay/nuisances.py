@@ -27,9 +27,9 @@ _SUSPENSION = {
 }  # fmt: skip
 _SPRINGS = 0.05
 """The same share of a number of the suspension that a set states."""
-_LIFT = 0.06
-"""Least half-width of an axle's lift coefficient: it takes what two models of the axles' loads do not have in common.
-Known to 0.03, it was off by 1.9 of what noise explains on drives with nothing hidden."""
+_LIFT, _LIFT_GUESSED = 0.06, 0.1
+"""Least half-widths of an axle's lift coefficient, stated and not: it takes what two models of the axles' loads do not
+have in common. Known to 0.03, it was off by 1.9 of what noise explains on drives with nothing hidden."""
 _SIDE = 0.5
 """Share that the load may be off at which a tyre's cornering stiffness is largest: whether it grows with the load."""
 _THERMAL = {"friction_brake_heat_capacity_j_k": 0.2, "friction_brake_cooling_w_k": 0.3}
@@ -140,12 +140,10 @@ def listed(
     add("tyre_lsgal", [layout.slice("tyre_lsgal").start], [0.3])
     add("tyre_lmuy", [layout.slice("tyre_lmuy").start], [0.15])
     lift = layout.slice("vehicle_lift_coefficient")
+    least = _LIFT if "vehicle_lift_coefficient" in stated else _LIFT_GUESSED
     for k, axle in enumerate(("front", "rear")):
-        add(
-            f"vehicle_lift_coefficient_{axle}",
-            [lift.start + k],
-            [max(tolerance.get("vehicle_lift_coefficient", 0.0), _LIFT)],
-        )
+        half = max(tolerance.get("vehicle_lift_coefficient", 0.0), least)
+        add(f"vehicle_lift_coefficient_{axle}", [lift.start + k], [half])
         found[-1] = replace(found[-1], kind="signed")
     # the same for suspension and discs, where a set does not state them
     shares = {name: _SPRINGS if name in stated else share for name, share in _SUSPENSION.items()}

@@ -128,6 +128,12 @@ def test_springs_that_are_stated_are_as_far_off_as_stated_and_at_least_a_twentie
     assert silent["suspension_ride_rate_n_m_front"].step[0] > 5.0 * by_name["suspension_ride_rate_n_m_front"].step[0]
 
 
+@pytest.mark.parametrize(("told", "half"), [({}, 0.1), ({"lift_front": 0.05, "lift_front_tolerance": 0.03}, 0.06)])
+def test_lift_that_is_stated_is_off_by_less(told: dict[str, float], half: float) -> None:
+    by_name = {one.name: one for one in load_vehicle(SIX | told).nuisances}
+    assert by_name["vehicle_lift_coefficient_front"].step[0] == pytest.approx(HALF_WIDTH_TO_SIGMA * half)
+
+
 def test_discs_that_are_stated_are_as_far_off_as_stated() -> None:
     pads = {"pad_a_1_ks": 3e-5, "pad_b_1_j": 9e-7, "pad_c_1_s": 4e-3, "pad_epsilon_w": 35510.0}
     told = {"disc_heat_front_j_k": 3000.0, "disc_heat_front_j_k_tolerance": 60.0}

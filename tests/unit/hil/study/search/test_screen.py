@@ -1,6 +1,7 @@
 """The race: estimates, bounds and thresholds of the linear screen."""
 
 import tomllib
+from dataclasses import replace
 from importlib import resources
 
 import numpy as np
@@ -75,6 +76,12 @@ def test_a_gain_is_shared_out_over_the_models_own_error() -> None:
     found = score(candidate, 0.1 * 1e4, 1e4)
     assert variance_of(candidate) > 1.0
     assert found.gain == pytest.approx(found.raw / variance_of(candidate))
+
+
+def test_what_goes_with_the_loads_errs_more_where_nobody_states_the_springs() -> None:
+    candidate = CANDIDATES["cog_height@car"]
+    assert variance_of(replace(candidate, sprung=False)) > variance_of(candidate)
+    assert variance_of(candidate) == variance_of(replace(candidate, sprung=True))
 
 
 def test_every_entry_of_the_models_own_error_is_a_candidates_number_or_a_law_at_a_kind_of_place() -> None:
