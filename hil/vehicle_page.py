@@ -57,8 +57,8 @@ brake_gain_rear_nm_pa = 1.7e-4
   `node_latency_s_tolerance`. Heat capacity and cooling of the discs may be off by a fifth and nearly a third where they
   are not stated.
 - Springs, dampers, bars and links (`suspension_`, `vehicle_pitch_inertia_kg_m2`) that a set states may be off by their
-  tolerance, at least by a twentieth, others by much more. Where it does not state every number of `suspension_`, more is
-  asked before the height, the lift, the dive or what else goes with the loads is named.
+  tolerance, at least by a twentieth, others by much more. Where it does not state every number of `suspension_`, more
+  is asked before the height, the lift, the dive or what else goes with the loads is named.
 - Without a `pad_` key the friction of the pads is one constant, which the brake gains contain.
 - Unknown keys are told in the remarks and left out.
 """
