@@ -5,10 +5,12 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hil.study.compiled import compiled
 from hil.study.logs.between import at_places
 from hil.study.logs.case import ROW_S, SLOW_MPS, Case, Drive, Segment
+from hil.study.logs.sliding import since_sliding
 from hil.study.logs.stamps import begin_s, wait_s
 from hil.study.logs.table import (
     MOTOR_DEMAND,
@@ -25,6 +27,8 @@ from plant.vectors import CUT, INPUT, U
 SETTLE_S, _RINGS_S = 1.0, 2.0
 """For how long what begins or ends is not compared; and a car that came to rest, which rings on its brakes and springs:
 when it stopped, to the hundredth, would matter more than all that was before (docs/decisions/0085)."""
+_BEFORE_S = 0.2
+"""How long before it is slow a car is not compared any more: the simulated one may be slow a little earlier."""
 SHORTEST_S, LONGEST_S, TURNING_S = 8.0, 25.0, 3.0
 STRAIGHT_RAD = 0.02  # of the steering wheel
 _RELEASED_PA, _RELEASED_NM = 1e5, 20.0
@@ -221,25 +225,34 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float, follow
     if "pressure" in measured and "pressure" not in followed:
         compared = _pressures_known(averaged(inputs[:, INPUT.slice("pressure_demand_pa")], stride), stride)
     slow = averaged(speed[:, None], stride)[:, 0]
-    after = max(int(SETTLE_S / (stride * ROW_S)), 1)
-    near_stop = np.convolve(slow < SLOW_MPS, np.ones(2 * after + 1), mode="same") > 0.5
+    before, after = (max(int(time_s / (stride * ROW_S)), 1) for time_s in (_BEFORE_S, SETTLE_S))
+    near_stop = np.convolve(slow < SLOW_MPS, np.ones(before + 1 + after))[before : before + len(slow)] > 0.5
     rings = max(int(_RINGS_S / (stride * ROW_S)), 1)
     resting = np.convolve(slow > 0.02, np.ones(2 * rings + 1), mode="same") < 0.5
     resting[: 2 * after] = False  # the simulated body first sinks into its springs
+    slid = since_sliding(wheels, ground, ~quiet, segments, radius_m)
+    if slid.any():
+        log = replace(log, remarks=(*log.remarks, _slides(slid)))
+    held = averaged(slid[:, None] * 1.0, stride)[:, 0] == 0.0
     return Drive(
         log,
         inputs,
         segments,
         measured,
         stride,
-        ~near_stop * 1.0,
-        resting * 1.0,
+        (~near_stop & held) * 1.0,
+        (resting & held) * 1.0,
         slow,
         averaged(brakes[:, None], stride)[:, 0],
         _charge(log),
         wait_s=wait_s(log.t_s),
         compared=compared,
     )
+
+
+def _slides(slid: NDArray[np.bool_]) -> str:
+    at = np.flatnonzero(slid)
+    return f"a wheel slides from {at[0] * ROW_S:.2f} s on; the car's motion is compared up to there, not after"
 
 
 def _pressures_known(demand_pa: Floats, stride: int) -> dict[str, Floats]:
