@@ -130,13 +130,13 @@ def simulate(
     work = np.empty(WORK_SHAPE)
     now = np.empty(inputs.shape[1])
     angles = np.empty(4)
-    rows = inputs.shape[0]
+    rows = at_once.shape[0]
     q = np.empty(apply.SIZE)
     apply.begin(p, theta, terms, plugins, q, y, work[2])
     for row in range(rows):
         now_s = x[X.time_s]
         apply.row(x, now, p, theta, now_s, now_s + max(steps, 1) * step_s, q, y, work[2])
-        following = min(row + 1, rows - 1)
+        following = min(row + 1, inputs.shape[0] - 1)
         for i in range(now.size):
             now[i] = inputs[row, i]
         if columns.size > 0:

@@ -19,6 +19,7 @@ from hil.study.replay.sensing import inverted
 from hil.study.replay.starting import restart, start, start_speed
 from hil.study.replay.steps import STEPS, at_once
 from hil.study.replay.telling import SOURCE, Stack, Telling, powers
+from hil.study.replay.turning import QUARTER_RAD, angles, parts, standing, turns, with_spots
 from hil.study.replay.vehicle import Vehicle
 from hil.study.replay.world import World, apart, told_alike
 from hil.study.side_by_side import side_by_side
@@ -40,6 +41,7 @@ _SLOW = np.concatenate(
     ]
 )  # fmt: skip
 """States that a segment hands on to a later one, beside the motion."""
+_ANGLES = STATE.slice("wheel_angle_rad")
 _INPUTS = (("pressure", "pressure_pa"), ("motor", "motor_torque_nm"))
 _SMOOTH = 21  # rows of 10 ms
 _FADING_MPS, _LEAST_NM = 0.3, 1.0
@@ -106,6 +108,7 @@ class Rig:
         self._pace = [at_once(drive) for drive in case.drives]
         self._kept: _Kept | None = None
         self._made: _Made | None = None
+        self._turned: list[Floats] = []
         self.runs = 0
 
     def quieted(self, world: World) -> "Rig":
@@ -115,6 +118,24 @@ class Rig:
         rig.quieten(world)
         rig._pace = [at_once(drive) for drive in rig.case.drives]
         return rig
+
+    def align(self, world: World) -> bool:
+        """Turn the discs' hot spots to where they explain most of the wheels' speeds; whether this world has any.
+
+        Neither a log nor a drawing tells how a wheel stood when the log began.
+        """
+        if "wheel" not in self._groups:
+            return False
+        bare = self.run(with_spots(world, 0.0))["wheel"]
+        turned, shown = [angles(drive) for drive in self.case.drives], []
+        for offset in (0.0, QUARTER_RAD):
+            self._turned = [angle + offset for angle in turned]
+            shown.append(self.run(with_spots(world))["wheel"] - bare)
+        ends = np.cumsum([drive.samples for drive in self.case.drives])[:-1]
+        each = zip(*(np.split(values, ends) for values in (self.measured()["wheel"] - bare, *shown)), strict=True)
+        stand = [standing(drive, left, of) for drive, (left, *of) in zip(self.case.drives, each, strict=True)]
+        self._turned = [angle + offset for angle, offset in zip(turned, stand, strict=True)]
+        return turns(world)
 
     def quieten(self, world: World) -> None:
         """What drives the car becomes the simulated value plus the smoothed difference of the measured one.
@@ -278,6 +299,7 @@ class Rig:
         table = np.empty((len(inputs), len(columns)))
         cut, switch, y, pace = self.case.cut, healthy(), OUTPUT.zeros(), self._pace[drive.number]
         states = [x.copy()]
+        turned = self._turned[drive.number] if self._turned and turns(world) else None
         for number, segment in enumerate(drive.segments):
             rows = slice(segment.first, segment.last)
             if kept is not None and not differs[number]:
@@ -288,9 +310,13 @@ class Rig:
                 continue
             if number:
                 restart(x, start_speed(drive, segment, world))
-            simulate(
-                x, inputs[rows], cut, switch, world.p, self._road, ROW_S / STEPS, STEPS, pace[rows], EXPONENTIAL,
-                columns, table[rows], y, theta, world.terms, NO_PLUGINS,
-            )  # fmt: skip
+            for part in [rows] if turned is None else parts(rows):
+                if turned is not None:
+                    x[_ANGLES] = turned[part.start]
+                given = inputs[part.start : min(part.stop + 1, rows.stop)]
+                simulate(
+                    x, given, cut, switch, world.p, self._road, ROW_S / STEPS, STEPS, pace[part], EXPONENTIAL,
+                    columns, table[part], y, theta, world.terms, NO_PLUGINS,
+                )  # fmt: skip
             states.append(x.copy())
         return _Replay(inputs, table, tuple(states))

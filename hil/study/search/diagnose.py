@@ -80,6 +80,8 @@ class _Search:
         nominal, noise = self.fitter.start(self.settings.noise_model)
         self.say("noise, and the vehicle's numbers within their tolerance")
         model, noise = self.numbers.fitted(nominal, noise)
+        if self.rig.align(self.fitter.world(model.z, ())):
+            model, noise = self.numbers.fitted(self.fitter.at(model.z, (), noise), noise)
         found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, noise, noise, nominal, model, model)
         self._screened(found)
         around = model.z

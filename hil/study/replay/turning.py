@@ -1,0 +1,74 @@
+"""Where the wheels' hot spots stand: angles as measured, from where no log tells."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hil.study.logs.case import ROW_S, Drive
+from hil.study.logs.table import Floats
+from hil.study.replay.world import World
+from plant.effects.hot_spot import ORDER
+from plant.effects.theta import THETA
+
+_HOT = THETA.slice("hot_spot", "amplitude")
+_SHOWN = 0.01
+"""Amplitude of the replays that show where the spots stand: some 0.1 rad/s at the wheels, where all is linear."""
+QUARTER_RAD = 0.5 * np.pi / ORDER
+"""A quarter of the way from spot to spot."""
+_ROWS = 5
+
+
+def turns(world: World) -> bool:
+    """Whether angles of the wheels matter beyond a turn or two."""
+    return bool(np.any(world.theta[_HOT]))
+
+
+def with_spots(world: World, amplitude: float = _SHOWN) -> World:
+    """The world with spots of this amplitude on all discs."""
+    theta = world.theta.copy()
+    theta[_HOT] = amplitude
+    return replace(world, theta=theta)
+
+
+def angles(drive: Drive) -> Floats:
+    """Angles by which the wheels have turned since the log began, (rows, 4), rad, from their measured speeds.
+
+    A free replay drifts by radii and slips: a thousandth in 100 m is three radians of the tenth order.
+    """
+    speeds = drive.measured["wheel"]
+    at = np.arange(len(speeds))
+    whole = np.zeros((len(speeds), 4))
+    for k in range(4):
+        seen = np.isfinite(speeds[:, k])
+        if seen.any():
+            whole[:, k] = np.interp(at, at[seen], speeds[seen, k])
+    turned = np.cumsum(np.repeat(whole, drive.stride, axis=0) * ROW_S, axis=0)
+    return np.concatenate([np.zeros((1, 4)), turned])[: len(drive.inputs)]
+
+
+def parts(rows: slice) -> Iterator[slice]:
+    """Rows in parts short enough for a simulated wheel to turn as the measured one."""
+    for first in range(rows.start, rows.stop, _ROWS):
+        yield slice(first, min(first + _ROWS, rows.stop))
+
+
+def standing(drive: Drive, left: Floats, shown: Sequence[Floats]) -> Floats:
+    """Angle between spots and the begin of each segment, (rows, 4), rad: where they explain the wheels' speeds best.
+
+    ``left`` (samples, 4) is what a replay without spots leaves, ``shown`` what spots at no angle and at a quarter do.
+    Samples differ from one to the next: what is slow says nothing of the tenth order.
+    """
+    found = np.zeros((len(drive.inputs), 4))
+    for segment in drive.segments:
+        within = slice(segment.first // drive.stride, segment.last // drive.stride)
+        known = (drive.moving[within][1:] > 0.5) & (drive.moving[within][:-1] > 0.5)
+        for k in range(4):
+            steps = [np.diff(values[within, k]) for values in (left, *shown)]
+            good = known & np.isfinite(steps[0])
+            of = np.column_stack([values[good] for values in steps[1:]])
+            if not of.any():
+                continue
+            sine, cosine = np.linalg.lstsq(of, steps[0][good], rcond=None)[0]
+            found[segment.first : segment.last, k] = np.arctan2(cosine, sine) / ORDER
+    return found

@@ -1,0 +1,90 @@
+"""Where hot spots stand: nobody tells, the wheels' speeds do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hil.study.logs.prepare import prepare
+from hil.study.logs.table import make_log
+from hil.study.replay.rig import Rig
+from hil.study.replay.telling import SOURCE
+from hil.study.replay.turning import QUARTER_RAD, angles, parts, standing, turns, with_spots
+from hil.study.replay.vehicle_set import paper_car
+from hil.study.replay.world import nominal
+from plant.effects.hot_spot import ORDER
+from plant.effects.signals import WHEELS
+
+AMPLITUDE, STAND_RAD = 0.1, QUARTER_RAD
+RADIUS_M, BRAKES_S = 0.308, 2.0
+
+
+def _stop(wheels: np.ndarray) -> Rig:
+    """A rig of a stop from 20 m/s with these wheel speeds, rad/s, every 10 ms, on hot discs."""
+    t = np.arange(len(wheels)) * 0.01
+    channels = {f"wheel_speed_{w}_rad_s": wheels[:, k] for k, w in enumerate(WHEELS)}
+    channels |= {f"pressure_{w}_pa": np.where(t > BRAKES_S, 35e5, 0.0) for w in WHEELS}
+    log = replace(make_log("hot", t, channels), disc_temperature_k=650.0)
+    return Rig(prepare([log], RADIUS_M), paper_car())
+
+
+@pytest.fixture(scope="module")
+def rolled() -> np.ndarray:
+    """Wheel speeds of the car without spots, as it simulates them: a log that it explains."""
+    t = np.arange(650) * 0.01
+    speed = np.clip(20.0 - 5.4 * np.clip(t - BRAKES_S, 0.0, None), 0.0, None) / RADIUS_M
+    rig = _stop(np.column_stack([speed] * 4))
+    return rig.states(nominal(rig.vehicle), SOURCE["wheel"])
+
+
+def test_spots_are_turned_to_where_the_wheels_show_them(rolled: np.ndarray) -> None:
+    """Of a car whose spots stand elsewhere the amplitude is seen once they are turned, and was not before."""
+    made = _stop(rolled)
+    world = nominal(made.vehicle)
+    made._turned = [angles(drive) + STAND_RAD for drive in made.case.drives]
+    spots = made.states(with_spots(world, AMPLITUDE), SOURCE["wheel"]) - made.states(world, SOURCE["wheel"])
+    seen = rolled[: len(spots)] + spots
+
+    def told(rig: Rig) -> float:
+        """The amplitude that explains most, by one linear step, of the samples that are compared."""
+        compared = rig.case.drives[0].moving > 0.5
+        bare = rig.run(with_spots(world, 0.0))["wheel"]
+        left = np.diff((rig.measured()["wheel"] - bare)[compared], axis=0).ravel()
+        shown = np.diff((rig.run(with_spots(world, 0.01))["wheel"] - bare)[compared], axis=0).ravel() / 0.01
+        return float(left @ shown / (shown @ shown))
+
+    rig = _stop(seen)
+    rig._turned = [angles(drive) for drive in rig.case.drives]
+    before = told(rig)
+    assert not rig.align(world)
+    assert before < 0.6 * AMPLITUDE
+    assert told(rig) == pytest.approx(AMPLITUDE, rel=0.2)
+
+
+@pytest.mark.parametrize("stand", [-0.3, -0.05, 0.0, 0.2, 0.31])
+def test_two_replays_tell_where_the_spots_stand(rolled: np.ndarray, stand: float) -> None:
+    (drive,) = _stop(rolled).case.drives
+    rng = np.random.default_rng(3)
+    shown = [rng.normal(size=(drive.samples, 4)) for _ in range(2)]
+    left = 7.0 * (np.cos(ORDER * stand) * shown[0] + np.sin(ORDER * stand) * shown[1])
+    assert standing(drive, left, shown)[0] == pytest.approx(stand)
+
+
+def test_angles_are_those_of_the_measured_wheels(rolled: np.ndarray) -> None:
+    (drive,) = _stop(np.full((600, 4), 30.0)).case.drives
+    turned = angles(drive)
+    assert turned[0] == pytest.approx(0.0)
+    assert turned[100] == pytest.approx(30.0)
+    assert len(turned) == len(drive.inputs)
+
+
+def test_parts_have_all_rows_once() -> None:
+    rows = [row for part in parts(slice(3, 21)) for row in range(part.start, part.stop)]
+    assert rows == list(range(3, 21))
+
+
+def test_only_a_world_with_spots_asks_for_angles(rolled: np.ndarray) -> None:
+    world = nominal(paper_car())
+    assert not turns(world)
+    assert turns(with_spots(world))
+    assert pytest.approx(0.25 * 2.0 * np.pi / ORDER) == QUARTER_RAD
