@@ -7,6 +7,8 @@ _NUMBERS = {
     ("imu_bias", "bias_mps2"): "ax_mps2", ("imu_position", "distance_m"): "x_m", ("imu_filter", "lag_s"): "time_s",
     ("timestamp_offset", "time_s"): "delay_s", ("clock_drift", "rate"): "share", ("wrong_scale", "gain"): "factor",
 }  # fmt: skip
+_OF_ANY_PHASE = ("hot_spot",)
+"""Effects whose sign is half a turn of a phase that nobody knows."""
 
 
 def numbers(hidden: Mapping[str, Any]) -> dict[str, float]:
@@ -17,4 +19,5 @@ def numbers(hidden: Mapping[str, Any]) -> dict[str, float]:
     hidden : a cause of the sealed answer.
     """
     effect = hidden["effect"]
-    return {_NUMBERS.get((effect, name), name): float(p["value"]) for name, p in hidden["parameters"].items()}
+    values = {_NUMBERS.get((effect, name), name): float(p["value"]) for name, p in hidden["parameters"].items()}
+    return {name: abs(value) for name, value in values.items()} if effect in _OF_ANY_PHASE else values

@@ -19,7 +19,7 @@ from hil.study.replay.sensing import inverted
 from hil.study.replay.starting import restart, start, start_speed
 from hil.study.replay.steps import STEPS, at_once
 from hil.study.replay.telling import SOURCE, Stack, Telling, powers
-from hil.study.replay.turning import QUARTER_RAD, angles, parts, standing, turns, with_spots
+from hil.study.replay.turning import QUARTER_RAD, angles, parts, standing, turns, with_spots, without_spots
 from hil.study.replay.vehicle import Vehicle
 from hil.study.replay.world import World, apart, told_alike
 from hil.study.side_by_side import side_by_side
@@ -126,7 +126,7 @@ class Rig:
         """
         if "wheel" not in self._groups:
             return False
-        bare = self.run(with_spots(world, 0.0))["wheel"]
+        bare = self.run(without_spots(world))["wheel"]
         turned, shown = [angles(drive) for drive in self.case.drives], []
         for offset in (0.0, QUARTER_RAD):
             self._turned = [angle + offset for angle in turned]

@@ -24,10 +24,17 @@ def turns(world: World) -> bool:
     return bool(np.any(world.theta[_HOT]))
 
 
-def with_spots(world: World, amplitude: float = _SHOWN) -> World:
-    """The world with spots of this amplitude on all discs."""
+def without_spots(world: World) -> World:
+    """The world with even discs."""
     theta = world.theta.copy()
-    theta[_HOT] = amplitude
+    theta[_HOT] = 0.0
+    return replace(world, theta=theta)
+
+
+def with_spots(world: World) -> World:
+    """The world with weak spots on all discs, of the sign of its own."""
+    theta = world.theta.copy()
+    theta[_HOT] = np.where(theta[_HOT] < 0.0, -_SHOWN, _SHOWN)
     return replace(world, theta=theta)
 
 

@@ -22,3 +22,8 @@ def test_the_plant_has_every_hidden_number_at_its_place_but_those_with_a_phase()
 def test_a_number_keeps_its_value() -> None:
     hidden = {"effect": "imu_filter", "parameters": {"lag_s": {"value": 0.02}}}
     assert numbers(hidden) == {"time_s": 0.02}
+
+
+def test_spots_half_a_turn_on_are_the_same_spots() -> None:
+    hidden = {"effect": "hot_spot", "wheel": "rear", "parameters": {"amplitude": {"value": -0.002, "unit": ""}}}
+    assert numbers(hidden) == {"amplitude": 0.002}

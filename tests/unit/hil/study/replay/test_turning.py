@@ -9,11 +9,12 @@ from hil.study.logs.prepare import prepare
 from hil.study.logs.table import make_log
 from hil.study.replay.rig import Rig
 from hil.study.replay.telling import SOURCE
-from hil.study.replay.turning import QUARTER_RAD, angles, parts, standing, turns, with_spots
+from hil.study.replay.turning import QUARTER_RAD, angles, parts, standing, turns, with_spots, without_spots
 from hil.study.replay.vehicle_set import paper_car
-from hil.study.replay.world import nominal
+from hil.study.replay.world import World, nominal
 from plant.effects.hot_spot import ORDER
 from plant.effects.signals import WHEELS
+from plant.effects.theta import THETA
 
 AMPLITUDE, STAND_RAD = 0.1, QUARTER_RAD
 RADIUS_M, BRAKES_S = 0.308, 2.0
@@ -26,6 +27,12 @@ def _stop(wheels: np.ndarray) -> Rig:
     channels |= {f"pressure_{w}_pa": np.where(t > BRAKES_S, 35e5, 0.0) for w in WHEELS}
     log = replace(make_log("hot", t, channels), disc_temperature_k=650.0)
     return Rig(prepare([log], RADIUS_M), paper_car())
+
+
+def _spotted(world: World, amplitude: float) -> World:
+    theta = world.theta.copy()
+    theta[THETA.slice("hot_spot", "amplitude")] = amplitude
+    return replace(world, theta=theta)
 
 
 @pytest.fixture(scope="module")
@@ -42,15 +49,15 @@ def test_spots_are_turned_to_where_the_wheels_show_them(rolled: np.ndarray) -> N
     made = _stop(rolled)
     world = nominal(made.vehicle)
     made._turned = [angles(drive) + STAND_RAD for drive in made.case.drives]
-    spots = made.states(with_spots(world, AMPLITUDE), SOURCE["wheel"]) - made.states(world, SOURCE["wheel"])
+    spots = made.states(_spotted(world, AMPLITUDE), SOURCE["wheel"]) - made.states(world, SOURCE["wheel"])
     seen = rolled[: len(spots)] + spots
 
     def told(rig: Rig) -> float:
         """The amplitude that explains most, by one linear step, of the samples that are compared."""
         compared = rig.case.drives[0].moving > 0.5
-        bare = rig.run(with_spots(world, 0.0))["wheel"]
+        bare = rig.run(world)["wheel"]
         left = np.diff((rig.measured()["wheel"] - bare)[compared], axis=0).ravel()
-        shown = np.diff((rig.run(with_spots(world, 0.01))["wheel"] - bare)[compared], axis=0).ravel() / 0.01
+        shown = np.diff((rig.run(_spotted(world, 0.01))["wheel"] - bare)[compared], axis=0).ravel() / 0.01
         return float(left @ shown / (shown @ shown))
 
     rig = _stop(seen)
@@ -83,8 +90,24 @@ def test_parts_have_all_rows_once() -> None:
     assert rows == list(range(3, 21))
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_spots_are_turned_for_the_sign_they_have(rolled: np.ndarray, sign: float) -> None:
+    """Of a car handed in with spots: less than none is the same spots half the way to the next."""
+    made = _stop(rolled)
+    made._turned = [angles(drive) for drive in made.case.drives]
+    world = _spotted(nominal(made.vehicle), AMPLITUDE)
+    seen = made.states(world, SOURCE["wheel"])
+    rig = _stop(seen)
+    told = _spotted(world, sign * AMPLITUDE)
+    assert rig.align(told)
+    compared = rig.case.drives[0].moving > 0.5
+    left, bare = (rig.measured()["wheel"] - rig.run(one)["wheel"] for one in (told, nominal(rig.vehicle)))
+    assert np.diff(left[compared], axis=0).std() < 0.4 * np.diff(bare[compared], axis=0).std()
+
+
 def test_only_a_world_with_spots_asks_for_angles(rolled: np.ndarray) -> None:
     world = nominal(paper_car())
     assert not turns(world)
     assert turns(with_spots(world))
+    assert not turns(without_spots(with_spots(world)))
     assert pytest.approx(0.25 * 2.0 * np.pi / ORDER) == QUARTER_RAD
