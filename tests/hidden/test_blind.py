@@ -84,7 +84,7 @@ _NAMED_SINCE = (
     ("pressure_location", 14495151), ("imu_filter", 807153),
 )  # fmt: skip
 _MISSED = (
-    ("hot_spot", 15418795, "what shows lies where its tenth order meets the wheels' swing on their tyres"),
+    ("hot_spot", 15418795, "what is chosen, where the spots stand, divides the gain"),
     ("hot_spot", 807153, "what shows lies where its tenth order meets the wheels' swing on their tyres"),
     ("residual_drag", 14495151, "rolling resistance of that wheel: 1.9 to 4.1 deviations apart"),
     ("residual_drag", 9927935, "rolling resistance of that wheel: 1.9 to 4.1 deviations apart"),
@@ -112,6 +112,19 @@ def test_what_a_draw_missed_is_named(effect: str, seed: int) -> None:
     record = run_case(draw("single", SINGLES.index(effect), seed, 15.0), seed, 15.0)
     assert record["hidden"][0]["effect"] == effect
     assert record["named"][:1] == [effect]
+
+
+@pytest.mark.parametrize(
+    ("effect", "wheel", "size", "rel"), [("stuck_corner", "fl", 0.4, 0.1), ("hot_spot", "front", 0.1, 0.3)]
+)
+def test_what_is_too_large_to_overlook_is_named(effect: str, wheel: str, size: float, rel: float) -> None:
+    """A weak calliper with which the car spins in two stops was a law in no list; spots on hot discs were ``none``, for
+    nobody knows how a wheel stood when the log began."""
+    record = run_case(make_case((Hidden(effect, wheel, size),), 1), 1, None)
+    (cause,) = record["causes"]
+    (value,) = cause["parameters"].values()
+    assert (cause["effect"], cause["wheel"]) == (effect, wheel)
+    assert value["value"] == pytest.approx(size, rel=rel)
 
 
 @pytest.mark.parametrize(("index", "effect"), [(0, "water"), (2, "clock_drift")])
