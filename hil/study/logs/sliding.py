@@ -10,7 +10,7 @@ from hil.study.logs.table import Floats
 
 _SLIP, _BEGINS, _ROLLS = 0.5, 0.2, 0.1
 """Slip of a wheel that slides; slip at which it began to: beyond the peak of any tyre's curve on a dry road (0.1 to
-0.2; Pacejka 2012, fig. 1.2); slip of one that rolls."""
+0.2; Pacejka 2012, ch. 1); slip of one that rolls."""
 _LASTS_S = 0.1
 _LEAST_MPS = 4.0  # below, sensors with teeth miss what a wheel does within a tenth of a second
 
