@@ -251,8 +251,8 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float, follow
 
 
 def _slides(slid: NDArray[np.bool_]) -> str:
-    at = np.flatnonzero(slid)
-    return f"a wheel slides from {at[0] * ROW_S:.2f} s on; the car's motion is compared up to there, not after"
+    since = np.flatnonzero(slid)[0] * ROW_S
+    return f"a wheel slides from {since:.2f} s on; motion is not compared from there to the end of its segment"
 
 
 def _pressures_known(demand_pa: Floats, stride: int) -> dict[str, Floats]:

@@ -16,7 +16,7 @@ from plant.effects.hot_spot import ORDER
 from plant.effects.signals import WHEELS
 from plant.effects.theta import THETA
 
-AMPLITUDE, STAND_RAD = 0.1, QUARTER_RAD
+AMPLITUDE = 0.1
 RADIUS_M, BRAKES_S = 0.308, 2.0
 
 
@@ -48,7 +48,7 @@ def test_spots_are_turned_to_where_the_wheels_show_them(rolled: np.ndarray) -> N
     """Of a car whose spots stand elsewhere the amplitude is seen once they are turned, and was not before."""
     made = _stop(rolled)
     world = nominal(made.vehicle)
-    made._turned = [angles(drive) + STAND_RAD for drive in made.case.drives]
+    made._turned = [angles(drive) + QUARTER_RAD for drive in made.case.drives]
     spots = made.states(_spotted(world, AMPLITUDE), SOURCE["wheel"]) - made.states(world, SOURCE["wheel"])
     seen = rolled[: len(spots)] + spots
 
@@ -64,7 +64,7 @@ def test_spots_are_turned_to_where_the_wheels_show_them(rolled: np.ndarray) -> N
     rig._turned = [angles(drive) for drive in rig.case.drives]
     before = told(rig)
     assert not rig.align(world)
-    assert before < 0.6 * AMPLITUDE
+    assert before != pytest.approx(AMPLITUDE, rel=0.2)
     assert told(rig) == pytest.approx(AMPLITUDE, rel=0.2)
 
 
