@@ -18,8 +18,9 @@ from hil.study.replay.world import World
 
 Tracks = dict[str, Floats]
 _LARGEST_STEP = 8.0
-_ATTEMPTS = ((False, 0.0), (True, 0.1), (True, 1.0), (True, 10.0))
-"""Ways to make a step, in turn until one improves: whether limits stay where they are, and the damping."""
+_ATTEMPTS = ((False, 0.0, 1.0), (True, 0.0, 0.5), (True, 0.1, 1.0), (True, 1.0, 1.0), (True, 10.0, 1.0))
+"""Ways to make a step, in turn until one improves: whether limits stay where they are, the damping, and the share of the
+step that is made. Damping stops what two numbers do together that each undoes alone; half a step does not."""
 _LIMITS = (
     "battery_charge_power_w", "motor_peak_torque_nm", "motor_rate_limit_nm_s", "motor_fade_start_mps",
     "motor_fade_end_mps", "ehb_build_rate_pa_s", "ehb_release_rate_pa_s",
@@ -206,8 +207,8 @@ class Fitter:
 
     def _step(self, model: Model, own: Tracks, noise: Noise) -> Model | None:
         total = self._total(model, own, noise)
-        for hold, damping in _ATTEMPTS:
-            z, terms, covariance, foretold = self.moved(model, total, hold, damping)
+        for hold, damping, share in _ATTEMPTS:
+            z, terms, covariance, foretold = self.moved(model, total, hold, damping, share)
             if foretold < _WORTH:
                 break
             moved = self.at(z, terms, noise)
@@ -216,10 +217,11 @@ class Fitter:
         return replace(model, covariance=covariance) if model.terms and not model.covariance.size else None
 
     def moved(
-        self, model: Model, total: Floats, hold: bool = False, damping: float = 0.0
+        self, model: Model, total: Floats, hold: bool = False, damping: float = 0.0, share: float = 1.0
     ) -> tuple[Floats, tuple[Term, ...], Floats, float]:
         """Nuisances and effects after a step, no farther than each may go, covariance of the effects, and what the step
-        takes off the cost if the model is linear; limits stay where they are if told to ``hold``.
+        takes off the cost if the model is linear; limits stay where they are if told to ``hold``. ``share`` of the step
+        is made.
 
         ``total`` are products of [residual, nuisances, columns of the effects].
         """
@@ -233,6 +235,7 @@ class Fitter:
             low[self._limits] = high[self._limits] = 0.0
         free = range(len(values))
         change, covariance, foretold = solve_within(total, count, free, model.z, low, high, damping)
+        change, foretold = share * change, share * (2.0 - share) * foretold  # along an undamped step
         terms = tuple(
             replace(term, value=float(value)) for term, value in zip(model.terms, values + change[count:], strict=True)
         )

@@ -10,7 +10,9 @@ from hil.study.logs.table import Floats
 from hil.study.replay.world import World
 from plant.effects.hot_spot import ORDER
 from plant.effects.theta import THETA
+from plant.vectors import INPUT
 
+_SPEEDS = INPUT.slice("wheel_speed_rad_s")
 _HOT = THETA.slice("hot_spot", "amplitude")
 _SHOWN = 0.01
 """Amplitude of the replays that show where the spots stand: some 0.1 rad/s at the wheels, where all is linear."""
@@ -43,15 +45,8 @@ def angles(drive: Drive) -> Floats:
 
     A free replay drifts by radii and slips: a thousandth in 100 m is three radians of the tenth order.
     """
-    speeds = drive.measured["wheel"]
-    at = np.arange(len(speeds))
-    whole = np.zeros((len(speeds), 4))
-    for k in range(4):
-        seen = np.isfinite(speeds[:, k])
-        if seen.any():
-            whole[:, k] = np.interp(at, at[seen], speeds[seen, k])
-    turned = np.cumsum(np.repeat(whole, drive.stride, axis=0) * ROW_S, axis=0)
-    return np.concatenate([np.zeros((1, 4)), turned])[: len(drive.inputs)]
+    turned = np.cumsum(drive.inputs[:, _SPEEDS] * ROW_S, axis=0)
+    return np.concatenate([np.zeros((1, 4)), turned])[:-1]
 
 
 def parts(rows: slice) -> Iterator[slice]:
