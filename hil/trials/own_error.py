@@ -60,7 +60,8 @@ def _of_numbers(screened: Iterable[Score]) -> Iterator[tuple[Key, float]]:
     for item in screened:
         if item.usual > _LEAST_USUAL and item.value != 0.0:
             candidate = item.candidate
-            yield (candidate.effect.name, candidate.parameter.name, kind_of(candidate.place)), item.raw
+            key = candidate.effect.name, candidate.parameter.name, kind_of(candidate.place)
+            yield key, max(item.raw - item.paid, 0.0)
 
 
 def _of_laws(found: Diagnosis) -> Iterator[tuple[Key, float]]:

@@ -69,7 +69,10 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A listed effect's number at a place; its columns move together. ``sprung``: the set states the car's springs."""
+    """A listed effect's number at a place; its columns move together. ``sprung``: the set states the car's springs.
+
+    ``price`` is what takes off its gain that the data chose something of it beside its value.
+    """
 
     effect: Effect
     parameter: Parameter
@@ -77,6 +80,7 @@ class Candidate:
     columns: tuple[int, ...]
     places: int
     sprung: bool = field(default=True, kw_only=True)
+    price: float = field(default=0.0, kw_only=True)
 
     @property
     def name(self) -> str:

@@ -19,8 +19,8 @@ from hil.study.replay.world import World
 Tracks = dict[str, Floats]
 _LARGEST_STEP = 8.0
 _ATTEMPTS = ((False, 0.0, 1.0), (True, 0.0, 0.5), (True, 0.1, 1.0), (True, 1.0, 1.0), (True, 10.0, 1.0))
-"""Ways to make a step, in turn until one improves: whether limits stay where they are, the damping, and the share of the
-step that is made. Damping stops what two numbers do together that each undoes alone; half a step does not."""
+"""Ways to make a step, in turn until one improves: whether limits stay where they are, the damping, and the share
+of the step that is made. Damping stops what two numbers do together that each undoes alone; half a step does not."""
 _LIMITS = (
     "battery_charge_power_w", "motor_peak_torque_nm", "motor_rate_limit_nm_s", "motor_fade_start_mps",
     "motor_fade_end_mps", "ehb_build_rate_pa_s", "ehb_release_rate_pa_s",

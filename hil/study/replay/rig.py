@@ -109,6 +109,8 @@ class Rig:
         self._kept: _Kept | None = None
         self._made: _Made | None = None
         self._turned: list[Floats] = []
+        self.shown: Floats = np.zeros((0, 4))
+        """How much hot spots would show, by segment and wheel, where `align` chose angles."""
         self.runs = 0
 
     def quieted(self, world: World) -> "Rig":
@@ -133,7 +135,9 @@ class Rig:
             shown.append(self.run(with_spots(world))["wheel"] - bare)
         ends = np.cumsum([drive.samples for drive in self.case.drives])[:-1]
         each = zip(*(np.split(values, ends) for values in (self.measured()["wheel"] - bare, *shown)), strict=True)
-        stand = [standing(drive, left, of) for drive, (left, *of) in zip(self.case.drives, each, strict=True)]
+        stood = [standing(drive, left, of) for drive, (left, *of) in zip(self.case.drives, each, strict=True)]
+        stand, much = zip(*stood, strict=True)
+        self.shown = np.vstack(much)
         self._turned = [angle + offset for angle, offset in zip(turned, stand, strict=True)]
         return turns(world)
 

@@ -28,7 +28,8 @@ class Contender:
     """A model that explains the data with one cause in a certain place: its term, cost and log of the odds.
 
     ``noise`` is what is left beside it; ``gained`` is what it takes off chi-squared, shared out over the model's own
-    error, ``error`` what that was divided by beside the table's, ``price`` what the choice of its beginning takes off.
+    error, ``error`` what that was divided by beside the table's, ``price`` what the choice of its beginning takes off
+    (`paid`: of whatever the data chose).
     """
 
     term: Term
@@ -41,10 +42,15 @@ class Contender:
     error: float = np.inf
     price: float = 0.0
 
+    @property
+    def paid(self) -> float:
+        """What all that was chosen by the data takes off its gain."""
+        return self.price + self.term.candidate.price
+
 
 def odds(contender: Contender) -> float:
     """Twice the negative log of the odds, the smaller the better."""
-    return contender.cost + contender.price - 2.0 * contender.evidence
+    return contender.cost + contender.paid - 2.0 * contender.evidence
 
 
 def behind(one: Contender, best: Contender) -> float:
@@ -112,12 +118,13 @@ def instead(
 
 
 def from_the_best(fitter: Fitter, fitted: Sequence[Contender]) -> list[Contender]:
-    """Contenders that begin when the best does, each fitted from where the best ended, too, where that explains more.
+    """Contenders, each fitted from where the best ended and begun when it does, too, where that explains more.
 
-    What acts alike ends alike: a fit that stopped on its way would be no rival.
+    What acts alike ends alike: a fit that stopped on its way, or began late beside numbers that stood in for the cause,
+    would be no rival.
     """
     best = min(fitted, key=odds)
-    others = [one for one in fitted if one is not best and one.term.onset == best.term.onset]
+    others = [one for one in fitted if one is not best]
     again = instead(fitter, best, [(one.term.candidate, one.term.value) for one in others], True)
     better = dict(zip(map(id, others), again, strict=True))
     return [min(one, better.get(id(one), one), key=odds) for one in fitted]

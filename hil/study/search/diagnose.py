@@ -62,7 +62,6 @@ class _Search:
         self.rig = Rig(case, vehicle).quieted(base)
         self.frame = Frame.of(self.rig.case)
         self.numbers = Numbers(self.rig, self.frame, vehicle, base, settings.relinearise)
-        self.field = Field(self.rig, self.frame, vehicle.untold)
         self.unlisted = Unlisted(self.numbers, self._from_handed_in, settings, say)
         self.told = float(len(self.numbers.nuisances))
         self.began_again = False
@@ -82,6 +81,7 @@ class _Search:
         model, noise = self.numbers.fitted(nominal, noise)
         if self.rig.align(self.fitter.world(model.z, ())):
             model, noise = self.numbers.fitted(self.fitter.at(model.z, (), noise), noise)
+        self.field = Field(self.rig, self.frame, self.rig.vehicle.untold)
         found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, noise, noise, nominal, model, model)
         self._screened(found)
         around = model.z

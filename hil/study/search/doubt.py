@@ -45,7 +45,7 @@ def erring(most_left: float, found: Diagnosis) -> float:
 def with_gain(contender: Contender, reference: float, error: float) -> Contender:
     """With its gain against ``reference``, shared out over the model's own error and that here, less its price."""
     gained = (reference - contender.cost) / variance_of(contender.term.candidate)
-    return replace(contender, gained=gained / error - contender.price, error=error)
+    return replace(contender, gained=gained / error - contender.paid, error=error)
 
 
 def beyond_doubt(contender: Contender, least: float, fitter: Fitter, told: float) -> bool:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from copy import copy
+from dataclasses import replace
 
 from hil.study.fitting.candidates import Candidate, candidates, columns
 from hil.study.fitting.fit import Fitter, Model, Tracks
@@ -9,6 +10,7 @@ from hil.study.fitting.linear import Sums, project, project_later, track_columns
 from hil.study.likelihood.noise import Frame, Noise
 from hil.study.logs.driven import undriven
 from hil.study.replay.rig import Rig
+from hil.study.replay.turning import price_of_angles
 from hil.study.search.behind import replayed, silent
 from hil.study.search.contest import Contest
 from hil.study.search.diagnosis import Diagnosis
@@ -26,8 +28,13 @@ class Field:
         self._rig, self._frame = rig, frame
         self._columns = columns(untold)
         without = undriven(drive.log for drive in rig.case.drives)
-        self.candidates: list[Candidate] = candidates(self._columns, without, rig.vehicle.sprung)
+        self.candidates = [self._priced(one) for one in candidates(self._columns, without, rig.vehicle.sprung)]
         self.tracks: Tracks = {}
+
+    def _priced(self, candidate: Candidate) -> Candidate:
+        """Of hot spots the data chose the angles."""
+        turned = candidate.effect.name == "hot_spot"
+        return replace(candidate, price=price_of_angles(self._rig.shown, candidate.members())) if turned else candidate
 
     def taken_at(self, fitter: Fitter, model: Model) -> None:
         """Take the sensitivities at a model."""

@@ -29,7 +29,7 @@ def one_for_all(fitter: Fitter, field: Field, found: Diagnosis, model: Model, no
 
     singles = sorted(Contest.at_once(lambda one: fitted(*one), tried), key=odds)
     accepted = [listed[0] for listed in found.races]
-    together = model.cost + sum(one.price - 2.0 * one.evidence for one in accepted)
+    together = model.cost + sum(one.paid - 2.0 * one.evidence for one in accepted)
     return singles if singles and odds(singles[0]) < together else []
 
 

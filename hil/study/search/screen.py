@@ -25,7 +25,8 @@ class Score:
 
     ``raw`` is the gain before it is shared out over the model's own error (`hil.study.fitting.own_error`); ``replayed``
     where it is that of a replay at this value (`hil.study.search.behind`). ``since`` is when it begins, as drive and s
-    in it, None where it is always there; ``price`` what the choice of that takes off its gain.
+    in it, None where it is always there; ``price`` what the choice of that takes off its gain (`paid`: of whatever the
+    data chose).
     """
 
     candidate: Candidate
@@ -39,6 +40,11 @@ class Score:
     replayed: bool = False
     since: tuple[int, float] | None = None
     price: float = 0.0
+
+    @property
+    def paid(self) -> float:
+        """What all that was chosen by the data takes off its gain."""
+        return self.price + self.candidate.price
 
 
 def scores(candidates: Sequence[Candidate], projected: Projected, offset: int, now: Sequence[float]) -> list[Score]:
@@ -63,8 +69,8 @@ def score(candidate: Candidate, b: float, q: float, now: float = 0.0) -> Score:
     step = float(np.clip(now + step, parameter.low, parameter.high)) - now
     gain = 2.0 * b * step - q * step * step
     raw = gain
-    gain /= variance_of(candidate)
-    evidence = 0.5 * raw + share_of(candidate, q, step)
+    gain = raw / variance_of(candidate) - candidate.price
+    evidence = 0.5 * (raw - candidate.price) + share_of(candidate, q, step)
     reach, usual = largest * float(np.sqrt(q)), tau / USUAL * float(np.sqrt(q))
     return Score(candidate, now + step, gain, evidence, reach, usual, q, raw)
 
@@ -77,8 +83,8 @@ def share_of(candidate: Candidate, information: float, value: float) -> float:
 
 def rescored(item: Score, value: float, raw: float, information: float) -> Score:
     """A candidate looked at again: with another value, gain and information."""
-    evidence = 0.5 * (raw - item.price) + share_of(item.candidate, information, value)
-    gain = raw / variance_of(item.candidate) - item.price
+    evidence = 0.5 * (raw - item.paid) + share_of(item.candidate, information, value)
+    gain = raw / variance_of(item.candidate) - item.paid
     return replace(item, value=value, gain=gain, evidence=evidence, information=information, raw=raw)
 
 
