@@ -81,10 +81,10 @@ def test_stamps_that_are_too_early_are_named_and_within_their_interval() -> None
 _NAMED_SINCE = (
     ("clock_drift", 15154224), ("pitch_dive", 15418795), ("pitch_dive", 15154224), ("pitch_dive", 9927935),
     ("pitch_dive", 16068464), ("aero_lift", 16068464), ("aero_lift", 807153), ("timestamp_offset", 15418795),
-    ("pressure_location", 14495151), ("imu_filter", 807153),
+    ("pressure_location", 14495151), ("imu_filter", 807153), ("mass_offset", 2542592), ("aero_lift", 2542592),
+    ("hot_spot", 2542592), ("hot_spot", 15418795),
 )  # fmt: skip
 _MISSED = (
-    ("hot_spot", 15418795, "what is chosen, where the spots stand, divides the gain"),
     ("hot_spot", 807153, "what shows lies where its tenth order meets the wheels' swing on their tyres"),
     ("residual_drag", 14495151, "rolling resistance of that wheel: 1.9 to 4.1 deviations apart"),
     ("residual_drag", 9927935, "rolling resistance of that wheel: 1.9 to 4.1 deviations apart"),
@@ -97,9 +97,6 @@ _MISSED = (
     ("pad_mu_gain", 16068464, "rear pads 8 % weak; why numbers of the car take so much of it is not known"),
     ("slip_stiffness", 807153, "of an axle the model errs by 1.9 times the noise"),
     ("bedding", 1903544, "all four brakes; why is not known"),
-    ("mass_offset", 2542592, "motors weaker than they tell; all numbers of the car go to their ends first"),
-    ("aero_lift", 2542592, "leads by 92 in chi-squared and is not beyond doubt; why is not known"),
-    ("hot_spot", 2542592, "what is chosen, where the spots stand, divides the gain"),
 )
 
 

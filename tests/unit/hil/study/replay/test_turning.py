@@ -4,12 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from hil.study.logs.prepare import prepare
 from hil.study.logs.table import make_log
 from hil.study.replay.rig import Rig
 from hil.study.replay.telling import SOURCE
-from hil.study.replay.turning import QUARTER_RAD, angles, parts, standing, turns, with_spots, without_spots
+from hil.study.replay.turning import (
+    QUARTER_RAD,
+    angles,
+    parts,
+    price_of_angles,
+    standing,
+    turns,
+    with_spots,
+    without_spots,
+)
 from hil.study.replay.vehicle_set import paper_car
 from hil.study.replay.world import World, nominal
 from plant.effects.hot_spot import ORDER
@@ -74,7 +84,26 @@ def test_two_replays_tell_where_the_spots_stand(rolled: np.ndarray, stand: float
     rng = np.random.default_rng(3)
     shown = [rng.normal(size=(drive.samples, 4)) for _ in range(2)]
     left = 7.0 * (np.cos(ORDER * stand) * shown[0] + np.sin(ORDER * stand) * shown[1])
-    assert standing(drive, left, shown)[0] == pytest.approx(stand)
+    found, much = standing(drive, left, shown)
+    assert found[0] == pytest.approx(stand)
+    assert np.all(much > 0.0)
+
+
+@pytest.mark.parametrize(("segments", "wheels"), [(1, (2,)), (2, (0, 1)), (2, (0, 1, 2, 3))])
+def test_angles_that_noise_chooses_explain_no_more_than_their_price(segments: int, wheels: tuple[int, ...]) -> None:
+    """As seldom as noise of one degree of freedom explains what is asked of a cause."""
+    chosen, asked = segments * len(wheels), 12.0
+    much = np.ones((segments, 4))
+    drawn = np.random.default_rng(5).rayleigh(size=(400_000, chosen))
+    seldom = np.mean(drawn.sum(axis=1) ** 2 / chosen > asked + price_of_angles(much, wheels))
+    assert seldom < 2.0 * chi2.sf(asked, 1)
+
+
+def test_angles_where_spots_do_not_show_cost_nothing() -> None:
+    much = np.zeros((3, 4))
+    assert price_of_angles(much, (0, 1)) == 0.0
+    much[0, 0] = 2.0
+    assert price_of_angles(much, (0, 1)) == price_of_angles(np.full((1, 4), 7.0), (1,))
 
 
 def test_angles_are_those_of_the_measured_wheels(rolled: np.ndarray) -> None:
