@@ -73,7 +73,7 @@ def standing(drive: Drive, left: Floats, shown: Sequence[Floats]) -> tuple[Float
             of = np.column_stack([values[good] for values in steps[1:]])
             if not of.any():
                 continue
-            much[number, k] = np.sum(of**2)
+            much[number, k] = np.linalg.norm(of)
             sine, cosine = np.linalg.lstsq(of, steps[0][good], rcond=None)[0]
             found[segment.first : segment.last, k] = np.arctan2(cosine, sine) / ORDER
     return found, much
@@ -84,7 +84,8 @@ def price_of_angles(much: Floats, wheels: Sequence[int]) -> float:
 
     Spots show in N segments and wheels alike much, and noise turns each to where it looks like spots: (sum of N
     Rayleigh variables)^2 / N exceeds this and 20 as seldom as chi-squared with one degree of freedom exceeds 20 (by
-    convolution: 3.5, 13.9, 25.5 and 36.0 for N of 1, 4, 8 and 12). N by what they show (Kish 1965, Survey Sampling).
+    convolution: 3.5, 13.9, 25.5 and 36.0 for N of 1, 4, 8 and 12). Where they show unlike much N is that of Kish (1965,
+    Survey Sampling), weighed by the root of the sum of squares they show: so the variables are, in the sum.
     """
     of = much[:, list(wheels)]
     squares = float(np.sum(of**2))
