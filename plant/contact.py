@@ -42,8 +42,11 @@ def static_load(i: int, cos_grade: float, p: Vector) -> float:
 
 
 @equation
-def wheel_load(i: int, torque: float, cos_grade: float, x: Vector, p: Vector, y: Vector) -> float:
-    """Vertical load of one wheel, N: static share, unsprung weight, spring and links."""
+def wheel_load(i: int, braking: float, driving: float, cos_grade: float, x: Vector, p: Vector, y: Vector) -> float:
+    """Vertical load of one wheel, N: static share, unsprung weight, spring and links.
+
+    ``braking``, ``driving`` : torque of the friction brake and of the motor, N m; negative brakes.
+    """
     front = 1.0 if i < 2 else -1.0
     half = 0.5 - (i % 2)
     front_m, rear_m = p[P.vehicle_cog_to_axle_m], p[P.vehicle_cog_to_axle_m + 1]
@@ -58,8 +61,9 @@ def wheel_load(i: int, torque: float, cos_grade: float, x: Vector, p: Vector, y:
         per_axle(i, p, P.suspension_anti_roll_nm_rad),
     )  # fmt: skip
     links = link_force(
-        torque / p[P.wheel_rolling_radius_m], p[P.vehicle_mass_kg] * share * x[X.speed_mps] * x[X.yaw_rate_rad_s],
-        front, wheel_y, per_axle(i, p, P.suspension_brake_support_tangent),
+        braking / p[P.wheel_rolling_radius_m], driving / p[P.wheel_rolling_radius_m],
+        p[P.vehicle_mass_kg] * share * x[X.speed_mps] * x[X.yaw_rate_rad_s], front, wheel_y,
+        per_axle(i, p, P.suspension_brake_support_tangent), per_axle(i, p, P.suspension_drive_support_tangent),
         per_axle(i, p, P.suspension_roll_centre_height_m),
     )  # fmt: skip
     return max(at_wheel(static_load(i, cos_grade, p) + spring + links, y, J.wheel_load, i), 0.0)
@@ -116,7 +120,8 @@ def contacts(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, cos_grade:
         given, made = u[U.wheel_torque_nm + i], y[Y.friction_torque_nm + i] + y[Y.motor_torque_nm + i]
         torque = given if cut[C.wheel_torque + i] > 0.5 else made
         y[Y.wheel_torque_nm + i] = torque
-        load = wheel_load(i, torque, cos_grade, x, p, y)
+        driving = y[Y.motor_torque_nm + i]
+        load = wheel_load(i, torque - driving, driving, cos_grade, x, p, y)
         y[Y.wheel_load_n + i] = load
 
         omega, slip, side_slip = x[X.wheel_speed_rad_s + i], x[X.slip + i], x[X.side_slip + i]

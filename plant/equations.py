@@ -52,7 +52,11 @@ def body(
     x: Vector, p: Vector, y: Vector, cos_grade: float, sin_grade: float, cos_yaw: float, sin_yaw: float,
     cos_steer: float, sin_steer: float,
 ) -> None:  # fmt: skip
-    """Rates of the body and of the inertial measurement unit, from the forces at the wheels."""
+    """Rates of the body and of the inertial measurement unit, from the forces at the wheels.
+
+    Lift and drag are those a wind tunnel tells: drag acts along the road, what it does higher up is in the lift of the
+    axles (SAE J1594).
+    """
     mass = p[P.vehicle_mass_kg]
     height = p[P.vehicle_cog_height_m]
     speed, lateral, yaw_rate = x[X.speed_mps], x[X.lateral_speed_mps], x[X.yaw_rate_rad_s]
@@ -77,6 +81,7 @@ def body(
         sum_pitch -= wheel_x * up + height * body_x
         sum_roll += wheel_y * up + height * body_y
 
+    sum_pitch += height * drag
     rate = Y.rate
     specific_x, specific_y = at_car(sum_x - drag, y, J.body_force) / mass, sum_y / mass
     sprung = mass - p[P.vehicle_unsprung_mass_kg] - p[P.vehicle_unsprung_mass_kg + 1]

@@ -22,8 +22,9 @@ def spring_force(
 
 @equation
 def link_force(
-    brake_force_n: float, axle_lateral_n: float, front: float, y_m: float, support_tangent: float, roll_centre_m: float
-) -> float:
+    brake_force_n: float, drive_force_n: float, axle_lateral_n: float, front: float, y_m: float, brake_tangent: float,
+    drive_tangent: float, roll_centre_m: float,
+) -> float:  # fmt: skip
     """Force the links pass by the spring, N, positive up on the body.
 
     Reimpell/Stoll/Betzler, The Automotive Chassis, chapter 3. The forces are those the torques and the steady turn
@@ -31,8 +32,11 @@ def link_force(
 
     Parameters
     ----------
-    brake_force_n : wheel torque over radius; negative brakes.  axle_lateral_n : lateral force of the axle.
-    front : 1 front, -1 rear.  support_tangent : slope of the line from the contact to the support pole; braking lifts
-        the body at the front and pulls it down at the rear.  roll_centre_m : height of the roll centre.
+    brake_force_n, drive_force_n : torque of the friction brake and of the motor over radius; negative brakes.
+    axle_lateral_n : lateral force of the axle.  front : 1 front, -1 rear.
+    brake_tangent, drive_tangent : slope of the line to the support pole from the contact, of motors on the body from
+        the wheel's centre; braking lifts the body at the front and pulls it down at the rear.
+    roll_centre_m : height of the roll centre.
     """
-    return -front * support_tangent * brake_force_n - 0.5 * axle_lateral_n * roll_centre_m / y_m
+    supported = brake_tangent * brake_force_n + drive_tangent * drive_force_n
+    return -front * supported - 0.5 * axle_lateral_n * roll_centre_m / y_m

@@ -38,9 +38,10 @@ _TOLD = (
     "battery_charge_power_w", "imu_cutoff_hz", "disc_heat_front_j_k", "disc_heat_rear_j_k", "disc_cooling_front_w_k",
     "disc_cooling_rear_w_k",
 )  # fmt: skip
-_SUPPORT, _ROLL_CENTRE_M = 0.06, 0.03
-"""Half-widths of the links' support, whose share of an axle's braking force is not the pads' where motors brake, too,
-and of the roll centres, as drawings tell them."""
+_SUPPORT, _ROLL_CENTRE_M = 0.03, 0.03
+"""Half-widths of the links' support and of the roll centres, as drawings tell them."""
+_ROLL_INERTIA_KG_M2 = 100.0
+"""The hidden body rolls at once; with so much it does in 0.03 s, and the plant's steps still follow."""
 
 
 def sealed_folder(folder: Path) -> Path:
@@ -113,8 +114,9 @@ def _suspension(car: Car) -> dict[str, tuple[float | list[float], float]]:
 
     Pitch and heave are not coupled: c_f a = c_r b, dampers alike (Mitschke/Wallentowitz, Dynamik der Kraftfahrzeuge).
     Pitch stiffness is what of m h the links do not carry, over the dive; inertia and damping follow from frequency and
-    damping ratio. Support: tan = share h / (L b), b the axle's share of the braking force, between that of the pads and
-    the motors' half. Bars are what the roll needs beyond the springs, shared so that loads across are, by weight.
+    damping ratio. Support: tan = share h / (L b) of what of the torque slows the body and not the wheels, b the axle's
+    share: of the brakes that of the pads, of the motors a half. Bars are what the roll needs beyond the springs, shared
+    so that loads across are, by weight.
     """
     front_m, rear_m = car.cog_to_front_axle_m, car.wheelbase_m - car.cog_to_front_axle_m
     moment = car.mass_kg * car.cog_height_m
@@ -123,7 +125,8 @@ def _suspension(car: Car) -> dict[str, tuple[float | list[float], float]]:
     inertia = stiffness / w**2
     springs = [stiffness / (2.0 * m * car.wheelbase_m) for m in (front_m, rear_m)]
     pads = car.brake_gain_front_nm_pa / (car.brake_gain_front_nm_pa + car.brake_gain_rear_nm_pa)
-    braking = [0.5 * (pads + 0.5), 0.5 * (1.5 - pads)]
+    body = car.mass_kg / (car.mass_kg + 4.0 * car.wheel_inertia_kg_m2 / car.rolling_radius_m**2)
+    passed = body * LINKS * car.cog_height_m / car.wheelbase_m
     weight = [rear_m / car.wheelbase_m, front_m / car.wheelbase_m]
     roll = [share * moment / car.roll_rad_s2_m for share in weight]
     dive, frequency, damping, rolling = (
@@ -137,14 +140,14 @@ def _suspension(car: Car) -> dict[str, tuple[float | list[float], float]]:
             _rounded(2.0 * car.pitch_damping / w * c for c in springs),
             round(2.0 * car.pitch_damping / w * max(springs) * hypot(damping, dive, frequency)),
         ),
-        "suspension_brake_support_tangent": (
-            [round(LINKS * car.cog_height_m / (car.wheelbase_m * b), 3) for b in braking], _SUPPORT,
-        ),
+        "suspension_brake_support_tangent": ([round(passed / b, 3) for b in (pads, 1.0 - pads)], _SUPPORT),
+        "suspension_drive_support_tangent": ([round(passed / 0.5, 3)] * 2, _SUPPORT),
         "suspension_anti_roll_nm_rad": (
             _rounded(k - 0.5 * c * car.track_m**2 for k, c in zip(roll, springs, strict=True)),
             round(rolling * max(roll)),
         ),
         "suspension_roll_centre_height_m": (0.0, _ROLL_CENTRE_M),
+        "vehicle_roll_inertia_kg_m2": (_ROLL_INERTIA_KG_M2, 0.0),
         "vehicle_pitch_inertia_kg_m2": (round(inertia), round(inertia * hypot(dive, 2.0 * frequency))),
     }  # fmt: skip
 

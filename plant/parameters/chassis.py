@@ -28,13 +28,14 @@ class VehicleParameters:
 
 @dataclass(frozen=True, slots=True)
 class SuspensionParameters:
-    """Springs and dampers at the wheel, per side, and the support angles of the links."""
+    """Springs and dampers at the wheel, per side, and the support angles of the links under brakes and motors."""
 
     ride_rate_n_m: Annotated[tuple[float, float], "N/m", 5e3, 5e5]
     progression_n_m3: Annotated[tuple[float, float], "N/m3", 0.0, 1e8]
     damping_ns_m: Annotated[tuple[float, float], "N s/m", 0.0, 5e4]
     anti_roll_nm_rad: Annotated[tuple[float, float], "N m/rad", 0.0, 2e5]
     brake_support_tangent: Annotated[tuple[float, float], "", 0.0, 1.5]
+    drive_support_tangent: Annotated[tuple[float, float], "", -0.5, 1.5]
     roll_centre_height_m: Annotated[tuple[float, float], "m", -0.2, 0.6]
 
 

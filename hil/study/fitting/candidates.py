@@ -118,11 +118,13 @@ def columns(without: Collection[str] = ()) -> list[Column]:
     return found
 
 
-def candidates(of: list[Column], undriven: Collection[int] = (), sprung: bool = True) -> list[Candidate]:
+def candidates(
+    of: list[Column], undriven: Collection[int] = (), sprung: bool = True, quiet: Collection[str] = ()
+) -> list[Candidate]:
     """All places of all strengths that have columns; of motors, those with one at every wheel.
 
     Where the rear wheels are ``undriven``, the motor on the right is the one front right. ``sprung``: whether the set
-    states the suspension.
+    states the suspension. Of nodes that are ``quiet`` neither scale, stamps nor clock is asked.
     """
     index: Mapping[tuple[str, str, int], int] = {
         (column.effect.name, column.parameter.name, column.member): k for k, column in enumerate(of)
@@ -132,6 +134,8 @@ def candidates(of: list[Column], undriven: Collection[int] = (), sprung: bool = 
         groups = PLACES[effect.scope]
         if effect.scope is Scope.WHEEL and all(joint.startswith(_MOTOR) for joint in effect.joints):
             groups = {place: members for place, members in groups.items() if not {*members} & {*undriven}}
+        if effect.scope is Scope.NODE:
+            groups = {node: members for node, members in groups.items() if node not in quiet}
         for parameter in effect.strengths:
             for place, members in groups.items():
                 at = tuple(index[effect.name, parameter.name, member] for member in members)

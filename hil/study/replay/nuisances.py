@@ -22,20 +22,23 @@ _FORM = {
 """Share that a number is off at least, however well it is stated: an equation's number is not what was measured."""
 _SUSPENSION = {
     "suspension_ride_rate_n_m": 0.3, "suspension_progression_n_m3": 1.0, "suspension_damping_ns_m": 0.3,
-    "suspension_brake_support_tangent": 0.6, "suspension_anti_roll_nm_rad": 0.7, "suspension_roll_centre_height_m": 3.0,
+    "suspension_brake_support_tangent": 0.6, "suspension_drive_support_tangent": 0.6,
+    "suspension_anti_roll_nm_rad": 0.7, "suspension_roll_centre_height_m": 3.0,
     "vehicle_pitch_inertia_kg_m2": 0.6, "vehicle_roll_inertia_kg_m2": 0.2,
 }  # fmt: skip
 _SPRINGS = 0.05
 """The same share of a number of the suspension that a set states."""
-_LIFT, _LIFT_GUESSED = 0.06, 0.1
-"""Least half-widths of an axle's lift coefficient, stated and not: it takes what two models of the axles' loads do not
-have in common. Known to 0.03, it was off by 1.9 of what noise explains on drives with nothing hidden."""
+_LIFT = 0.1
+"""Half-width of an axle's lift coefficient that no set states."""
 _SIDE = 0.5
 """Share that the load may be off at which a tyre's cornering stiffness is largest: whether it grows with the load."""
 _THERMAL = {"friction_brake_heat_capacity_j_k": 0.2, "friction_brake_cooling_w_k": 0.3}
 """Heat store of the discs, if a set does not state it; where the friction does not depend on temperature it does not
 matter."""
-_SIGNED = ("suspension_progression_n_m3", "suspension_brake_support_tangent", "suspension_roll_centre_height_m")
+_SIGNED = (
+    "suspension_progression_n_m3", "suspension_brake_support_tangent", "suspension_drive_support_tangent",
+    "suspension_roll_centre_height_m",
+)  # fmt: skip
 """Numbers that a car may have of either sign."""
 
 
@@ -140,7 +143,7 @@ def listed(
     add("tyre_lsgal", [layout.slice("tyre_lsgal").start], [0.3])
     add("tyre_lmuy", [layout.slice("tyre_lmuy").start], [0.15])
     lift = layout.slice("vehicle_lift_coefficient")
-    least = _LIFT if "vehicle_lift_coefficient" in stated else _LIFT_GUESSED
+    least = 0.0 if "vehicle_lift_coefficient" in stated else _LIFT
     for k, axle in enumerate(("front", "rear")):
         half = max(tolerance.get("vehicle_lift_coefficient", 0.0), least)
         add(f"vehicle_lift_coefficient_{axle}", [lift.start + k], [half])

@@ -29,6 +29,7 @@ _SECTIONS = (
 _THRESHOLD = "friction_brake_threshold_pressure_pa"
 _BALANCE = 0.3
 """Half width of what an axle's cornering stiffness may be off beside the other's, where nobody states the tyres'."""
+_BRAKES, _MOTORS = "suspension_brake_support_tangent", "suspension_drive_support_tangent"
 _KNOWN = sorted({*ALIASES, *DERIVED, *SPECIAL, *PARAMETER.sizes})
 _FORMS = ("tyre_", "suspension_")
 """Sections whose curves no set states: where it says nothing else of them either, they may go as far as any guess."""
@@ -154,6 +155,9 @@ def _stated(table: Mapping[str, Any], where: str, base: PlantParameters) -> _Sta
             stated.remarks.append(f"{where}: {key} is one number of the car: {mean:g} is taken, {apart:g} more or less")
         else:
             stated.numbers[name] = given
+    if _BRAKES in stated.numbers:  # a hub carrier takes up the torque of a motor in the wheel as it does a caliper's
+        stated.numbers.setdefault(_MOTORS, stated.numbers[_BRAKES])
+        stated.tolerances.setdefault(_MOTORS, stated.tolerances.get(_BRAKES, 0.0))
     return stated
 
 

@@ -28,7 +28,7 @@ from hil.study.search.contest import (
 )
 from hil.study.search.diagnosis import Diagnosis, Say, Settings, causes_in
 from hil.study.search.doubt import backward, beyond_doubt, stands_beside, with_gain
-from hil.study.search.field import Field, number_of
+from hil.study.search.field import Field, number_of, quiet_nodes
 from hil.study.search.handed_in import Refitted, from_handed_in
 from hil.study.search.leading import fitted_leaders, together
 from hil.study.search.left_over import LeftOver
@@ -81,7 +81,8 @@ class _Search:
         model, noise = self.numbers.fitted(nominal, noise)
         if self.rig.align(self.fitter.world(model.z, ())):
             model, noise = self.numbers.fitted(self.fitter.at(model.z, (), noise), noise)
-        self.field = Field(self.rig, self.frame, self.rig.vehicle.untold)
+        quiet = quiet_nodes(self.fitter.of_stack(model.stack or self.rig.run(self.fitter.world(model.z, ()))), noise)
+        self.field = Field(self.rig, self.frame, self.rig.vehicle.untold, quiet)
         found = Diagnosis(self.rig.case, self.rig.vehicle, self.fitter, noise, noise, nominal, model, model)
         self._screened(found)
         around = model.z

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 
+import numpy as np
+
 from hil.study.fitting.candidates import Candidate, candidates, columns
 from hil.study.fitting.fit import Fitter, Model, Tracks
 from hil.study.fitting.linear import Sums, project, project_later, track_columns
@@ -22,13 +24,17 @@ _PLAUSIBLE = 12
 
 
 class Field:
-    """All candidates of a case; ``tracks`` are their sensitivities where they were last taken."""
+    """All candidates of a case; ``tracks`` are their sensitivities where they were last taken.
 
-    def __init__(self, rig: Rig, frame: Frame, untold: Sequence[str]) -> None:
+    Nodes that are ``quiet`` tell nothing but noise (`quiet_nodes`).
+    """
+
+    def __init__(self, rig: Rig, frame: Frame, untold: Sequence[str], quiet: Sequence[str] = ()) -> None:
         self._rig, self._frame = rig, frame
         self._columns = columns(untold)
         without = undriven(drive.log for drive in rig.case.drives)
-        self.candidates = [self._priced(one) for one in candidates(self._columns, without, rig.vehicle.sprung)]
+        listed = candidates(self._columns, without, rig.vehicle.sprung, quiet)
+        self.candidates = [self._priced(one) for one in listed]
         self.tracks: Tracks = {}
 
     def _priced(self, candidate: Candidate) -> Candidate:
@@ -103,6 +109,20 @@ class Field:
             looks = [score(candidate, float(b[block, k]), float(q[block, k])) for block in blocks]
             found.append(max(looks, key=lambda look: look.evidence))
         return found
+
+
+def quiet_nodes(shown: Tracks, noise: Noise) -> list[str]:
+    """Nodes of what drives the car whose channels ``shown``, simulated, are less than the noise of one sample.
+
+    Their noise drives the simulated car, a little; a scale that takes it away says nothing of the sensor (regression
+    dilution, Fuller 1987, Measurement Error Models, section 1.1: half of what is told is noise).
+    """
+
+    def tells(node: str) -> bool:
+        tracks = [name for name in shown if name.startswith(f"{node}.")]
+        return any(np.mean(np.square(shown[name])) > noise.tracks[name].a ** 2 for name in tracks)
+
+    return [node for node in ("pressure", "motor") if not tells(node)]
 
 
 def number_of(candidate: Candidate) -> tuple[str, str, str]:
