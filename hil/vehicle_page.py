@@ -57,8 +57,12 @@ brake_gain_rear_nm_pa = 1.7e-4
   `node_latency_s_tolerance`. Heat capacity and cooling of the discs may be off by a fifth and nearly a third where they
   are not stated.
 - Springs, dampers, bars and links (`suspension_`, `vehicle_pitch_inertia_kg_m2`) that a set states may be off by their
-  tolerance, at least by a twentieth, others by much more. Where it does not state every number of `suspension_`, more
+  tolerance, at least by a twentieth, others by much more. Links support the torque of motors
+  (`suspension_drive_support_tangent`) as they do the brakes' where a set says nothing else: so it is of motors in the
+  wheels, not of motors on the body. Where a set does not state every number of `suspension_`, more
   is asked before the height, the lift, the dive or what else goes with the loads is named.
+- Lift of the axles and drag are those a wind tunnel tells: drag acts along the road, and what it does higher up is in
+  the lift (SAE J1594).
 - Without a `pad_` key the friction of the pads is one constant, which the brake gains contain.
 - Unknown keys are told in the remarks and left out.
 """

@@ -17,7 +17,9 @@ from hil.study.search.race import LawRace
 from hil.study.search.screen import Score
 from hil.study.verdict.answer import Answer
 
-_SELDOM_TOLD = ("suspension_", "vehicle_pitch_inertia_kg_m2", "disc_", "node_latency_s")
+_SELDOM_TOLD = (
+    "suspension_", "vehicle_pitch_inertia_kg_m2", "vehicle_roll_inertia_kg_m2", "disc_", "node_latency_s",
+)  # fmt: skip
 """What a stranger's set hardly ever tells."""
 _PRIOR_CASES = 6
 _LEAST_USUAL = 0.3

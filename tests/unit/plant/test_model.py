@@ -12,7 +12,7 @@ from plant.effects.theta import THETA
 from plant.integrate import EXPONENTIAL, RUNGE_KUTTA_4, SEMI_IMPLICIT
 from plant.model import NEUTRAL, advance, column_indices, compile_model, healthy, initial_state, pack, replay, simulate
 from plant.road import DRY, RoadSegment, road_table
-from plant.vectors import BASE_RATES, CUT, INPUT, OUTPUT, STATE, SWITCH, P, U, X, Y
+from plant.vectors import BASE_RATES, CUT, INPUT, OUTPUT, PARAMETER, STATE, SWITCH, P, U, X, Y
 
 ROWS = 300
 
@@ -356,3 +356,31 @@ def test_a_torque_bent_between_two_rows_does_what_its_mean_does(stop, at_once):
     bent = _run(start, inputs, p, 2.5e-3, 4, at_once, cut)
     turned = bent[STATE.slice("wheel_speed_rad_s")] - straight[STATE.slice("wheel_speed_rad_s")]
     assert turned == pytest.approx(np.full(4, -60.0 * 2.0 / 3.0 * 0.01 / p[P.wheel_inertia_kg_m2]), rel=3e-3)
+
+
+def test_links_support_motors_with_their_own_tangent(stop):
+    """Braking with motors alone, a car whose links carry all of the front and none of the rear dives and rises less."""
+    start, inputs, p = stop
+    inputs[:, INPUT.slice("pressure_demand_pa")] = 0.0
+    pitch = {}
+    for of in ("brake", "drive"):
+        carried = p.copy()
+        carried[PARAMETER.slice(f"suspension_{of}_support_tangent")] += 0.2
+        pitch[of] = replay(start, inputs, carried, ["pitch_rad"])[0][-1, 0]
+    plain = replay(start, inputs, p, ["pitch_rad"])[0][-1, 0]
+    assert pitch["brake"] == pytest.approx(plain, rel=1e-6)
+    assert pitch["drive"] < 0.7 * plain
+
+
+def test_drag_moves_load_as_the_force_that_stops_the_car_does(paper_car):
+    """Lift and drag as a wind tunnel tells them, drag along the road: m h a between the axles, whatever makes a."""
+    vehicle = replace(paper_car.vehicle, lift_coefficient=(0.0, 0.0), drag_coefficient=1.0)
+    p = pack(replace(paper_car, vehicle=vehicle))
+    loads = [f"wheel_load_n_{wheel}" for wheel in ("fl", "fr", "rl", "rr")]
+    start, rest = initial_state(paper_car, 50.0, 423.15, 0.7), np.zeros((900, INPUT.size))
+    table = replay(start, rest, p, [*loads, "acceleration_mps2"])[0]
+    front_m, rear_m = vehicle.cog_to_axle_m
+    moved = table[:, :2].sum(axis=1) - vehicle.mass_kg * 9.81 * rear_m / (front_m + rear_m)
+    expected = -vehicle.mass_kg * vehicle.cog_height_m * table[:, 4] / (front_m + rear_m)
+    assert expected[600] > 150.0
+    assert moved[600:] == pytest.approx(expected[600:], rel=0.05)

@@ -9,7 +9,7 @@ from hil.study.replay.vehicle import Vehicle, rest_friction
 from hil.study.replay.vehicle_set import load_vehicle, paper_car
 from hil.study.replay.world import nominal, start_nuisances
 from plant.effects.theta import THETA
-from plant.vectors import P
+from plant.vectors import PARAMETER, P
 
 SIX = {
     "mass_kg": 1800.0,
@@ -128,7 +128,7 @@ def test_springs_that_are_stated_are_as_far_off_as_stated_and_at_least_a_twentie
     assert silent["suspension_ride_rate_n_m_front"].step[0] > 5.0 * by_name["suspension_ride_rate_n_m_front"].step[0]
 
 
-@pytest.mark.parametrize(("told", "half"), [({}, 0.1), ({"lift_front": 0.05, "lift_front_tolerance": 0.03}, 0.06)])
+@pytest.mark.parametrize(("told", "half"), [({}, 0.1), ({"lift_front": 0.05, "lift_front_tolerance": 0.03}, 0.03)])
 def test_lift_that_is_stated_is_off_by_less(told: dict[str, float], half: float) -> None:
     by_name = {one.name: one for one in load_vehicle(SIX | told).nuisances}
     assert by_name["vehicle_lift_coefficient_front"].step[0] == pytest.approx(HALF_WIDTH_TO_SIGMA * half)
@@ -259,3 +259,11 @@ def test_motors_of_unknown_strength_are_as_strong_as_they_are_asked() -> None:
     assert car.asked([]) is car
     stated = load_vehicle({**SIX, "motor_peak_torque_nm": 400.0})
     assert stated.asked([_asks(-315.0)]) is stated
+
+
+def test_motors_are_supported_as_brakes_are_where_a_set_says_nothing_else() -> None:
+    at = PARAMETER.slice("suspension_drive_support_tangent")
+    assert load_vehicle(SIX | SPRINGS).p[at].tolist() == SPRINGS["suspension_brake_support_tangent"]
+    own = load_vehicle(SIX | SPRINGS | {"suspension_drive_support_tangent": [0.05, 0.1]})
+    assert own.p[at].tolist() == [0.05, 0.1]
+    assert load_vehicle(SIX | SPRINGS).sprung

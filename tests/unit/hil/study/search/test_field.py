@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 from outsider import VEHICLE
 
+from hil.study.fitting.candidates import candidates, columns
 from hil.study.fitting.linear import track_columns
-from hil.study.likelihood.noise import Frame
+from hil.study.likelihood.noise import MODE_NAMES, Frame, Noise, Track
 from hil.study.logs.prepare import prepare
 from hil.study.logs.table import make_log
 from hil.study.replay.rig import Rig
 from hil.study.replay.vehicle_set import load_vehicle
 from hil.study.replay.world import nominal
-from hil.study.search.field import Field
+from hil.study.search.field import Field, quiet_nodes
 
 WHEELS = ("fl", "fr", "rl", "rr")
 
@@ -26,8 +27,8 @@ def _alike(log, one: str, other: str) -> float:
     for name in (one, other):
         candidate = listed[name]
         step = 0.05 * candidate.parameter.typical
-        columns = track_columns(rig, frame, rig.run(base), [candidate.applied(base, step)], [step])
-        shown.append(np.where(frame.present["ax"].ravel() > 0.5, columns["ax"][:, 0], 0.0))
+        shows = track_columns(rig, frame, rig.run(base), [candidate.applied(base, step)], [step])
+        shown.append(np.where(frame.present["ax"].ravel() > 0.5, shows["ax"][:, 0], 0.0))
     a, b = shown
     return float(a @ b / np.sqrt((a @ a) * (b @ b)))
 
@@ -44,3 +45,18 @@ def test_a_car_that_rings_at_a_stop_does_not_tell_two_names_of_one_brake_apart(m
     channels |= {f"pressure_{w}_pa": 17e5 * np.clip((t - 1.0) / 0.2, 0.0, 1.0) for w in WHEELS}
     cosine = _alike(make_log("log", t, channels), "pad_mu_gain@front", "stuck_corner.loss@front")
     assert (abs(cosine) > 0.999) is alike
+
+
+@pytest.mark.parametrize(("torque_nm", "tells"), [(0.3, False), (3.0, True)])
+def test_of_a_sensor_that_tells_nothing_but_noise_no_scale_is_asked(torque_nm, tells):
+    """Motors that stood still were told at 4.7 times what they give: less of their noise then drove the car."""
+    shown = {f"motor.{mode}": np.full((100, 1), 0.1) for mode in MODE_NAMES}
+    shown["motor.mean"][20:40] = torque_nm
+    noise = Noise({name: Track(0.5, 0.0, 0.0, 1.0) for name in shown}, ())
+    quiet = quiet_nodes(shown, noise)
+    assert quiet == (["pressure"] if tells else ["pressure", "motor"])
+    places = {(one.effect.name, one.place) for one in candidates(columns(), quiet=quiet)}
+    for name in ("wrong_scale", "timestamp_offset", "clock_drift"):
+        assert ((name, "motor") in places) == tells
+        assert (name, "imu") in places
+    assert ("iwm_gain", "front") in places
