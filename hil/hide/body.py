@@ -38,6 +38,8 @@ def road_height(s: float) -> float:
 def wheel_load(x: Vector, i: int, mass: float, car: Car, e: Vector) -> float:
     """Load of one wheel, N: static share, transfer by springs, dampers and links, lateral transfer, lift, rough road.
 
+    Links pass a share of what the tyres' forces move; of drag, which acts along the road, nothing.
+
     Mitschke/Wallentowitz, Dynamik der Kraftfahrzeuge: m h a / L between the axles, m h a / t across.
     """
     front = i < 2
@@ -58,6 +60,16 @@ def wheel_load(x: Vector, i: int, mass: float, car: Car, e: Vector) -> float:
         place = x[S.distance_m] - (0.0 if front else car.wheelbase_m)
         load += 60000.0 * e[E.road_roughness, 0] * road_height(place)
     return max(load, 50.0)
+
+
+@equation
+def pitch_by_lift(x: Vector, mass: float, car: Car, e: Vector) -> float:
+    """Pitch on the springs by the lift of the axles, rad; nose down where the rear is lifted more."""
+    front_m, rear_m = car.cog_to_front_axle_m, car.wheelbase_m - car.cog_to_front_axle_m
+    moment_m = rear_m * (car.lift_rear + e[E.aero_lift, 2]) - front_m * (car.lift_front + e[E.aero_lift, 0])
+    lifted_n = 0.5 * car.air_density_kg_m3 * car.frontal_area_m2 * x[S.speed_mps] ** 2
+    stiffness = (1.0 - LINKS) * mass * (car.cog_height_m + e[E.cog_height, 0])
+    return lifted_n * moment_m * car.dive_rad_s2_m * (1.0 + e[E.pitch_dive, 0]) / stiffness
 
 
 @equation
@@ -189,14 +201,16 @@ def rates(
     softer = 1.0 + e[E.pitch_dive, 0]  # springs; inertia and dampers stay
     dive = car.dive_rad_s2_m * softer
     w = 6.283185307 * car.pitch_frequency_hz
+    carried = specific_x - LINKS / (1.0 - LINKS) * drag / mass  # links pass nothing of the drag
     dx[S.pitch_rad] = x[S.pitch_rate_rad_s]
     dx[S.pitch_rate_rad_s] = (
-        w * w * (-dive * specific_x - x[S.pitch_rad]) / softer - 2.0 * car.pitch_damping * w * x[S.pitch_rate_rad_s]
+        w * w * (-dive * carried - x[S.pitch_rad]) / softer - 2.0 * car.pitch_damping * w * x[S.pitch_rate_rad_s]
     )
-    dx[S.load_ax_mps2] = (specific_x - x[S.load_ax_mps2]) / 0.02
+    dx[S.load_ax_mps2] = (specific_x + drag / mass - x[S.load_ax_mps2]) / 0.02
     dx[S.load_ay_mps2] = (specific_y - x[S.load_ay_mps2]) / 0.04
     held = GRAVITY_MPS2 * sin(atan2(grade, 1.0)) * (1.0 - moving)  # what keeps a standing car on the slope is felt
-    felt = (specific_x + held) * cos(x[S.pitch_rad]) - GRAVITY_MPS2 * sin(x[S.pitch_rad])
+    nose = x[S.pitch_rad] + pitch_by_lift(x, mass, car, e)
+    felt = (specific_x + held) * cos(nose) - GRAVITY_MPS2 * sin(nose)
     arm = e[E.imu_position, 0]
     felt -= arm * yaw * yaw
     turned = specific_y + arm * dx[S.yaw_rate_rad_s]

@@ -87,5 +87,5 @@ def test_a_body_as_told_moves_as_the_hidden_one(told, pressure_pa, motor_nm):
     simulated = replay(start, inputs, vehicle.p, columns, cut=cut)[0][begins - 5 :]
     true = np.column_stack((outputs[:, Y.load_n], outputs[:, Y.load_n + 2], hidden[:, S.pitch_rad]))[begins - 5 :]
     apart = simulated - true
-    apart[:, 2] -= apart[0, 2]  # lift and drag pitch the plant's body otherwise
-    assert (np.sqrt(np.mean(apart**2, axis=0)) < (0.025, 0.025, 0.08) * np.ptp(true, axis=0)).all()
+    apart[:, 2] -= apart[0, 2]  # what lift pitches, the hidden sensor has beside this state
+    assert (np.sqrt(np.mean(apart**2, axis=0)) < (0.025, 0.025, 0.045) * np.ptp(true, axis=0)).all()
