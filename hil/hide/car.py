@@ -16,8 +16,8 @@ class Car(NamedTuple):
     ``tyre_curvature_load`` dfz, K = ``slip_stiffness`` Fz (1 + ``slip_stiffness_load`` dfz),
     D = ``tyre_friction`` Fz (1 + ``tyre_friction_load`` dfz), dfz = Fz / 4000 N - 1.
     Brake: torque = ``brake_gain`` mu / 0.398 (p - ``threshold_pressure``), mu and its temperature by Ricciardi et al.,
-    equations (3) and (4), with ``pad_a`` to ``pad_epsilon``. ``dive_rad_s2_m``: pitch angle over deceleration by the wheels;
-    ``roll_rad_s2_m``: roll angle over lateral acceleration.
+    equations (3) and (4), with ``pad_a`` to ``pad_epsilon``. ``dive_rad_s2_m``: pitch angle over deceleration by the
+    wheels; ``roll_rad_s2_m``: roll angle over lateral acceleration.
     """
 
     mass_kg: float = 1463.0

@@ -62,7 +62,7 @@ class _Search:
         self.rig = Rig(case, vehicle).quieted(base)
         self.frame = Frame.of(self.rig.case)
         self.numbers = Numbers(self.rig, self.frame, vehicle, base, settings.relinearise)
-        self.unlisted = Unlisted(self.numbers, self._from_handed_in, settings, say)
+        self.unlisted = Unlisted(self.numbers, settings, say)
         self.told = float(len(self.numbers.nuisances))
         self.began_again = False
 
@@ -206,7 +206,7 @@ class _Search:
         fitted = gained() if fitted else []
         clear = sorted((c for c in fitted if beyond_doubt(c, found.least_gain, self.fitter, self.told)), key=odds)
         now = Round(contest, model, tighter, reference, listed, bool(clear), left, error, self._bent(model))
-        law = self.unlisted.best(found, now)
+        law = self.unlisted.best(found, now, self._from_handed_in)
         if law is not None:
             found.explained += reference - law.cost
             polished, tighter = self.fitter.settle(law.model, law.noise, 1)

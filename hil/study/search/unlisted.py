@@ -69,18 +69,18 @@ def ahead(law: Contender, listed: Contender | None, clear: bool, reference: floa
 class Unlisted:
     """The laws at a model, simulated once."""
 
-    def __init__(self, numbers: Numbers, again: Again, settings: Settings, say: Say) -> None:
-        self._numbers, self._again, self._settings, self._say = numbers, again, settings, say
+    def __init__(self, numbers: Numbers, settings: Settings, say: Say) -> None:
+        self._numbers, self._settings, self._say = numbers, settings, say
         self._race: LawRace | None = None
 
     def elsewhere(self) -> None:
         """What laws show is asked for at another model from now on."""
         self._race = None
 
-    def best(self, found: Diagnosis, now: Round) -> Contender | None:
+    def best(self, found: Diagnosis, now: Round, again: Again) -> Contender | None:
         """The best law where it is ahead of the best listed cause, beyond noise and the model's own error.
 
-        A listed cause of another shape than the usual (`hil.study.search.shapes`) takes the place of a law that is not
+        ``again`` fits laws from the car as handed in, too. A listed cause of another shape than the usual (`hil.study.search.shapes`) takes the place of a law that is not
         ahead of it.
         """
         model, reference = now.model, now.reference
@@ -103,7 +103,7 @@ class Unlisted:
         if now.bent:
             tried = [replayed(one) for one in sorted(seen, key=odds)[:_TRIED]]
             best_listed = np.inf if now.listed is None else odds(now.listed)
-            seen, without = self._again(model, tried, refitted_law, reference, 1, best_listed)
+            seen, without = again(model, tried, refitted_law, reference, 1, best_listed)
             reference = min(reference, without[0].cost)
         law = min(seen, key=odds)
         best = entries[law.term.candidate.name]
@@ -114,7 +114,7 @@ class Unlisted:
             return ahead(law, listed, clear, reference, least * now.error(law, law))
 
         if stands(law, now.listed, now.clear) and self._settings.relinearise and not now.bent:
-            (law,), without = self._again(model, [replayed(law)], refitted_law, reference, 1, np.inf)
+            (law,), without = again(model, [replayed(law)], refitted_law, reference, 1, np.inf)
             reference = min(reference, without[0].cost)
         if not stands(law, now.listed, now.clear):
             return None
