@@ -80,8 +80,8 @@ class Unlisted:
     def best(self, found: Diagnosis, now: Round, again: Again) -> Contender | None:
         """The best law where it is ahead of the best listed cause, beyond noise and the model's own error.
 
-        ``again`` fits laws from the car as handed in, too. A listed cause of another shape than the usual (`hil.study.search.shapes`) takes the place of a law that is not
-        ahead of it.
+        ``again`` fits laws from the car as handed in, too. A listed cause of another shape than the usual
+        (`hil.study.search.shapes`) takes the place of a law that is not ahead of it.
         """
         model, reference = now.model, now.reference
         if not self._settings.dictionary or any(isinstance(term.candidate, Piece) for term in model.terms):
