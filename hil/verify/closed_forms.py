@@ -74,14 +74,13 @@ def topic() -> Topic:
 
     base = v.cog_to_axle_m[0] + v.cog_to_axle_m[1]
     table = inputs(4.0, {"pressure_demand_pa": 34e5})
-    stop = drive(table, 30.0, ["wheel_load_n_*", "longitudinal_force_n_*", "acceleration_mps2", "pitch_rad"], free)
+    stop = drive(table, 30.0, ["wheel_load_n_*", "acceleration_mps2", "pitch_rad"], free)
     late = slice(250, 350)
-    force = stop.four("longitudinal_force_n")[late].sum(axis=1)
     axle = stop.four("wheel_load_n")[late][:, :2].sum(axis=1)
     transferred = axle - v.mass_kg * GRAVITY * v.cog_to_axle_m[1] / base
-    lever = -force * v.cog_height_m / base
+    lever = -v.mass_kg * stop["acceleration_mps2"][late] * v.cog_height_m / base
     numbers.append(
-        below("Load transfer", 100.0 * (float(np.mean(transferred / lever)) - 1.0), 0.5, "%", "against sum F h / L")
+        below("Load transfer", 100.0 * (float(np.mean(transferred / lever)) - 1.0), 0.5, "%", "against m h a / L")
     )  # fmt: skip
 
     ehb = car.ehb
