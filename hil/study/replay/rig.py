@@ -189,7 +189,7 @@ class Rig:
         columns = column_indices(SOURCE["motor"])
         table = np.empty((len(halves), len(columns)))
         simulate(
-            start(self.vehicle, drive, world, halves[0]), halves, self.case.cut, healthy(), world.p, self._road,
+            start(self.vehicle, drive, world, drive.inputs), halves, self.case.cut, healthy(), world.p, self._road,
             ROW_S / 2, 1, np.ones(len(halves), np.int64), EXPONENTIAL, columns, table, OUTPUT.zeros(),
             world.theta_in(drive), world.terms, NO_PLUGINS,
         )  # fmt: skip
@@ -299,7 +299,7 @@ class Rig:
         """
         theta = world.theta_in(drive)
         inputs = kept.inputs if kept is not None and alike else self._driving(drive, world)
-        x = start(self.vehicle, drive, world, inputs[0])
+        x = start(self.vehicle, drive, world, inputs)
         table = np.empty((len(inputs), len(columns)))
         cut, switch, y, pace = self.case.cut, healthy(), OUTPUT.zeros(), self._pace[drive.number]
         states = [x.copy()]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hil.study.logs.case import Drive, Segment
+from hil.study.logs.case import ROW_S, Drive, Segment
 from hil.study.logs.table import Floats
 from hil.study.replay.sensing import ground_speed_before, wheel_speed_before
 from hil.study.replay.vehicle import Vehicle
@@ -10,14 +10,19 @@ from hil.study.replay.world import World
 from plant.effects.theta import THETA
 from plant.friction import mu_equilibrium
 from plant.model import initial_state
-from plant.vectors import INPUT, STATE, P, X
+from plant.vectors import DELAY_SLOTS, INPUT, STATE, P, X
 
 DISC_K = 350.0
 _BACKWARD_MPS = 0.5
+_STEADY = int(0.1 / ROW_S)
+"""Rows that tell what a pressure was at the first one."""
 
 
 def start(vehicle: Vehicle, drive: Drive, world: World, given: Floats) -> Floats:
-    """State at the first row; ``given`` are its inputs, what the sensors add taken off."""
+    """State at the first row of the inputs ``given``, (rows, INPUT.size), what the sensors add taken off.
+
+    What is asked at first has been asked before: a log may begin on the brakes.
+    """
     disc = (drive.log.disc_temperature_k or DISC_K) + world.disc_offset_k
     pad_k = disc if vehicle.pad_temperature_matters else float(world.p[P.friction_brake_ambient_k])
     pad = (float(world.p[at]) for at in (P.pad_a_1_ks, P.pad_b_1_j, P.pad_epsilon_w))
@@ -26,9 +31,21 @@ def start(vehicle: Vehicle, drive: Drive, world: World, given: Floats) -> Floats
     speed = start_speed(drive, drive.segments[0], world)
     x[X.speed_mps] = speed
     x[STATE.slice("wheel_speed_rad_s")] = speed / _radius_m(world)
-    x[STATE.slice("pressure_pa")] = np.clip(given[INPUT.slice("pressure_pa")], 0.0, None)
-    x[STATE.slice("motor_torque_nm")] = given[INPUT.slice("motor_torque_nm")]
+    x[STATE.slice("pressure_pa")] = np.clip(_first_pressures(given), 0.0, None)
+    x[STATE.slice("motor_torque_nm")] = given[0, INPUT.slice("motor_torque_nm")]
+    x[STATE.slice("delayed_demand_pa")] = np.repeat(given[0, INPUT.slice("pressure_demand_pa")], DELAY_SLOTS)
     return x
+
+
+def _first_pressures(given: Floats) -> Floats:
+    """Measured pressures at the first row, Pa, (4,): a straight line through those before others are asked for."""
+    told, asked = (given[:_STEADY, INPUT.slice(name)] for name in ("pressure_pa", "pressure_demand_pa"))
+    others = np.flatnonzero((asked != asked[0]).any(axis=1))
+    told = told[: others[0] if len(others) else len(told)]
+    if len(told) < 3:
+        return np.asarray(told[0])
+    rows = np.arange(len(told)) - 0.5 * (len(told) - 1)
+    return np.asarray(told.mean(axis=0) + rows[0] * (rows @ told) / float(rows @ rows))
 
 
 def start_speed(drive: Drive, segment: Segment, world: World) -> float:
