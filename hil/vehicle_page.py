@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from importlib import resources
 from typing import Any
 
-from hil.study.replay.vehicle_keys import ALIASES, DERIVED, LATENCY_S, SPECIAL, UNLIMITED, WIDE
+from hil.study.replay.vehicle_keys import ALIASES, DERIVED, LATENCY_S, LINE_S, SPECIAL, UNLIMITED, WIDE
 
 _WHAT = {
     "wheelbase_m": "between the axles",
@@ -54,7 +54,9 @@ brake_gain_rear_nm_pa = 1.7e-4
   asked of them and of what they tell, radii by 0.12 %; clocks of the nodes by 50 ppm, and the steering wheel may stand
   half a degree off where the car goes straight.
 - The frames of a node are taken to be sent within {latency:g} ms of the wheel speeds', or within
-  `node_latency_s_tolerance`. Heat capacity and cooling of the discs may be off by a fifth and nearly a third where they
+  `node_latency_s_tolerance`. Pads may lag behind the sensors of their pressures, as one pole, by {line:g} ms, or by
+  `line_lag_s_tolerance`: 0 where pressures are measured at the callipers. A yaw rate may come 6 ms later than the
+  accelerations. Heat capacity and cooling of the discs may be off by a fifth and nearly a third where they
   are not stated.
 - Springs, dampers, bars and links (`suspension_`, `vehicle_pitch_inertia_kg_m2`) that a set states may be off by their
   tolerance, at least by a twentieth, others by much more. Links support the torque of motors
@@ -78,7 +80,8 @@ def page() -> str:
     """The page in Markdown."""
     shipped = _shipped()
     flat = {f"{section}_{name}": entry for section, entries in shipped.items() for name, entry in entries.items()}
-    lines = [_INTRO.format(sections=", ".join(f"`{section}_`" for section in UNLIMITED), latency=1e3 * LATENCY_S)]
+    sections = ", ".join(f"`{section}_`" for section in UNLIMITED)
+    lines = [_INTRO.format(sections=sections, latency=1e3 * LATENCY_S, line=1e3 * LINE_S)]
     lines += ["## The car's six and their like", "", "| key | also | what |", "|---|---|---|"]
     lines += [f"| {_names(name)} | {what} |" for name, what in _WHAT.items()]
     lines += _short(flat) + _derived(flat)

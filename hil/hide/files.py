@@ -102,6 +102,7 @@ def vehicle_toml() -> str:
         lines.append(f"{key}_tolerance = {value * TOLERANCE[name] / float(getattr(NOMINAL, name)):.4f}")
     lines.append("# frames of the other nodes beside the wheel speeds'")
     lines.append(f"node_latency_s_tolerance = {2.0 * USUALLY_LATE_S:.5f}")
+    lines.append("line_lag_s_tolerance = 0.0")  # its pressures are measured at the callipers
     lines.append("# suspension at the wheel, [front, rear]; linear springs, roll centres on the road")
     for key, (values, half) in _suspension(NOMINAL).items():
         lines.append(f"{key} = {values!r}")

@@ -19,6 +19,7 @@ from hil.study.verdict.answer import Answer
 
 _SELDOM_TOLD = (
     "suspension_", "vehicle_pitch_inertia_kg_m2", "vehicle_roll_inertia_kg_m2", "disc_", "node_latency_s",
+    "line_lag_s",
 )  # fmt: skip
 """What a stranger's set hardly ever tells."""
 _PRIOR_CASES = 6

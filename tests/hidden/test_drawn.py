@@ -16,7 +16,7 @@ from plant.compiled import digest
 
 COUNT, MOST_MISSES, MOST_ALARMS = 12, 2, 1
 SNR = 15.0
-pytestmark = [pytest.mark.slow, pytest.mark.long, pytest.mark.timeout(7200)]
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(7200)]
 
 
 def drawn_seed() -> int:
@@ -29,7 +29,7 @@ def drawn_seed() -> int:
 @pytest.fixture
 def seed() -> int:
     number = drawn_seed()
-    print(f"\nto repeat: BRAKEBENCH_DRAWN_SEED={number} pytest tests/hidden/test_drawn.py -m long -s")
+    print(f"\nto repeat: BRAKEBENCH_DRAWN_SEED={number} pytest tests/hidden/test_drawn.py -m slow -s")
     return number
 
 

@@ -78,10 +78,8 @@ def _far(taken: Model, now: Model) -> bool:
 
 def with_term(world: World, term: Term) -> World:
     """The world with an effect at its value, from where it begins."""
-    world = term.candidate.applied(world, term.value)
-    if term.onset is None:
-        return world
-    return replace(world, onsets=(*world.onsets, (term.candidate.effect.name, *term.onset)))
+    found = term.candidate.applied(world, term.value)
+    return found if term.onset is None else found.begun(term.candidate.effect.name, *term.onset, before=world)
 
 
 def strain(z: Floats, farthest: Floats | float = np.inf, told: float | None = None) -> float:
@@ -107,8 +105,9 @@ class Fitter:
         self.rig, self.frame, self.base = rig, frame, base
         self.nuisances, self.nuisance_columns = tuple(nuisances), nuisance_columns
         self.farthest = np.array([nuisance.farthest for nuisance in self.nuisances])
+        self.highest = np.array([nuisance.highest for nuisance in self.nuisances])
         self.lowest = np.where(
-            [nuisance.kind in ("held", "window") for nuisance in self.nuisances], 0.0, -self.farthest
+            [nuisance.kind in ("held", "window", "line") for nuisance in self.nuisances], 0.0, -self.farthest
         )
         self._of_form = np.array([nuisance.kind != "scatter" for nuisance in self.nuisances])
         self._limits = [k for k, nuisance in enumerate(self.nuisances) if nuisance.name in _LIMITS]
@@ -229,7 +228,7 @@ class Fitter:
         ends = [(term.candidate.parameter.low, term.candidate.parameter.high) for term in model.terms]
         least, most = np.array(ends).reshape(-1, 2).T
         low = np.concatenate((np.maximum(self.lowest - model.z, -_LARGEST_STEP), least - values))
-        high = np.concatenate((np.minimum(self.farthest - model.z, _LARGEST_STEP), most - values))
+        high = np.concatenate((np.minimum(self.highest - model.z, _LARGEST_STEP), most - values))
         low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
         if hold:
             low[self._limits] = high[self._limits] = 0.0
@@ -265,7 +264,7 @@ class Fitter:
 
     def at_their_end(self, z: Floats) -> list[int]:
         """Nuisances as far off as they may be: they explain nothing more."""
-        return np.flatnonzero(np.abs(z) >= self.farthest).tolist()
+        return np.flatnonzero((np.abs(z) >= self.farthest) | (z >= self.highest)).tolist()
 
     def products(self, noise: Noise) -> Floats:
         """Information of the nuisances, (nuisances, nuisances); remembered for this noise."""

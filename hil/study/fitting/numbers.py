@@ -52,11 +52,13 @@ class Numbers:
 
         self._rig.quieten(world(z))
         self._rig.keep(world(z))
-        base, own = self._rig.run(world(z)), np.diag(self._steps)
-        tracks = track_columns(self._rig, self._frame, base, [world(z + step) for step in own], self._steps.tolist())
+        highest = np.array([nuisance.highest for nuisance in self.nuisances])
+        steps = np.where(z + self._steps > highest, -self._steps, self._steps)
+        base, own = self._rig.run(world(z)), np.diag(steps)
+        tracks = track_columns(self._rig, self._frame, base, [world(z + step) for step in own], steps.tolist())
         for k, nuisance in enumerate(self.nuisances):
             if nuisance.name in _KINKED:  # the mean of both sides
-                other = track_columns(self._rig, self._frame, base, [world(z - own[k])], [-float(self._steps[k])])
+                other = track_columns(self._rig, self._frame, base, [world(z - own[k])], [-float(steps[k])])
                 for name, columns in tracks.items():
                     columns[:, k] = 0.5 * (columns[:, k] + other[name][:, 0])
         self.fitter = Fitter(self._rig, self._frame, self._base, self.nuisances, tracks)

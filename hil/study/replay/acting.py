@@ -49,7 +49,7 @@ _ALWAYS = ("residual_drag", "stuck_corner", "ehb_deadband", "cogging")
 _OF_NODE = {"imu": Acting.NOTHING, "pressure": Acting.BRAKES, "motor": Acting.MOTORS, "driver": Acting.NOTHING}
 _MOVES_START = "wrong_scale"
 _PER_NODE = (_MOVES_START, "timestamp_offset", "clock_drift")
-LATE = (Acting.NOTHING, Acting.BRAKES, Acting.MOTORS, Acting.BRAKES | Acting.MOTORS, Acting.TURNING)
+LATE = (Acting.NOTHING, Acting.BRAKES, Acting.MOTORS, Acting.BRAKES | Acting.MOTORS, Acting.TURNING, Acting.TURNING)
 """What must be going on for the latency of each node (`hil.study.replay.world.LATE`) to matter."""
 
 

@@ -37,7 +37,7 @@ def _held_later(values: Floats, rows: float) -> Floats:
 
 def in_time(inputs: Floats, late_s: tuple[float, ...]) -> Floats:
     """Measured inputs with their nodes' latency taken back, demands when they are acted on."""
-    if not any(late_s[1:]):
+    if not any(late_s[1:5]):
         return inputs
     moved = inputs.copy()
     moved[:, _STEERING] = later(inputs[:, _STEERING], late_s[4] / ROW_S)

@@ -46,11 +46,12 @@ _SIGNED = (
 class Nuisance:
     """A number of the vehicle that may be off: ``p[at] += z * step``, z normal with standard deviation 1.
 
-    ``farthest`` is how many standard deviations it may be off at most; farther off it is a cause to be named.
+    ``farthest`` is how many standard deviations it may be off at most; farther off it is a cause to be named. Beyond
+    ``most`` more its equation has no meaning.
     ``kind`` says of what: a number of the vehicle (``signed`` if it may be below zero), the discs' temperature at the
     start, the latency of a node, or of what holds a demand (never below zero), zero of a sensor, what one brake, motor,
     tyre or clock is off beside the others (``scatter``), the lag of a toothed wheel, or the time over which it is a
-    mean (never below zero).
+    mean (never below zero), the lag of pads behind their sensors (``line``, never below zero).
     """
 
     name: str
@@ -58,6 +59,12 @@ class Nuisance:
     step: tuple[float, ...]
     kind: str = "vehicle"
     farthest: float = 3.0
+    most: float = np.inf
+
+    @property
+    def highest(self) -> float:
+        """How many standard deviations it may be more at most."""
+        return min(self.farthest, self.most)
 
 
 def guessed(nuisance: Nuisance, p: Floats) -> Nuisance:
@@ -73,6 +80,12 @@ def factor_of(now: float, step: float) -> float:
     """By what one standard deviation multiplies a positive number known badly; 1 for one that it is added to."""
     wide = now > 0.0 and abs(step) >= _WIDE * now
     return min(1.0 + abs(step) / now, _MOST_FACTOR) if wide else 1.0
+
+
+def _amount(now: float, step: float, then: float) -> float:
+    """How many standard deviations a positive number ``then`` is off ``now``."""
+    factor = factor_of(now, step)
+    return float(np.log(then / now) / np.log(factor)) if factor > 1.0 else (then - now) / step
 
 
 def listed(
@@ -132,8 +145,12 @@ def listed(
     for name in ("pad_a_1_ks", "pad_epsilon_w", "pad_c_1_s"):
         add(name, [layout.slice(name).start], [tolerance.get(name, 0.0)])
     # forms of curves that no vehicle set states: the tyre's near its peak and at the side, the roll of the body
-    add("tyre_curve", [layout.slice("tyre_lex").start], [1.5])
-    add("tyre_shape", [layout.slice("tyre_lcx").start], [0.1])
+    curve = layout.slice("tyre_lex").start
+    add("tyre_curve", [curve], [1.5])
+    of_one = float(p[layout.slice("tyre_pex1").start])
+    if of_one > 0.0:  # E is 1 at most (Pacejka 2012, eq. 4.E14)
+        found[-1] = replace(found[-1], most=_amount(float(p[curve]), found[-1].step[0], 1.0 / of_one))
+    add("tyre_shape", [layout.slice("tyre_lcx").start], [0.25])
     add("tyre_stiffness_load", [layout.slice("tyre_pkx3").start], [0.3])
     side = layout.slice("tyre_pky2").start
     add("tyre_side_stiffness_load", [side], [_SIDE * float(p[side])])

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from hil.study.logs.table import Floats
-from hil.study.replay.nuisances import Nuisance
+from hil.study.replay.nuisances import HALF_WIDTH_TO_SIGMA, Nuisance
 from plant.effects.effect import NODES
 from plant.effects.theta import THETA
 from plant.vectors import P
@@ -25,6 +25,12 @@ def scattered(p: Floats, motors: bool) -> tuple[Nuisance, ...]:
     """Nuisances of a car ``p`` whose maker states no more than usual; of its motors only if they are compared."""
     parts = [one for one in _PARTS if motors or one[:2] != ("iwm_gain", "gain")]
     return (*_by_wheel(parts), *_clocks(), _straight_ahead(p))
+
+
+def lagging(half_s: float) -> list[Nuisance]:
+    """How much pads lag behind the sensors of their pressures, up to ``half_s`` usually; never ahead of them."""
+    at = THETA.slice("pressure_location", "lag_s").start
+    return [Nuisance("line_lag", (at,), (HALF_WIDTH_TO_SIGMA * half_s,), "line")] if half_s else []
 
 
 def _by_wheel(parts: Sequence[tuple[str, str, float]]) -> list[Nuisance]:

@@ -30,7 +30,9 @@ SOURCE = {
 """Columns of the plant that each group of channels tells of."""
 Stack = dict[str, Floats]
 """Channels by group, (samples of all drives, channels)."""
-_NODE = {"ax": 0, "ay": 0, "yaw": 0, "pressure": 1, "motor": 2}
+_LATE = {"ax": (0,), "ay": (0,), "yaw": (0, 5), "pressure": (1,)}
+"""Which latencies of a world each group has."""
+_MOTOR = 2
 _USUAL_RADIUS_M = 0.3
 _TOOTH_ROWS, _TURNS_RAD_S = 2.0, 0.1
 _FINER = 4
@@ -70,7 +72,7 @@ class Telling:
         others = {group: values for group, values in happened.items() if group != "motor"}
         stack = sensed(others, chain, ROW_S) if others else {}
         for group, values in stack.items():
-            late = world.late_s[_NODE[group]] if group in _NODE else 0.0
+            late = sum(world.late_s[k] for k in _LATE.get(group, ()))
             if late:
                 stack[group] = later(values, late / ROW_S, straight=group == "pressure")
             elif group == "wheel":
@@ -81,7 +83,7 @@ class Telling:
             fine = _finer(happened["motor"], drive.inputs[:, INPUT.slice("motor_torque_bend_nm")])
             fine = sensed({"motor": fine}, chain, ROW_S / _FINER)["motor"]
             stack["motor"] = np.empty_like(happened["motor"])
-            straight_at(fine, _FINER, _FINER * world.late_s[_NODE["motor"]] / ROW_S, stack["motor"])
+            straight_at(fine, _FINER, _FINER * world.late_s[_MOTOR] / ROW_S, stack["motor"])
         return stack
 
     def _at_measured_speed(self, found: Stack, drive: Drive) -> None:

@@ -72,6 +72,11 @@ LATENCY: Final = "node_latency_s"
 """Of it a set states the tolerance alone: how much later or earlier than the wheel speeds a node's frames are sent."""
 LATENCY_S: Final = 4e-3
 """Half-width of that where a set does not say."""
+LINE: Final = "line_lag_s"
+"""Of it, too: by how much pads lag behind what the sensors of the pressures tell, as one pole."""
+LINE_S: Final = 8e-3
+"""Half-width of that where a set does not say: 5 to 20 ms of a line (`plant.effects.pressure_location`), which many a
+set counts into its dead time."""
 
 WIDE: Final = {
     "vehicle_mass_kg": 0.1,

@@ -13,9 +13,19 @@ import numpy as np
 from hil.parameters import ParameterError, is_number, load_set, override
 from hil.study.logs.table import UnusableError
 from hil.study.replay.nuisances import Nuisance, guessed, listed
-from hil.study.replay.scatter import scattered
+from hil.study.replay.scatter import lagging, scattered
 from hil.study.replay.vehicle import Vehicle, with_constant_friction, with_gains
-from hil.study.replay.vehicle_keys import ALIASES, DERIVED, LATENCY, LATENCY_S, SPECIAL, UNLIMITED, WIDE
+from hil.study.replay.vehicle_keys import (
+    ALIASES,
+    DERIVED,
+    LATENCY,
+    LATENCY_S,
+    LINE,
+    LINE_S,
+    SPECIAL,
+    UNLIMITED,
+    WIDE,
+)
 from plant.model import pack
 from plant.parameters.plant import PlantParameters
 from plant.vectors import PARAMETER
@@ -32,7 +42,9 @@ _BALANCE = 0.3
 _BRAKES, _MOTORS = "suspension_brake_support_tangent", "suspension_drive_support_tangent"
 _KNOWN = sorted({*ALIASES, *DERIVED, *SPECIAL, *PARAMETER.sizes})
 _FORMS = ("tyre_", "suspension_")
-"""Sections whose curves no set states: where it says nothing else of them either, they may go as far as any guess."""
+"""Sections whose curves hardly a set states: what it does not say may go as far as any guess."""
+_HALVES = (f"{LATENCY}_tolerance", f"{LINE}_tolerance")
+"""Half-widths of what no set gives a value of."""
 _THEN = {
     "ehb": "pressures are compared only where none has been asked for a while, and left and right where the same is",
     "motor": "torques of the motors are not compared with what is asked of them",
@@ -115,15 +127,18 @@ def _from_flat(table: Mapping[str, Any], where: str) -> Vehicle:
     tolerance = _tolerance(stated, parameters, gains, missing, unlimited)
     remarks = (*stated.remarks, *_left_open(where, unlimited, unstated, missing))
     vehicle = _vehicle(parameters, tolerance, friction or not gains, remarks, stated.names)
-    silent = tuple(s for s in _FORMS if not any(n.startswith(s) for n in (*stated.names, *stated.tolerances)))
+    told = stated.names | {_of_both(name) for name in stated.tolerances}
     nuisances = tuple(
-        guessed(one, vehicle.p) if one.name.startswith(silent) or _of_both(one.name) in missing else one
+        guessed(one, vehicle.p)
+        if _of_both(one.name) in missing or (one.name.startswith(_FORMS) and _of_both(one.name) not in told)
+        else one
         for one in vehicle.nuisances
     )
     if is_number(stated.numbers.get(_THRESHOLD)):
         nuisances = _as_one(nuisances, _THRESHOLD)
     if unlimited:  # who states every limit has measured the rest as well
         nuisances = (*nuisances, *scattered(vehicle.p, motors="motor" not in unstated))
+    nuisances = (*nuisances, *lagging(stated.tolerances.get(LINE, LINE_S)))
     sprung = {name for name in PARAMETER.sizes if name.startswith("suspension_")} <= stated.names
     return replace(
         vehicle, nuisances=nuisances, unstated=unstated, unlimited=unlimited, sprung=sprung,
@@ -139,7 +154,7 @@ def _stated(table: Mapping[str, Any], where: str, base: PlantParameters) -> _Sta
             _derive(stem, float(value), key != stem, base, stated)
             continue
         name = ALIASES.get(stem, stem)
-        if name not in SPECIAL and name not in PARAMETER.sizes and key != f"{LATENCY}_tolerance":
+        if name not in SPECIAL and name not in PARAMETER.sizes and key not in _HALVES:
             if not isinstance(value, str):
                 near = get_close_matches(stem, _KNOWN, 1)
                 hint = f"; did you mean {near[0]!r}?" if near else ""

@@ -18,20 +18,36 @@ from plant.effects.effect import NODES
 from plant.effects.theta import THETA
 
 _OF_THE_ROAD = (("road_grade", "grade"), ("headwind", "wind_mps"))
-LATE = ("imu", "pressure", "motor", "demand", "steering")
+LATE = ("imu", "pressure", "motor", "demand", "steering", "yaw_rate")
 """Nodes whose frames may come later than the wheel speeds'; demands, and the steering wheel, may act later than they
-are logged."""
+are logged; a yaw rate, which is filtered by itself, comes that much later than the accelerations."""
+GYRO_S = 6e-3
+"""Half-width of how much later a yaw rate comes, in s: as a filter of 25 Hz delays."""
 ZEROS = {"ay_mps2": 0.01, "yaw_rate_rad_s": 5e-4}
 """Standard deviations of what an inertial unit tells at rest, across: a tenth of a degree of roll, and 0.03 deg/s."""
 DISC_TOLD_K, DISC_GUESSED_K = 5.0, 15.0
 """Standard deviations of the discs' temperature at the start: as a thermocouple tells it, and as we guess."""
 
 
+@dataclass(frozen=True)
+class Begun:
+    """An effect that begins in the middle: ``number`` of the drive, and s in it.
+
+    ``before`` are its strengths until then: what single wheels are off was there before a cause of the same kind. Of
+    the drive in which it begins they are not known to the plant, and are left out.
+    """
+
+    effect: str
+    number: int
+    since_s: float
+    before: tuple[float, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class World:
     """One car: flat parameters, theta, basis terms (rows as in `plant.effects.bank`), discs at the start, latencies.
 
-    ``onsets`` names effects that begin in the middle: number of the drive, and s in it.
+    ``onsets`` are effects that begin in the middle.
     ``tooth_share`` multiplies the lag of a toothed wheel, half the time between two teeth: the speed is told when a
     tooth has passed; ``window_rows2`` is the square of the time over which it is a mean, in rows.
     """
@@ -43,20 +59,22 @@ class World:
     late_s: tuple[float, ...] = (0.0,) * len(LATE)
     tooth_share: float = 1.0
     window_rows2: float = 0.0
-    onsets: tuple[tuple[str, int, float], ...] = ()
+    onsets: tuple[Begun, ...] = ()
 
     def theta_in(self, drive: Drive) -> Floats:
         """Theta of one drive: direction along the road, and what begins later or within it."""
-        theta = _along(self.theta, drive.log.direction)
-        if self.onsets:
-            theta = theta.copy()
-        for name, number, since_s in self.onsets:
-            if drive.number < number:
-                for parameter in THETA.effect(name).strengths:
-                    theta[THETA.slice(name, parameter.name)] = 0.0
-            elif drive.number == number:
-                theta[THETA.slice(name, "onset_s")] = since_s
-        return theta
+        theta = self.theta.copy() if self.onsets else self.theta
+        for begun in self.onsets:
+            if drive.number < begun.number:
+                theta[_strengths(begun.effect)] = begun.before
+            elif drive.number == begun.number:
+                theta[THETA.slice(begun.effect, "onset_s")] = begun.since_s
+        return _along(theta, drive.log.direction)
+
+    def begun(self, effect: str, number: int, since_s: float, before: "World") -> "World":
+        """With an effect that begins in the middle, and was as in a world ``before``."""
+        strengths = tuple(before.theta[_strengths(effect)].tolist())
+        return replace(self, onsets=(*self.onsets, Begun(effect, number, since_s, strengths)))
 
     def shifted(self, nuisances: Sequence[Nuisance], z: Floats) -> "World":
         """With nuisances ``z`` standard deviations off."""
@@ -72,7 +90,7 @@ class World:
                     tooth += amount * step
                 elif nuisance.kind == "window":
                     window += amount * step
-                elif nuisance.kind in ("sensor", "scatter"):
+                elif nuisance.kind in ("sensor", "scatter", "line"):
                     theta[at] += amount * step
                 elif nuisance.kind == "signed":
                     p[at] += amount * step
@@ -91,7 +109,7 @@ def start_nuisances(disc_told: bool, latency_s: float) -> list[Nuisance]:
     """
     found = []
     for k, node in enumerate(LATE):
-        half = latency_s if node in NODES else LATENCY_S
+        half = latency_s if node in NODES else GYRO_S if node == "yaw_rate" else LATENCY_S
         found.append(
             Nuisance(f"late_{node}", (k,), (HALF_WIDTH_TO_SIGMA * half,), "held" if node == "demand" else "late")
         )
@@ -115,6 +133,12 @@ def _positive(now: float, z: float, step: float) -> float:
 def nominal(vehicle: Vehicle) -> World:
     """The car as handed in."""
     return World(vehicle.p, THETA.neutral())
+
+
+def _strengths(effect: str) -> list[int]:
+    """Where the strengths of an effect lie in theta."""
+    slices = (THETA.slice(effect, parameter.name) for parameter in THETA.effect(effect).strengths)
+    return [at for own in slices for at in range(own.start, own.stop)]
 
 
 def _along(theta: Floats, direction: int) -> Floats:

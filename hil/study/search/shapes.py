@@ -29,6 +29,9 @@ apart."""
 _FAR_APART = 4.0
 _ROUNDS, _TURNS, _SETTLED = 8, 4, 1.0
 """Values that are fitted, how often in turn, and how little less cost ends it."""
+_FAR_BEHIND = 0.5
+"""Share of what a law explains, below which a shape as offered is not followed: the values around it are no further
+off than an eighth of its range."""
 _SHARE, _RISES = 0.1, 1.0
 """A finite difference, of what is usual; and what in chi-squared tells how well a shape is known."""
 _TWO_SIDED_95 = 1.96
@@ -101,8 +104,8 @@ def _values(shape: Parameter) -> list[float]:
     return list(map(float, (np.geomspace if far_apart else np.linspace)(shape.low, shape.high, _OFFERED)))
 
 
-def _fitted(fitter: Fitter, bare: Model, begun: Shaped, law: Contender) -> Contender:
-    """The cause with the shape that explains most, near the one at which it is offered."""
+def _fitted(fitter: Fitter, bare: Model, begun: Shaped, law: Contender) -> Contender | None:
+    """The cause with the shape that explains most, near the one at which it is offered; None far behind the law."""
     seen: list[tuple[float, Model]] = []
 
     def found_from(z: Floats, term: Term) -> Model:
@@ -126,7 +129,8 @@ def _fitted(fitter: Fitter, bare: Model, begun: Shaped, law: Contender) -> Conte
     offered = _values(begun.shape)
     number = offered.index(begun.at)
     beyond = offered[max(number - 1, 0)], offered[min(number + 1, len(offered) - 1)]
-    cost(begun.at)
+    if bare.cost - cost(begun.at) < _FAR_BEHIND * (bare.cost - law.cost):
+        return None
     minimize_scalar(cost, bounds=beyond, method="bounded", options={"maxiter": _ROUNDS})
     at, model = min(seen, key=lambda one: one[1].cost)
     by_noise = _deviation(at, model.cost, [(other, of.cost) for other, of in seen], begun.shape)

@@ -64,7 +64,7 @@ def held_out(fitter: Fitter, noise: Noise, model: Model) -> Tracks:
     z_of_all, of_all, *_ = fitter.moved(model, of.total())
     for weights in trained:
         z, terms, *_ = fitter.moved(model, of.total(weights))
-        z = np.clip(model.z + z - z_of_all, fitter.lowest, fitter.farthest)
+        z = np.clip(model.z + z - z_of_all, fitter.lowest, fitter.highest)
         terms = tuple(map(_changed, model.terms, terms, of_all))
         residual = fitter.residual(z, terms)
         test = weights[blocks] < 0.5

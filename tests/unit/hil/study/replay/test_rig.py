@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hil.study.logs.case import ROW_S
 from hil.study.logs.prepare import prepare
 from hil.study.logs.table import Log, make_log
 from hil.study.replay.rig import Rig
 from hil.study.replay.steps import STEPS
 from hil.study.replay.vehicle_set import load_vehicle, paper_car
-from hil.study.replay.world import World, nominal
+from hil.study.replay.world import LATE, World, nominal
 from plant.effects.effect import NODES
 from plant.effects.theta import THETA
 from plant.model import initial_state, pack, replay
@@ -38,6 +39,11 @@ def _log() -> Log:
 @pytest.fixture(scope="module")
 def rig() -> Rig:
     return Rig(prepare([_log()], 0.308), paper_car())
+
+
+def late(node: str, by_s: float) -> tuple[float, ...]:
+    """Latencies of a world in which one node is late."""
+    return tuple(by_s if name == node else 0.0 for name in LATE)
 
 
 def _with(world: World, effect: str, number: str, value: float | np.ndarray) -> World:
@@ -103,8 +109,8 @@ def test_a_kept_world_changes_no_result(rig, effect, number, value):
 
 
 @pytest.mark.parametrize("change", [
-    {"late_s": (0.004, 0.0, 0.0, 0.0, 0.0)}, {"late_s": (0.0, 0.004, 0.0, 0.0, 0.0)},
-    {"late_s": (0.0, 0.0, 0.0, 0.004, 0.0)}, {"window_rows2": 4.0}, {"tooth_share": 0.2},
+    {"late_s": late("imu", 0.004)}, {"late_s": late("pressure", 0.004)}, {"late_s": late("demand", 0.004)},
+    {"window_rows2": 4.0}, {"tooth_share": 0.2},
 ])  # fmt: skip
 def test_what_a_kept_world_was_told_is_not_told_of_other_frames_or_teeth(rig, change):
     level = nominal(rig.vehicle)
@@ -211,7 +217,7 @@ def test_what_drives_the_car_is_what_happened_however_the_torque_is_told(late_by
     true = changed["motor_torque_fl_nm"]
     level = nominal(vehicle)
     world = {
-        "latency": replace(level, late_s=(0.0, 0.0, 0.006, 0.0, 0.0)),
+        "latency": replace(level, late_s=late("motor", 0.006)),
         "stamp": _with(level, "timestamp_offset", "delay_s", MOTOR_NODE * 0.006),
         "clock": _with(level, "clock_drift", "share", MOTOR_NODE * 5e-4),
         "scale": _with(level, "wrong_scale", "factor", MOTOR_NODE * -0.2),
@@ -239,16 +245,29 @@ def test_a_torque_told_half_a_row_late_is_the_one_between_two_rows(told):
     level.p[P.motor_time_constant_s] = 0.008
     rig = Rig(prepare([log], 0.308), vehicle).quieted(level)
     drive = rig.case.drives[0]
-    late = (
-        replace(level, late_s=(0.0, 0.0, 0.005, 0.0, 0.0))
+    world = (
+        replace(level, late_s=late("motor", 0.005))
         if told == "latency"
         else _with(level, "timestamp_offset", "delay_s", MOTOR_NODE * 0.005)
     )
     happened = {"motor": drive.inputs[:, INPUT.slice("motor_torque_nm")]}
-    seen = rig.telling.at_rows(happened, drive, late)["motor"][1:, 0]
+    seen = rig.telling.at_rows(happened, drive, world)["motor"][1:, 0]
     straight = 0.5 * (happened["motor"][:-1, 0] + happened["motor"][1:, 0])
     far, near = (np.abs(values - true[: len(values)])[20:-20].max() for values in (straight, seen))
     assert near < 0.8 < 2.0 < far
+
+
+def test_a_yaw_rate_comes_later_than_the_accelerations(rig):
+    """A gyroscope has a filter of its own."""
+    drive = rig.case.drives[0]
+    ramp = np.arange(len(drive.inputs), dtype=float)[:, None]
+    level = nominal(rig.vehicle)
+    in_time, later = (
+        rig.telling.at_rows({"ay": ramp, "yaw": ramp}, drive, world)
+        for world in (level, replace(level, late_s=late("yaw_rate", 0.5 * ROW_S)))
+    )
+    assert later["yaw"][5:-5] == pytest.approx(in_time["yaw"][5:-5] - 0.5)
+    assert np.array_equal(later["ay"], in_time["ay"])
 
 
 def test_steps_are_short_where_a_torque_steps_and_noise_is_no_step():

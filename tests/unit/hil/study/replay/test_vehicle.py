@@ -142,6 +142,21 @@ def test_discs_that_are_stated_are_as_far_off_as_stated() -> None:
         assert by_name["friction_brake_heat_capacity_j_k_front"].step[0] == pytest.approx(HALF_WIDTH_TO_SIGMA * half)
 
 
+def test_the_curvature_of_a_tyre_ends_where_its_equation_does() -> None:
+    """Beyond a curvature factor of 1 the plant's tyre is that of 1: no sensitivity leads a fit back from there."""
+    car = load_vehicle(SIX)
+    (curve,) = (one for one in car.nuisances if one.name == "tyre_curve")
+    world = nominal(car).shifted([curve], np.array([curve.highest]))
+    assert float(world.p[P.tyre_lex] * world.p[P.tyre_pex1]) == pytest.approx(1.0)
+    assert curve.highest < curve.farthest
+
+
+def test_curves_that_a_set_does_not_state_go_as_far_as_a_guess() -> None:
+    by_name = {one.name: one for one in load_vehicle(SIX | {"tyre_lkx": 1.1, "tyre_lkx_tolerance": 0.1}).nuisances}
+    assert by_name["tyre_lkx"].farthest == 3.0
+    assert by_name["tyre_friction_load"].farthest > 3.0
+
+
 def test_how_late_a_node_may_be_is_as_stated_or_four_milliseconds() -> None:
     assert load_vehicle(SIX).node_latency_s == 4e-3
     vehicle = load_vehicle(SIX | {"node_latency_s_tolerance": 1e-3})
@@ -150,8 +165,23 @@ def test_how_late_a_node_may_be_is_as_stated_or_four_milliseconds() -> None:
     late = {one.name: one.step[0] for one in start_nuisances(True, vehicle.node_latency_s) if "late_" in one.name}
     assert late == {
         "late_imu": 5e-4, "late_pressure": 5e-4, "late_motor": 5e-4, "late_demand": 2e-3, "late_steering": 2e-3,
+        "late_yaw_rate": 3e-3,
     }  # fmt: skip
     assert any("node_latency_s" in remark for remark in load_vehicle(SIX | {"node_latency_s": 1e-3}).remarks)
+
+
+def test_pads_lag_behind_their_sensors_by_as_much_as_is_stated_or_usual() -> None:
+    """Lags of 3 and 4 ms were told as causes of cars with nothing hidden."""
+    car = load_vehicle(SIX)
+    (line,) = (one for one in car.nuisances if one.name == "line_lag")
+    assert line.step[0] == pytest.approx(4e-3)
+    lagging = nominal(car).shifted([line], np.ones(1))
+    assert lagging.theta[THETA.slice("pressure_location", "lag_s")] == pytest.approx(4e-3)
+    for half, count in ((2e-3, 1), (0.0, 0)):
+        told = load_vehicle(SIX | {"line_lag_s_tolerance": half})
+        assert [one.step[0] for one in told.nuisances if one.name == "line_lag"] == [0.5 * half] * count
+        assert not any("line_lag" in remark for remark in told.remarks)
+    assert not any(one.name == "line_lag" for one in paper_car().nuisances)
 
 
 @pytest.mark.parametrize("missing", [None, *SPRINGS])

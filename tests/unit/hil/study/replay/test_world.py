@@ -1,8 +1,12 @@
 """Worlds: the vehicle's numbers move without corners, and stay what they are."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from hil.study.logs.prepare import prepare
+from hil.study.logs.table import make_log
 from hil.study.replay.vehicle_keys import LATENCY_S
 from hil.study.replay.vehicle_set import load_vehicle, paper_car
 from hil.study.replay.world import ZEROS, nominal, start_nuisances
@@ -12,6 +16,8 @@ SIX = {
     "mass_kg": 1650.0, "wheelbase_m": 2.72, "cog_to_front_axle_m": 1.3, "rolling_radius_m": 0.318,
     "brake_gain_front_nm_pa": 2.9e-4, "brake_gain_rear_nm_pa": 1.7e-4,
 }  # fmt: skip
+WHEELS = ("fl", "fr", "rl", "rr")
+TOLD = (("wheel_speed", "rad_s"), ("pressure", "pa"))
 STEPS = np.linspace(-1.0, 1.0, 25)  # of how far each may be off
 
 
@@ -22,7 +28,7 @@ def test_every_number_of_the_vehicle_moves_without_a_corner(vehicle):
     for nuisance in vehicle.nuisances:
         for at, step in zip(nuisance.at, nuisance.step, strict=True):
             worlds = [base.shifted([nuisance], np.array([z])) for z in nuisance.farthest * STEPS]
-            told = nuisance.kind in ("sensor", "scatter")
+            told = nuisance.kind in ("sensor", "scatter", "line")
             values = np.array([(world.theta if told else world.p)[at] for world in worlds])
             moved = np.diff(values) * np.sign(step)
             assert (moved > 0.0).all(), nuisance.name
@@ -37,6 +43,26 @@ def test_one_standard_deviation_is_what_the_set_says():
     mass = next(nuisance for nuisance in vehicle.nuisances if nuisance.name == "vehicle_mass_kg")
     base = nominal(vehicle)
     assert base.shifted([mass], np.array([1.0])).p[mass.at[0]] == pytest.approx(base.p[mass.at[0]] + mass.step[0])
+
+
+def test_what_single_wheels_are_off_was_there_before_a_cause_of_the_same_kind():
+    """Pads of one wheel that lose a tenth from the second log on took with them, before, what all four are off."""
+    base = nominal(load_vehicle(SIX))
+    pads = THETA.slice("pad_mu_gain", "gain")
+    off = replace(base, theta=base.theta.copy())
+    off.theta[pads] = (0.01, -0.02, 0.0, 0.01)
+    weak = replace(off, theta=off.theta.copy())
+    weak.theta[pads.start] -= 0.1
+    begun = weak.begun("pad_mu_gain", 1, 2.0, before=off)
+    t = np.arange(3000) * 0.01
+    logs = [
+        make_log(name, t, {f"{what}_{w}_{unit}": 20.0 + 0.0 * t for w in WHEELS for what, unit in TOLD})
+        for name in "abc"
+    ]
+    first, second, third = prepare(logs, 0.318).drives
+    assert begun.theta_in(first)[pads].tolist() == off.theta[pads].tolist()
+    assert begun.theta_in(second)[THETA.slice("pad_mu_gain", "onset_s")] == 2.0
+    assert begun.theta_in(third)[pads].tolist() == weak.theta[pads].tolist()
 
 
 def test_an_inertial_unit_has_zeros_across():
