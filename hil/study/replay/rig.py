@@ -1,6 +1,7 @@
 """Free replays of cars over all drives of a case, many at once."""
 
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -84,6 +85,16 @@ def _between(drive: Drive, segment: Segment, group: str) -> Floats | None:
     """Measured channels of a segment."""
     values = drive.measured.get(group)
     return None if values is None else values[segment.first // drive.stride : segment.last // drive.stride]
+
+
+def _with_theta(parts: Iterable[slice], thetas: Sequence[tuple[int, Floats]]) -> Iterator[tuple[slice, Floats]]:
+    """Parts of a drive's rows, cut where another theta begins, and theta in each."""
+    ends = [row for row, _ in thetas[1:]] + [sys.maxsize]
+    for part in parts:
+        for (begin, theta), end in zip(thetas, ends, strict=True):
+            first, last = max(part.start, begin), min(part.stop, end)
+            if first < last:
+                yield slice(first, last), theta
 
 
 class Rig:
@@ -297,7 +308,7 @@ class Rig:
         Segments that do not differ are taken from ``kept``; what moves slowly goes on from where it was. Inputs are
         those of ``kept`` where sensors and frames are ``alike``.
         """
-        theta = world.theta_in(drive)
+        thetas = world.thetas_in(drive)
         inputs = kept.inputs if kept is not None and alike else self._driving(drive, world)
         x = start(self.vehicle, drive, world, inputs)
         table = np.empty((len(inputs), len(columns)))
@@ -314,7 +325,7 @@ class Rig:
                 continue
             if number:
                 restart(x, start_speed(drive, segment, world))
-            for part in [rows] if turned is None else parts(rows):
+            for part, theta in _with_theta([rows] if turned is None else parts(rows), thetas):
                 if turned is not None:
                     x[_ANGLES] = turned[part.start]
                 given = inputs[part.start : min(part.stop + 1, rows.stop)]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hil.study.logs.case import Drive
+from hil.study.logs.case import ROW_S, Drive
 from hil.study.logs.table import Floats
 from hil.study.replay import acting
 from hil.study.replay.acting import Acting
@@ -33,8 +33,7 @@ DISC_TOLD_K, DISC_GUESSED_K = 5.0, 15.0
 class Begun:
     """An effect that begins in the middle: ``number`` of the drive, and s in it.
 
-    ``before`` are its strengths until then: what single wheels are off was there before a cause of the same kind. Of
-    the drive in which it begins they are not known to the plant, and are left out.
+    ``before`` are its strengths until then: what single wheels are off was there before a cause of the same kind.
     """
 
     effect: str
@@ -63,13 +62,23 @@ class World:
 
     def theta_in(self, drive: Drive) -> Floats:
         """Theta of one drive: direction along the road, and what begins later or within it."""
+        return self.thetas_in(drive)[-1][1]
+
+    def thetas_in(self, drive: Drive) -> list[tuple[int, Floats]]:
+        """Theta of one drive from a row on, the first from 0: until an effect begins within it, it is as it was."""
         theta = self.theta.copy() if self.onsets else self.theta
+        within = sorted((one for one in self.onsets if one.number == drive.number), key=lambda one: one.since_s)
         for begun in self.onsets:
             if drive.number < begun.number:
                 theta[_strengths(begun.effect)] = begun.before
-            elif drive.number == begun.number:
-                theta[THETA.slice(begun.effect, "onset_s")] = begun.since_s
-        return _along(theta, drive.log.direction)
+        for begun in within:
+            theta[THETA.slice(begun.effect, "onset_s")] = begun.since_s
+        found = [(0, theta)]
+        for begun in reversed(within):
+            earlier, own = found[0][1].copy(), THETA.slice(begun.effect, "onset_s")
+            earlier[_strengths(begun.effect)], earlier[own] = begun.before, THETA.neutral()[own]
+            found = [(0, earlier), (int(begun.since_s / ROW_S), found[0][1]), *found[1:]]
+        return [(row, _along(one, drive.log.direction)) for row, one in found]
 
     def begun(self, effect: str, number: int, since_s: float, before: "World") -> "World":
         """With an effect that begins in the middle, and was as in a world ``before``."""

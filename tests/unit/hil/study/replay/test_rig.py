@@ -123,6 +123,18 @@ def test_what_a_kept_world_was_told_is_not_told_of_other_frames_or_teeth(rig, ch
         assert np.array_equal(kept[group], values), group
 
 
+def test_until_a_cause_begins_what_single_wheels_are_off_is_there(rig):
+    """Pads of one wheel grow weak in the middle of a stop: until then the four were as unlike as they were."""
+    level = nominal(rig.vehicle)
+    unlike = _with(level, "pad_mu_gain", "gain", np.array([0.01, -0.03, 0.02, 0.0]))
+    weak = _with(unlike, "pad_mu_gain", "gain", np.array([-0.3, -0.03, 0.02, 0.0]))
+    begun = weak.begun("pad_mu_gain", 0, 21.0, before=unlike)
+    alone, always, within = (rig.run(world)["wheel"] for world in (unlike, weak, begun))
+    assert np.abs(within - alone)[:1049].max() == 0.0
+    assert np.abs(within - alone)[1075:1140].max() > 0.5
+    assert np.abs(alone - always)[:1049].max() > 0.5
+
+
 def test_a_sensor_that_tells_too_much_does_not_press_the_pads_at_the_start():
     """The offset is in the first sample as in all others: no pressure that was never there has to be let off."""
     log, offset = _log(), 1e5
