@@ -80,10 +80,9 @@ def check(
         written = str(Path(out) / "extension.toml")
         write_numbers(Path(written), models, causes)
     listed = [c.as_json() for c in causes]
-    rivals = [c.as_json(k) for c in causes for k in range(1, len(c.names)) if c.odds[k] > 0.01 * c.odds[0]]
-    rivals = [r for r in rivals if r["effect"] not in {c["effect"] for c in listed}]
+    rivals = [r for c in causes for r in c.rivals() if r["effect"] not in {c["effect"] for c in listed}]
     tied = any(c.tied for c in causes)
-    told = needs(motion, {c.names[k].effect for c in causes for k in range(len(c.names))})
+    told = needs(motion, {name for c in causes for name in c.alternatives})
     content = {
         "verdict": "cannot_tell_apart" if tied else "named" if causes else "none",
         "causes": listed,
@@ -185,7 +184,7 @@ def _remarks(models: Mapping[str, Found], causes: Sequence[Cause]) -> list[str]:
 def _decide_with(causes: Sequence[Cause]) -> list[dict[str, Any]]:
     """Standard manoeuvres that show the tied effects; no scenario drives a car whose forces nobody measures."""
     shown: dict[str, list[str]] = {}
-    for name in (n.effect for c in causes if c.tied for n in c.names):
+    for name in (name for c in causes if c.tied for name in c.alternatives):
         shown.setdefault(THETA.effect(name).manoeuvre, []).append(name)
     return [
         {"scenario": manoeuvre, "why": f"shows {', '.join(dict.fromkeys(names))}", "separation": None}

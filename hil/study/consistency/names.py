@@ -1,11 +1,10 @@
 """What the numbers of the models are called in the list of effects, and which other effects would look the same."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hil.study.consistency.search import Found
+from hil.study.consistency.search import RARE, Found
 from plant.effects.theta import THETA
 
 GRAVITY_MPS2 = 9.80665
@@ -32,7 +31,8 @@ class Cause:
     """A number with its names, most likely first; ``value``, ``low`` and ``high`` are what it has
     changed by since it was handed in.
 
-    ``number`` is of ``model``; ``channels`` say where it shows; ``exact`` is the mistake that it equals.
+    ``number`` is of ``model``; ``channels`` say where it shows; ``exact`` is the mistake that it equals. ``instead``
+    are other numbers that fit nearly as well in its place, each ``behind`` by what it has more of -2 log L.
     """
 
     model: str
@@ -45,46 +45,75 @@ class Cause:
     gain: float
     channels: tuple[str, ...]
     exact: float | None = None
-    contenders: Mapping[str, float] = field(default_factory=dict)
+    instead: tuple["Cause", ...] = ()
+    behind: float = 0.0
 
     @property
     def tied(self) -> bool:
         """Whether another effect does as well."""
-        return len(self.odds) > 1 and self.odds[1] > self.odds[0] * np.exp(-0.5 * TIED)
+        by_size = len(self.odds) > 1 and self.odds[1] > self.odds[0] * np.exp(-0.5 * TIED)
+        return by_size or any(other.behind < TIED for other in self.instead)
 
-    def as_json(self, at: int = 0) -> dict[str, object]:
-        """As a cause (its first name), or a rival."""
+    @property
+    def alternatives(self) -> tuple[str, ...]:
+        """Every effect it may be."""
+        return tuple(dict.fromkeys(n.effect for cause in (self, *self.instead) for n in cause.names))
+
+    def rivals(self) -> list[dict[str, object]]:
+        """All that it may be besides, but for what is a hundred times less likely."""
+        own = [self.as_json(k) for k in range(1, len(self.names)) if self.odds[k] > RARE * self.odds[0]]
+        share = self._share
+        return own + [
+            other.as_json(k, share * float(np.exp(-0.5 * other.behind)))
+            for other in self.instead
+            for k in range(len(other.names))
+            if other.odds[k] > RARE * other.odds[0]
+        ]
+
+    @property
+    def _share(self) -> float:
+        """How likely it is this number and none of those that fit in its place."""
+        return 1.0 / (1.0 + float(sum(np.exp(-0.5 * other.behind) for other in self.instead)))
+
+    def as_json(self, at: int = 0, share: float | None = None) -> dict[str, object]:
+        """As a cause (its first name), or a rival; ``share`` as `_share` if None."""
         name = self.names[at]
         effect = THETA.effect(name.effect)
         joint = next((j for j in effect.joints if j == f"sensor.{name.wheel}"), effect.joints[0])
         low, high = sorted((name.factor * self.low, name.factor * self.high))
         parameter = {"value": name.factor * self.value, "unit": effect.parameter(name.parameter).unit}
+        probability = (self._share if share is None else share) * self.odds[at] / sum(self.odds)
         return {
             "effect": name.effect, "title": effect.title, "joint": joint, "wheel": name.wheel,
             "parameters": {name.parameter: parameter | {"ci95": [low, high]}},
-            "probability": self.odds[at] / sum(self.odds), "onset": None, "onset_s": None, "variables": [], "curve": [],
+            "probability": probability, "onset": None, "onset_s": None, "variables": [], "curve": [],
             "channels": list(self.channels),
         }  # fmt: skip
 
 
 def causes_of(model: str, found: Found, to_ground: bool) -> list[Cause]:
     """Every number that was taken up, by name."""
+    taken = {step.number for step in found.steps}
     listed = []
     for step in found.steps:
-        number, handed = step.number, found.handed.get(step.number, 0.0)
-        value, low, high = (_change(number, v, handed) for v in (found.final.sensor[number], *found.interval(number)))
-        low, high = sorted((low, high))
-        names, channels, exact = _names(model, number, value, (low, high), to_ground)
-        rivals = {n: f.cost for n, f in step.others.items()}
-        odds = _odds(names, value)
-        order = sorted(range(len(names)), key=lambda k: -odds[k])
-        listed.append(
-            Cause(
-                model, number, tuple(names[k] for k in order), tuple(odds[k] for k in order), value, low, high,
-                step.gain, channels, exact, rivals,
-            )
-        )  # fmt: skip
+        instead = tuple(
+            replace(_cause(model, other, number, to_ground), behind=behind)
+            for number, (other, behind) in step.instead.items()
+            if number not in taken
+        )
+        listed.append(replace(_cause(model, found, step.number, to_ground), gain=step.gain, instead=instead))
     return listed
+
+
+def _cause(model: str, found: Found, number: str, to_ground: bool) -> Cause:
+    handed = found.handed.get(number, 0.0)
+    value, low, high = (_change(number, v, handed) for v in (found.final.sensor[number], *found.interval(number)))
+    low, high = sorted((low, high))
+    names, channels, exact = _names(model, number, value, (low, high), to_ground)
+    odds = _odds(names, value)
+    order = sorted(range(len(names)), key=lambda k: -odds[k])
+    by_odds = tuple(names[k] for k in order), tuple(odds[k] for k in order)
+    return Cause(model, number, *by_odds, value, low, high, 0.0, channels, exact)
 
 
 def _change(number: str, value: float, handed: float) -> float:

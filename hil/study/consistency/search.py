@@ -17,6 +17,8 @@ ASKED = 20.0
 _WORTH_A_FIT = 0.5
 """Share of that from which a number that was tried for a few rounds is fitted to the end: it may gain more then."""
 ALPHA = 0.003
+RARE = 0.01
+"""How much less likely than another name, or number, one is that is not told beside it."""
 _STARTS: Mapping[str, Sequence[float]] = {
     "gain": (0.0, -0.5, 0.5, -2.0), "filter_s": (0.02, 0.1, 0.5, 2.0),
     "yaw_gain": (0.0, -2.0), "ay_gain": (0.0, -2.0),
@@ -26,11 +28,15 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Step:
-    """A number that was taken up, its gain, and what the others would have gained in its place (one fit each)."""
+    """A number that was taken up, its gain, and what the others would have gained in its place (one fit each).
+
+    ``instead`` are those that fit nearly as well: what was found with each, and how far behind in -2 log likelihood.
+    """
 
     number: str
     gain: float
     others: Mapping[str, Fit]
+    instead: Mapping[str, tuple["Found", float]] = field(default_factory=dict)
 
 
 @dataclass(eq=False)
@@ -127,22 +133,47 @@ def _some_rounds(found: Found, number: str, sensor: Values, noise: Values, round
     return replace(held, sensor=held.sensor | {number: sensor[number]})
 
 
+def _ended(found: Found, number: str, begun: Fit) -> Fit:
+    """A fit to its end. What cells resolve is fitted from the next cells as well, and on while that is better."""
+    best = fit(found.model, begun.sensor, begun.noise, fixed=found.handed)
+    of, cell = found.model.numbers[number], 2.0 * found.model.resolution.get(number, 0.0)
+    for beside in (-cell, cell) if cell else ():
+        at = cell * (math.floor(best.sensor[number] / cell) + 0.5) + beside
+        while of.low < at < of.high:
+            middle = _some_rounds(found, number, {**best.sensor, number: at}, best.noise, 12)
+            there = fit(found.model, middle.sensor, middle.noise, fixed=found.handed)
+            if there.cost >= best.cost:
+                break
+            best, at = there, at + beside
+    return best
+
+
 def _take(found: Found, tried: Mapping[str, Fit]) -> tuple[Step, Fit, Values] | None:
     worth = [n for n in tried if found.final.cost - tried[n].cost >= _WORTH_A_FIT * ASKED]
     most = min((tried[n].cost for n in worth), default=0.0)
     near = [n for n in worth if tried[n].cost < most + ASKED]  # a few rounds more may change which is first
     with ThreadPoolExecutor(WORKERS) as pool:
-        ended = pool.map(lambda n: fit(found.model, tried[n].sensor, tried[n].noise, fixed=found.handed), near)
-    fitted = dict(zip(near, ended, strict=True))
+        fitted = dict(zip(near, pool.map(lambda n: _ended(found, n, tried[n]), near), strict=True))
     for number in sorted(worth, key=lambda n: fitted[n].cost if n in fitted else tried[n].cost):
-        better = fitted.get(number) or fit(found.model, tried[number].sensor, tried[number].noise, fixed=found.handed)
+        better = fitted.get(number) or _ended(found, number, tried[number])
         if found.final.cost - better.cost < ASKED:
             continue
         deviation = deviations(found.model, better, found.block, found.handed)
         if _beyond(found, better, deviation, number):
-            others = {n: f for n, f in tried.items() if n != number}
-            return Step(number, found.final.cost - better.cost, others), better, deviation
+            others = {n: f for n, f in {**tried, **fitted}.items() if n != number}
+            instead = _instead(found, others, better.cost)
+            return Step(number, found.final.cost - better.cost, others, instead), better, deviation
     return None
+
+
+def _instead(found: Found, others: Mapping[str, Fit], cost: float) -> dict[str, tuple[Found, float]]:
+    near = {}
+    for number, fitted in others.items():
+        if fitted.cost < min(cost - 2.0 * math.log(RARE), found.final.cost - ASKED):
+            deviation = deviations(found.model, fitted, found.block, found.handed)
+            if _beyond(found, fitted, deviation, number):
+                near[number] = replace(found, final=fitted, deviation=deviation), fitted.cost - cost
+    return near
 
 
 def _beyond(found: Found, fitted: Fit, deviation: Mapping[str, float], number: str) -> bool:
