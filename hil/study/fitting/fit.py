@@ -163,6 +163,23 @@ class Fitter:
         worlds = [term.candidate.applied(world, step) for term, step in zip(model.terms, steps, strict=True)]
         return track_columns(self.rig, self.frame, model.stack or self.rig.run(world), worlds, steps)
 
+    def columns_at(self, model: Model) -> Tracks:
+        """Sensitivities to the nuisances, anew for those on which nothing depended before there was a cause.
+
+        A fade by temperature makes the discs' heat matter, of which constant friction says nothing.
+        """
+        loud = [np.abs(values).max(axis=0) > 0.0 for values in self.nuisance_columns.values()]
+        silent = np.flatnonzero(~np.any(loud, axis=0))
+        if not len(silent) or not model.terms:
+            return self.nuisance_columns
+        worlds = [self.world(model.z + one, model.terms) for one in np.eye(len(model.z))[silent]]
+        base = model.stack or self.rig.run(self.world(model.z, model.terms))
+        anew = track_columns(self.rig, self.frame, base, worlds, [1.0] * len(silent))
+        columns = {name: values.copy() for name, values in self.nuisance_columns.items()}
+        for name, values in columns.items():
+            values[:, silent] = anew[name]
+        return columns
+
     def fit(
         self, model: Model, noise: Noise, steps: int = 2, relinearise: bool = True, own: Tracks | None = None,
         follow: bool = False,

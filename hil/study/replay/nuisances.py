@@ -33,8 +33,7 @@ _LIFT = 0.1
 _SIDE = 0.5
 """Share that the load may be off at which a tyre's cornering stiffness is largest: whether it grows with the load."""
 _THERMAL = {"friction_brake_heat_capacity_j_k": 0.2, "friction_brake_cooling_w_k": 0.3}
-"""Heat store of the discs, if a set does not state it; where the friction does not depend on temperature it does not
-matter."""
+"""Heat store of the discs, if a set does not state it."""
 _SIGNED = (
     "suspension_progression_n_m3", "suspension_brake_support_tangent", "suspension_drive_support_tangent",
     "suspension_roll_centre_height_m",
@@ -88,15 +87,12 @@ def _amount(now: float, step: float, then: float) -> float:
     return float(np.log(then / now) / np.log(factor)) if factor > 1.0 else (then - now) / step
 
 
-def listed(
-    p: Floats, tolerance: Mapping[str, float], thermal: bool, layout: Layout, stated: Collection[str]
-) -> list[Nuisance]:
+def listed(p: Floats, tolerance: Mapping[str, float], layout: Layout, stated: Collection[str]) -> list[Nuisance]:
     """One a parameter; what acts alike is one (radius and area, pad numbers), axles are moved together or apart.
 
     Parameters
     ----------
-    tolerance : half-widths of numbers of the flat vehicle ``p``.  thermal : whether the discs' heat matters.
-    stated : numbers that the set gives.
+    tolerance : half-widths of numbers of the flat vehicle ``p``.  stated : numbers that the set gives.
     """
     found: list[Nuisance] = []
 
@@ -167,8 +163,7 @@ def listed(
         found[-1] = replace(found[-1], kind="signed")
     # the same for suspension and discs, where a set does not state them
     shares = {name: _SPRINGS if name in stated else share for name, share in _SUSPENSION.items()}
-    if thermal:
-        shares |= {name: 0.0 if name in stated else share for name, share in _THERMAL.items()}
+    shares |= {name: 0.0 if name in stated else share for name, share in _THERMAL.items()}
     for name, share in shares.items():
         at, size = layout.slice(name).start, layout.sizes[name]
         for k in range(size):

@@ -306,4 +306,4 @@ def _vehicle(
     stated: Collection[str],
 ) -> Vehicle:  # fmt: skip
     p = pack(parameters)
-    return Vehicle(parameters, p, tuple(listed(p, tolerance, thermal, PARAMETER, stated)), thermal, remarks)
+    return Vehicle(parameters, p, tuple(listed(p, tolerance, PARAMETER, stated)), thermal, remarks)

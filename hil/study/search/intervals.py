@@ -47,7 +47,7 @@ def deviations(found: Diagnosis) -> Floats:
     """Standard deviation of each value by noise: curvature of the likelihood, more where manoeuvres disagree."""
     model, fitter = found.final, found.fitter
     own, count = fitter.term_columns(model), len(fitter.nuisances)
-    columns = {name: np.hstack([values, own[name]]) for name, values in fitter.nuisance_columns.items()}
+    columns = {name: np.hstack([values, own[name]]) for name, values in fitter.columns_at(model).items()}
     of = sums(model.residual, columns, fitter.frame, found.noise, count)
     _, covariance = solve(of.total(), count, range(len(model.terms)), model.z)
     curvature = np.sqrt(np.maximum(np.diag(covariance), 0.0))

@@ -13,8 +13,9 @@ from scipy.optimize import minimize_scalar
 
 from hil.study.fitting.candidates import Candidate
 from hil.study.fitting.fit import Fitter, Model, Term
-from hil.study.fitting.linear import track_columns
+from hil.study.fitting.linear import solve, sums, track_columns
 from hil.study.fitting.own_error import variance_of
+from hil.study.likelihood.noise import Noise
 from hil.study.logs.table import Floats
 from hil.study.replay.world import World
 from hil.study.search.basis import Piece
@@ -134,7 +135,8 @@ def _fitted(fitter: Fitter, bare: Model, begun: Shaped, law: Contender) -> Conte
     minimize_scalar(cost, bounds=beyond, method="bounded", options={"maxiter": _ROUNDS})
     at, model = min(seen, key=lambda one: one[1].cost)
     by_noise = _deviation(at, model.cost, [(other, of.cost) for other, of in seen], begun.shape)
-    deviation = hypot(by_noise * sqrt(variance_of(begun)), DEVIATION_BY_FORM * (beyond[1] - beyond[0]))
+    by_form = DEVIATION_BY_FORM * (beyond[1] - beyond[0])
+    deviation = hypot(by_noise * sqrt(variance_of(begun)), by_form, _by_numbers(fitter, model, law.noise, by_noise))
     term = replace(model.terms[-1], candidate=replace(begun, at=at, deviation=deviation))
     model = replace(model, terms=(*model.terms[:-1], term))
     found = refitted(replace(law, gained=0.0), model, law.noise)
@@ -148,3 +150,23 @@ def _deviation(at: float, least: float, seen: Sequence[tuple[float, float]], sha
     sides = [[one for one in rises if one[0] < 0.0], [one for one in rises if one[0] > 0.0]]
     nearest = [min(side, key=lambda one: abs(one[0]))[1] for side in sides if side]
     return min(max(nearest, default=shape.high - shape.low), shape.high - shape.low)
+
+
+def _by_numbers(fitter: Fitter, model: Model, noise: Noise, step: float) -> float:
+    """Standard deviation of a shape by numbers that mattered to nothing before it (`Fitter.columns_at`)."""
+    *others, term = model.terms
+    shape = term.candidate
+    assert isinstance(shape, Shaped)
+    step = step if shape.at + step <= shape.shape.high else -step
+    moved = fitter.at(model.z, (*others, replace(term, candidate=replace(shape, at=shape.at + step))), noise)
+    own = {
+        name: np.hstack([values, (model.residual[name] - moved.residual[name]) / step])
+        for name, values in fitter.term_columns(model).items()
+    }
+    count, free = len(model.z), range(len(model.terms) + 1)
+    variances = []
+    for numbers in (fitter.nuisance_columns, fitter.columns_at(model)):
+        columns = {name: np.hstack([values, own[name]]) for name, values in numbers.items()}
+        total = sums(model.residual, columns, fitter.frame, noise, count).total()
+        variances.append(float(solve(total, count, free, model.z)[1][-1, -1]))
+    return sqrt(max(variances[1] - variances[0], 0.0))
