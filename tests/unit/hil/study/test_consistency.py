@@ -123,6 +123,25 @@ def test_a_car_that_stands_is_unusable():
 
 
 @pytest.mark.slow
+def test_a_delay_is_tied_with_a_filter_in_slow_manoeuvres():
+    """A sine that takes 10 s is as late behind a low-pass. It was told as a filter for certain."""
+    rng, n = np.random.default_rng(9), 12000
+    t = np.arange(n) * STEP_S
+    accel = 2.0 * np.sin(2.0 * np.pi * t / 10.0) + np.sin(2.0 * np.pi * t / 17.0 + 1.0)
+    felt = accel + _coloured(rng, n, 0.1, 8.0) + _coloured(rng, n, 0.05, 0.15)
+    speed = 25.0 + np.cumsum(accel) * STEP_S
+    wheels = {name: (speed + 0.01 * rng.standard_normal(n)) / RADIUS_M for name in WHEEL_SPEED}
+    late = np.concatenate((felt[:1].repeat(10), felt[:-10])) + 0.05 * rng.standard_normal(n)
+    found = explain({"t_s": t, **wheels, "ax_mps2": late}).json
+    assert found["verdict"] == "cannot_tell_apart"
+    told = {c["effect"]: c for c in found["causes"] + found["rivals"]}
+    assert set(told) == {"timestamp_offset", "imu_filter"}
+    assert sum(c["probability"] for c in told.values()) == pytest.approx(1.0)
+    low, high = told["timestamp_offset"]["parameters"]["delay_s"]["ci95"]
+    assert low < 0.1 < high
+
+
+@pytest.mark.slow
 def test_slip_of_the_tyres_is_no_filter_of_the_accelerometer():
     """Wheels slip in proportion to the force: those of soft tyres lead the car by 0.2 s at 20 m/s."""
     made = _log(5)

@@ -16,6 +16,7 @@ from hil.study.replay.vehicle_set import load_vehicle, paper_car
 from hil.study.replay.world import DISC_GUESSED_K, DISC_TOLD_K, nominal
 
 NOISE_PA = 2e3
+GAINS = {"brake_gain_front_nm_pa": 2e-4, "brake_gain_rear_nm_pa": 1e-4}
 (_MASS,) = (one for one in candidates(columns()) if one.name == "mass_offset@car")
 
 
@@ -74,6 +75,24 @@ def test_what_single_wheels_are_off_makes_light_of_no_strain():
     assert of_wheels.sum() >= 16
     assert fitter.strain(np.where(of_wheels, 0.0, 2.0)) == pytest.approx(4.0)
     assert fitter.strain(np.where(of_wheels, 3.0, 0.0)) == 1.0
+
+
+def test_the_discs_heat_matters_once_a_cause_reads_their_temperature():
+    """Temperatures were as sure as if every car had the discs of the shipped one, and where a fade begins with them."""
+    vehicle = load_vehicle({"mass_kg": 1500.0, "wheelbase_m": 2.5, "rolling_radius_m": 0.3} | GAINS)
+    case = prepare([replace(log_of_pulses(), disc_temperature_k=650.0)], 0.3)
+    numbers = Numbers(Rig(case, vehicle), Frame.of(case), vehicle, nominal(vehicle), False)
+    numbers.anew(np.zeros(len(numbers.nuisances)))
+    bare, noise = numbers.fitter.start()
+    (fade,) = (one for one in candidates(columns()) if one.name == "pad_temp_fade@front")
+    fades = numbers.fitter.at(bare.z, (Term(fade, 2e-3),), noise)
+    heat = [one.name for one in numbers.nuisances].index("friction_brake_heat_capacity_j_k_front")
+
+    def acts(model):
+        return max(np.abs(values[:, heat]).max() for values in numbers.fitter.columns_at(model).values()) > 0.0
+
+    assert not acts(bare)
+    assert acts(fades)
 
 
 def test_sensitivities_taken_lately_serve_again_where_cars_are_alike():
