@@ -80,7 +80,7 @@ def check(
         written = str(Path(out) / "extension.toml")
         write_numbers(Path(written), models, causes)
     listed = [c.as_json() for c in causes]
-    rivals = [r for c in causes for r in c.rivals() if r["effect"] not in {c["effect"] for c in listed}]
+    rivals = _rivals(causes, listed)
     tied = any(c.tied for c in causes)
     told = needs(motion, {name for c in causes for name in c.alternatives})
     content = {
@@ -156,6 +156,12 @@ def _wheel_scales(
     return search(model, motion.block, handed, dict.fromkeys(WHEELS, SPREAD), say, WHEELS, model.unknown)
 
 
+def _rivals(causes: Sequence[Cause], listed: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """All that the causes may be besides, but for what is ``listed`` of the same channels already."""
+    told = [(one["effect"], one["channels"]) for one in listed]
+    return [rival for cause in causes for rival in cause.rivals() if (rival["effect"], rival["channels"]) not in told]
+
+
 def _remarks(models: Mapping[str, Found], causes: Sequence[Cause]) -> list[str]:
     said = []
     for c in causes:
@@ -184,7 +190,7 @@ def _remarks(models: Mapping[str, Found], causes: Sequence[Cause]) -> list[str]:
 def _decide_with(causes: Sequence[Cause]) -> list[dict[str, Any]]:
     """Standard manoeuvres that show the tied effects; no scenario drives a car whose forces nobody measures."""
     shown: dict[str, list[str]] = {}
-    for name in (name for c in causes if c.tied for name in c.alternatives):
+    for name in (name for c in causes if c.tied for name in c.as_likely):
         shown.setdefault(THETA.effect(name).manoeuvre, []).append(name)
     return [
         {"scenario": manoeuvre, "why": f"shows {', '.join(dict.fromkeys(names))}", "separation": None}

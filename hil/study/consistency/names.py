@@ -51,8 +51,19 @@ class Cause:
     @property
     def tied(self) -> bool:
         """Whether another effect does as well."""
-        by_size = len(self.odds) > 1 and self.odds[1] > self.odds[0] * np.exp(-0.5 * TIED)
-        return by_size or any(other.behind < TIED for other in self.instead)
+        return len(self._near) > 1 or any(other.behind < TIED for other in self.instead)
+
+    @property
+    def as_likely(self) -> tuple[str, ...]:
+        """The effects that are not told apart, its first name first."""
+        near = [name for cause in (self, *self.instead) if cause.behind < TIED for name in cause._near]
+        return tuple(dict.fromkeys(name.effect for name in near))
+
+    @property
+    def _near(self) -> tuple[Name, ...]:
+        """Names of the number itself that its size does not tell from the first."""
+        least = self.odds[0] * np.exp(-0.5 * TIED)
+        return tuple(name for k, name in enumerate(self.names) if k == 0 or self.odds[k] > least)
 
     @property
     def alternatives(self) -> tuple[str, ...]:

@@ -71,7 +71,7 @@ def _headline(answer: Consistency) -> str:
     """The channels and what is wrong with them; the numbers follow as cards."""
     by_channel: dict[str, list[str]] = {}
     for cause in answer.causes:
-        words = cause.names[0].effect.replace("_", " ")
+        words = " or ".join(effect.replace("_", " ") for effect in cause.as_likely)
         if cause.names[0].effect == "wrong_scale":
             words = "wrong sign" if cause.exact == -1.0 else "wrong scale or sign"
         by_channel.setdefault(", ".join(cause.channels), []).append(words)

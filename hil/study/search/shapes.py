@@ -157,7 +157,7 @@ def _by_numbers(fitter: Fitter, model: Model, noise: Noise, step: float) -> floa
     *others, term = model.terms
     shape = term.candidate
     assert isinstance(shape, Shaped)
-    step = step if shape.at + step <= shape.shape.high else -step
+    step = _within(shape.at, step, shape.shape)
     moved = fitter.at(model.z, (*others, replace(term, candidate=replace(shape, at=shape.at + step))), noise)
     own = {
         name: np.hstack([values, (model.residual[name] - moved.residual[name]) / step])
@@ -170,3 +170,9 @@ def _by_numbers(fitter: Fitter, model: Model, noise: Noise, step: float) -> floa
         total = sums(model.residual, columns, fitter.frame, noise, count).total()
         variances.append(float(solve(total, count, free, model.z)[1][-1, -1]))
     return sqrt(max(variances[1] - variances[0], 0.0))
+
+
+def _within(at: float, step: float, shape: Parameter) -> float:
+    """A step of a shape, up where there is room for it, else as far as the further of its bounds."""
+    up, down = shape.high - at, at - shape.low
+    return min(step, up) if step <= up or up >= down else -min(step, down)

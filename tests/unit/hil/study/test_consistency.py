@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from hil.study.consistency.along import SLIP, Along, known_slip
-from hil.study.consistency.check import unforced
+from hil.study.consistency.check import Consistency, _rivals, unforced
 from hil.study.consistency.likelihood import fit
 from hil.study.consistency.model import Model, Number
 from hil.study.consistency.motion import motion_of
+from hil.study.consistency.names import Cause, Name
 from hil.study.consistency.search import search
+from hil.study.consistency.summary import _headline
 from hil.study.explain import explain
 from hil.study.logs.table import WHEEL_SPEED, Log, UnusableError, make_log
 
@@ -156,3 +158,30 @@ def test_slip_of_the_tyres_is_no_filter_of_the_accelerometer():
     found = search(model, motion.block, {}, {}, lambda _: None, always=[SLIP])
     assert found.steps == []
     assert found.numbers[SLIP] == pytest.approx(slip, rel=0.3)
+
+
+def _late_or_filtered() -> tuple[Cause, Cause]:
+    """An accelerometer that is filtered or, as likely, late; and pressures that are late."""
+
+    def cause(number, name, channel, instead=()):
+        return Cause("along", number, (name,), (1.0,), 0.1, 0.08, 0.12, 50.0, (channel,), instead=instead, behind=1.0)
+
+    late = cause("delay_s", Name("timestamp_offset", "delay_s", "imu", 1.0, 0.02), "ax_mps2")
+    filtered = cause("filter_s", Name("imu_filter", "time_s", "imu", 1.0, 0.02), "ax_mps2", (late,))
+    return filtered, cause("delay_s", Name("timestamp_offset", "delay_s", "pressure", -1.0, 0.02), "pressure")
+
+
+def test_a_rival_stays_where_its_effect_is_told_of_another_channel():
+    """It was dropped, though the verdict counted the two as tied."""
+    causes = _late_or_filtered()
+    assert causes[0].tied
+    assert not causes[1].tied
+    rivals = _rivals(causes, [cause.as_json() for cause in causes])
+    assert [(one["effect"], one["channels"]) for one in rivals] == [("timestamp_offset", ["ax_mps2"])]
+    assert _rivals(causes[:1], [*(c.as_json() for c in causes), causes[0].instead[0].as_json()]) == []
+
+
+def test_the_headline_names_all_that_are_tied():
+    """It named the first alone."""
+    told = _headline(Consistency({}, None, {}, _late_or_filtered(), ()))
+    assert told == "ax_mps2: imu filter or timestamp offset; pressure: timestamp offset."
