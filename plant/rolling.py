@@ -22,8 +22,11 @@ Vector = NDArray[np.float64]
 ROLLING_MPS = 3.0
 """Below, wheels on their brakes and tyres swing in threes."""
 CREEPING_S = 5e-3
-"""Longest step of a car that does not roll on: a light wheel on its tyre swings too fast for more, and is hardly damped
-where it is slow."""
+"""Longest step of a car that neither rolls on nor stands: a light wheel on its tyre swings too fast for more, and is
+hardly damped where it is slow. Who asks for a longer one of a car that stands knows that it no longer swings."""
+_STANDS_MPS, _STANDS_RAD_S = 3e-3, 1e-2
+"""Speeds of the body (m/s or rad/s) and of the wheels below which a car stands: it may creep on its tyres, but what
+swings in threes has died away."""
 _SLIDES = 0.08  # slip, either way, beyond which a tyre may be past its peak
 _HUB_TRAVEL, _HUB_RATE = (X.hub_m, X.hub_rate_mps) if EFFECTS else (0, 0)
 _WHEEL, _PRESSURE, _HUB = 0, 24, 48  # where a pair's numbers lie: phi_2 and the matrix, six of each wheel
@@ -33,7 +36,7 @@ _WHEEL, _PRESSURE, _HUB = 0, 24, 48  # where a pair's numbers lie: phi_2 and the
 def rolls_on(x: Vector, u: Vector, p: Vector, step_s: float) -> bool:
     """Whether `rolling_step` is good for this step: `plant.integrate.exponential_step` is where a car creeps, a
     wheel may lock, or a pressure comes to its limits."""
-    free = abs(x[X.speed_mps]) > ROLLING_MPS
+    free = (abs(x[X.speed_mps]) > ROLLING_MPS) | ((step_s > CREEPING_S) & _stands(x))
     build, release = p[P.ehb_build_rate_pa_s], p[P.ehb_release_rate_pa_s]
     for i in range(4):
         rate = x[X.pressure_rate_pa_s + i]
@@ -45,6 +48,19 @@ def rolls_on(x: Vector, u: Vector, p: Vector, step_s: float) -> bool:
         free &= max(abs(x[X.slip + i]), abs(x[X.side_slip + i])) < _SLIDES
         free &= (max(rate, ahead) < build) & (min(rate, ahead) > -release)
     return free
+
+
+@equation
+def _stands(x: Vector) -> bool:
+    """Whether body and wheels are at rest."""
+    body, wheels = 0.0, 0.0
+    for i in range(X.speed_mps, X.heave_m):
+        body = max(body, abs(x[i]))
+    for i in range(X.heave_rate_mps, X.wheel_speed_rad_s):
+        body = max(body, abs(x[i]))
+    for i in range(4):
+        wheels = max(wheels, abs(x[X.wheel_speed_rad_s + i]))
+    return (body < _STANDS_MPS) & (wheels < _STANDS_RAD_S)
 
 
 @section

@@ -27,10 +27,12 @@ class Acting(IntFlag):
     MOTORS = 2
     TURNING = 4
     DRIVING = 8
+    MOVING = 16
 
 
-_LEAST_PA, _LEAST_NM, _LEAST_MPS2 = 5e4, 8.0, 0.3
-"""Below in all of a segment, brakes and motors change nothing that noise would not hide, and the car runs straight."""
+_LEAST_PA, _LEAST_NM, _LEAST_MPS2, _LEAST_MPS = 5e4, 8.0, 0.3, 0.3
+"""Below in all of a segment, brakes and motors change nothing that noise would not hide, the car runs straight, or it
+stands: one that no motor pulls tells nothing of its tyres, wheels, springs and masses."""
 _SECTIONS = {
     "ehb_": Acting.BRAKES, "friction_brake_": Acting.BRAKES, "pad_": Acting.BRAKES, "motor_": Acting.MOTORS,
     "battery_": Acting.MOTORS,
@@ -42,7 +44,9 @@ _LATERAL = (
 _AT_JOINT = {
     "friction.mu": Acting.BRAKES, "brake.pressure": Acting.BRAKES, "brake.torque": Acting.BRAKES,
     "hydraulics.rate": Acting.BRAKES, "hydraulics.demand": Acting.BRAKES, "motor.demand": Acting.MOTORS,
-    "motor.available": Acting.MOTORS, "motor.torque": Acting.MOTORS,
+    "motor.available": Acting.MOTORS, "motor.torque": Acting.MOTORS, "tyre.stiffness": Acting.MOVING,
+    "road.friction": Acting.MOVING, "wheel.radius": Acting.MOVING, "wheel.rolling_torque": Acting.MOVING,
+    "contact.speed": Acting.MOVING, "steering.angle": Acting.MOVING,
 }  # fmt: skip
 _ALWAYS = ("residual_drag", "stuck_corner", "ehb_deadband", "cogging")
 """Effects that act while nothing is applied, or on demands too small to count."""
@@ -56,7 +60,7 @@ LATE = (Acting.NOTHING, Acting.BRAKES, Acting.MOTORS, Acting.BRAKES | Acting.MOT
 def _of_number(name: str) -> Acting:
     if name in _LATERAL:
         return Acting.TURNING
-    return next((acting for start, acting in _SECTIONS.items() if name.startswith(start)), Acting.DRIVING)
+    return next((acting for start, acting in _SECTIONS.items() if name.startswith(start)), Acting.MOVING)
 
 
 def _of_joint(joint: str) -> Acting:
@@ -115,7 +119,7 @@ def of_terms(one: Floats, other: Floats) -> Acting:
     return found
 
 
-def in_segment(inputs: Floats, ay_mps2: Floats | None) -> Acting:
+def in_segment(inputs: Floats, speed_mps: Floats, ay_mps2: Floats | None) -> Acting:
     """What is going on in a segment, (rows, INPUT.size) of inputs; ``ay_mps2`` where it is measured."""
 
     def most(*parts: str) -> float:
@@ -125,7 +129,9 @@ def in_segment(inputs: Floats, ay_mps2: Floats | None) -> Acting:
     if most("pressure_pa", "pressure_demand_pa") > _LEAST_PA:
         found |= Acting.BRAKES
     if most("motor_torque_nm", "motor_demand_nm") > _LEAST_NM:
-        found |= Acting.MOTORS
+        found |= Acting.MOTORS | Acting.MOVING
+    if float(np.abs(speed_mps).max(initial=0.0)) > _LEAST_MPS:
+        found |= Acting.MOVING
     turned = ay_mps2 is not None and float(np.nanquantile(np.abs(ay_mps2), 0.9)) > _LEAST_MPS2
     if turned or most("steering_wheel_rad") > STRAIGHT_RAD:
         found |= Acting.TURNING

@@ -81,10 +81,16 @@ def _taken_back(inputs: Floats, drive: Drive, world: World) -> Floats:
     return in_time(inverted(inputs, world.theta_in(drive), ROW_S), world.late_s)
 
 
-def _between(drive: Drive, segment: Segment, group: str) -> Floats | None:
-    """Measured channels of a segment."""
-    values = drive.measured.get(group)
-    return None if values is None else values[segment.first // drive.stride : segment.last // drive.stride]
+def _samples(drive: Drive, segment: Segment) -> slice:
+    """Samples of a segment."""
+    return slice(segment.first // drive.stride, segment.last // drive.stride)
+
+
+def _going_on(drive: Drive, segment: Segment) -> acting.Acting:
+    """What is going on in a segment."""
+    rows, samples = drive.inputs[segment.first : segment.last], _samples(drive, segment)
+    ay = drive.measured.get("ay")
+    return acting.in_segment(rows, drive.speed_mps[samples], None if ay is None else ay[samples])
 
 
 def _with_theta(parts: Iterable[slice], thetas: Sequence[tuple[int, Floats]]) -> Iterator[tuple[slice, Floats]]:
@@ -111,10 +117,7 @@ class Rig:
         names = [name for group in case.groups for name in SOURCE[group]]
         self._columns = column_indices(names)
         self._road = road_table(DRY)
-        self._going_on = [
-            [acting.in_segment(drive.inputs[s.first : s.last], _between(drive, s, "ay")) for s in drive.segments]
-            for drive in case.drives
-        ]
+        self._going_on = [[_going_on(drive, segment) for segment in drive.segments] for drive in case.drives]
         self._given = [drive.inputs for drive in case.drives]
         self._pace = [at_once(drive) for drive in case.drives]
         self._kept: _Kept | None = None

@@ -187,6 +187,28 @@ def test_a_light_wheel_does_not_go_wild_where_a_rolling_car_begins_to_creep(pape
     assert np.abs(driven(EXPONENTIAL, 1) - exact).max() < 0.05
 
 
+@pytest.mark.parametrize("inertia", [1.0, 0.2])
+@pytest.mark.parametrize(("slope", "speed_mps", "most"), [
+    (0.0, 0.0, (1e-4, 1e-3)), (1e-4, 0.0, (1e-3, 1e-2)), (0.0, 0.3, (3e-3, 3e-2)),
+])  # fmt: skip
+def test_long_steps_of_a_car_that_stands_rest(paper_car, inertia, slope, speed_mps, most):
+    """10 ms at once: pressures rise on a car that stands, creeps a little, or still rolls, after its wheels stood."""
+    light = replace(paper_car, wheel=replace(paper_car.wheel, inertia_kg_m2=(inertia, inertia)))
+    inputs = np.zeros((400, INPUT.size))
+    inputs[100:, INPUT.slice("pressure_demand_pa")] = 20e5
+    theta = NEUTRAL.copy()
+    theta[THETA.slice("road_grade", "grade")] = slope
+
+    def driven(method, steps):
+        start = initial_state(light, speed_mps, 350.0, 0.7)
+        columns = ["state.wheel_speed_rad_s_fl", "state.imu_longitudinal_mps2"]
+        how = {"steps": steps, "step_s": 0.01 / steps, "method": method, "theta": theta}
+        return replay(start, inputs, pack(light), columns, **how)[0]
+
+    error = np.abs(driven(EXPONENTIAL, 1) - driven(RUNGE_KUTTA_4, 20))[150:]
+    assert (error.max(axis=0) < most).all(), error.max(axis=0)
+
+
 def test_long_steps_keep_the_mark_of_a_soft_hub(stop):
     start, inputs, p = stop
     theta = NEUTRAL.copy()

@@ -108,6 +108,28 @@ def test_a_kept_world_changes_no_result(rig, effect, number, value):
         assert apart <= 2e-3 * max(np.abs(values - rig.run(level)[group]).max(), 1e-9), group
 
 
+@pytest.mark.parametrize(("effect", "number", "value", "acts"), [
+    ("mass_offset", "mass_kg", 100.0, False), ("slip_stiffness", "gain", 0.2, False),
+    ("headwind", "wind_mps", 4.0, True), ("rolling_resistance", "gain", 0.3, False),
+    ("tyre_radius", "gain", 0.01, False), ("road_grade", "grade", 0.01, True), ("ehb_dead_time", "time_s", 0.01, True),
+])  # fmt: skip
+def test_a_standing_car_is_replayed_for_what_acts_on_it(effect, number, value, acts):
+    """What needs a moving car leaves nothing behind that a sensor tells of one that stands on its brakes."""
+    t = np.arange(600) * 0.01
+    channels = {f"wheel_speed_{w}_rad_s": np.zeros(len(t)) for w in WHEELS} | {"ax_mps2": np.zeros(len(t))}
+    for name in ("pressure_{}_pa", "pressure_demand_{}_pa"):
+        channels |= {name.format(w): 15e5 * (t > 2.0) for w in WHEELS}
+    stands = Rig(prepare([make_log("stands", t, channels), _log()], 0.308), paper_car())
+    samples, level = stands.case.drives[0].samples, nominal(stands.vehicle)
+    before, fresh = stands.run(level), stands.run(_with(level, effect, number, value))
+    stands.keep(level)
+    kept = stands.run(_with(level, effect, number, value))
+    same = all(np.array_equal(values[:samples], kept[group][:samples]) for group, values in before.items())
+    assert same != acts
+    for group, most in (("wheel", 1e-2), ("ax", 2e-3), ("pressure", 1.0)):
+        assert np.abs(kept[group] - fresh[group])[:samples].max() < most, group
+
+
 @pytest.mark.parametrize("change", [
     {"late_s": late("imu", 0.004)}, {"late_s": late("pressure", 0.004)}, {"late_s": late("demand", 0.004)},
     {"window_rows2": 4.0}, {"tooth_share": 0.2},
