@@ -49,8 +49,8 @@ class Nuisance:
     ``most`` more its equation has no meaning.
     ``kind`` says of what: a number of the vehicle (``signed`` if it may be below zero), the discs' temperature at the
     start, the latency of a node, or of what holds a demand (never below zero), zero of a sensor, what one brake, motor,
-    tyre or clock is off beside the others, or pads with speed (``scatter``), the lag of a toothed wheel, or the time
-    over which it is a mean (never below zero), the lag of pads behind their sensors (``line``, never below zero).
+    tyre or clock is off beside the others (``scatter``), the lag of a toothed wheel, or the time over which it is a
+    mean (never below zero), the lag of pads behind their sensors (``line``, never below zero).
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""What no set states of a car: how far single brakes, motors, tyres and clocks are off, pads with speed, steering."""
+"""What no set states of a car: how far single brakes, motors, tyres and clocks are off, and its steering wheel."""
 
 from collections.abc import Sequence
 
@@ -14,9 +14,6 @@ _PARTS = (
 )  # fmt: skip
 """Standard deviations of a pressure sensor's zero and gain, of the torque a motor gives of what is asked and of what it
 tells, of the pads' friction, and of a wheel's radius beside the others' (docs/decisions/0093 and 0094)."""
-_WITH_SPEED_S_M = 1e-3
-"""Standard deviation of how the friction of an axle's pads goes with speed. Pads lose 10 to 25 % from 5 to 120 km/h,
-0.003 to 0.008 s/m (plant/effects/mu_speed); a third of the least of that is taken for what a set does not tell."""
 _CLOCK_SHARE = 5e-5
 """Standard deviation of the rate of one node's clock: quartz is good to 20 to 100 ppm (plant/effects/sensing)."""
 _STRAIGHT_AHEAD_RAD = 0.01
@@ -27,7 +24,7 @@ be set within 3 to 5 degrees of that (Hyundai Motor, Grandeur 2006: within 5, no
 def scattered(p: Floats, motors: bool) -> tuple[Nuisance, ...]:
     """Nuisances of a car ``p`` whose maker states no more than usual; of its motors only if they are compared."""
     parts = [one for one in _PARTS if motors or one[:2] != ("iwm_gain", "gain")]
-    return (*_by_wheel(parts), *_with_speed(), *_clocks(), _straight_ahead(p))
+    return (*_by_wheel(parts), *_clocks(), _straight_ahead(p))
 
 
 def lagging(half_s: float) -> list[Nuisance]:
@@ -42,15 +39,6 @@ def _by_wheel(parts: Sequence[tuple[str, str, float]]) -> list[Nuisance]:
         Nuisance(f"{effect}.{number}_{wheel}", (THETA.slice(effect, number).start + k,), (step,), "scatter")
         for effect, number, step in parts
         for k, wheel in enumerate(("fl", "fr", "rl", "rr"))
-    ]
-
-
-def _with_speed() -> list[Nuisance]:
-    """How the friction of each axle's pads goes with speed."""
-    first = THETA.slice("mu_speed", "slope_s_m").start
-    return [
-        Nuisance(f"mu_speed.slope_s_m_{axle}", (first + k,), (_WITH_SPEED_S_M,), "scatter")
-        for k, axle in enumerate(("front", "rear"))
     ]
 
 
