@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from motion_logs import RADIUS_M, STEP_S, coloured, motion_log
 
 from hil.study.consistency.along import SLIP, Along, known_slip
 from hil.study.consistency.check import Consistency, _rivals, unforced
@@ -13,31 +14,6 @@ from hil.study.consistency.search import search
 from hil.study.consistency.summary import _headline
 from hil.study.explain import explain
 from hil.study.logs.table import WHEEL_SPEED, Log, UnusableError, make_log
-
-RADIUS_M, STEP_S = 0.33, 0.01
-
-
-def _coloured(rng, n: int, size: float, time_s: float) -> np.ndarray:
-    keep = np.exp(-STEP_S / time_s)
-    out, white = np.zeros(n), size * np.sqrt(1.0 - keep**2) * rng.standard_normal(n)
-    for k in range(1, n):
-        out[k] = keep * out[k - 1] + white[k]
-    return out
-
-
-def _log(seed: int, gain: float = 0.0, late: int = 0) -> Log:
-    """One minute: accelerations in steps, a hilly road, shaking, noise."""
-    rng, n = np.random.default_rng(seed), 6000
-    levels = rng.uniform(-2.0, 2.0, 20)
-    levels -= levels.mean()
-    pull = np.repeat(levels, n // 20)
-    kernel = np.exp(-np.arange(200) * STEP_S / 0.15)
-    accel = np.convolve(pull, kernel / kernel.sum())[:n]
-    speed = 20.0 + np.cumsum(accel) * STEP_S
-    felt = accel + _coloured(rng, n, 0.2, 8.0) + _coloured(rng, n, 0.1, 0.15)
-    ax = (1.0 + gain) * np.concatenate((felt[:1].repeat(late), felt[: n - late])) + 0.05 * rng.standard_normal(n)
-    channels = {name: (speed + 0.02 * rng.standard_normal(n)) / RADIUS_M for name in WHEEL_SPEED}
-    return make_log("made", np.arange(n) * STEP_S, channels | {"ax_mps2": ax})
 
 
 def _found(log: Log):
@@ -91,12 +67,12 @@ def test_what_cells_resolve_is_fitted_from_the_next_cells_too():
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_nothing_is_found_in_nothing(seed):
-    assert _found(_log(seed)).steps == []
+    assert _found(motion_log(seed)).steps == []
 
 
 @pytest.mark.slow
 def test_a_sign_is_found_with_its_interval():
-    found = _found(_log(4, gain=-2.0))
+    found = _found(motion_log(4, gain=-2.0))
     assert [step.number for step in found.steps] == ["gain"]
     low, high = found.interval("gain")
     assert low < -2.0 < high
@@ -105,14 +81,14 @@ def test_a_sign_is_found_with_its_interval():
 
 @pytest.mark.slow
 def test_a_delay_is_found_with_its_interval():
-    found = _found(_log(5, late=15))
+    found = _found(motion_log(5, late=15))
     assert [step.number for step in found.steps] == ["delay_s"]
     low, high = found.interval("delay_s")
     assert low < 0.15 < high
 
 
 def test_the_way_is_chosen_by_the_channels():
-    log = _log(6)
+    log = motion_log(6)
     assert "forces cannot be replayed" in unforced([log], RADIUS_M)
     torque = {f"motor_torque_{w}_nm": np.zeros(6000) for w in ("fl", "fr", "rl", "rr")}
     assert unforced([make_log("made", log.t_s, {**log.channels, **torque})], RADIUS_M) == ""
@@ -130,7 +106,7 @@ def test_a_delay_is_tied_with_a_filter_in_slow_manoeuvres():
     rng, n = np.random.default_rng(9), 12000
     t = np.arange(n) * STEP_S
     accel = 2.0 * np.sin(2.0 * np.pi * t / 10.0) + np.sin(2.0 * np.pi * t / 17.0 + 1.0)
-    felt = accel + _coloured(rng, n, 0.1, 8.0) + _coloured(rng, n, 0.05, 0.15)
+    felt = accel + coloured(rng, n, 0.1, 8.0) + coloured(rng, n, 0.05, 0.15)
     speed = 25.0 + np.cumsum(accel) * STEP_S
     wheels = {name: (speed + 0.01 * rng.standard_normal(n)) / RADIUS_M for name in WHEEL_SPEED}
     late = np.concatenate((felt[:1].repeat(10), felt[:-10])) + 0.05 * rng.standard_normal(n)
@@ -146,7 +122,7 @@ def test_a_delay_is_tied_with_a_filter_in_slow_manoeuvres():
 @pytest.mark.slow
 def test_slip_of_the_tyres_is_no_filter_of_the_accelerometer():
     """Wheels slip in proportion to the force: those of soft tyres lead the car by 0.2 s at 20 m/s."""
-    made = _log(5)
+    made = motion_log(5)
     accel = np.gradient(made.channels[WHEEL_SPEED[0]] * RADIUS_M, STEP_S)
     smooth = np.convolve(accel, np.ones(15) / 15, mode="same")
     slip = 0.01
