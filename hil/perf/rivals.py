@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hil.diagnosis.data.log import Floats
+from hil.diagnosis.detection.result import ALPHA
+from hil.diagnosis.detection.score_test import threshold
 from hil.perf.signatures import Problem
-from hil.study.logs.table import Floats
-from hil.study.search.diagnosis import ALPHA
-from hil.study.search.screen import threshold
 
 NONE = "none"
 _CONDITION = 1e10

@@ -12,12 +12,12 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from hil.diagnosis.estimation.terms import PLACES
 from hil.hide.case import Case, Hidden, as_number, logs, make_case, unknowns
 from hil.hide.cases import SEPARABLE
 from hil.hide.catalogue import Hideable, find
 from hil.hide.noise import LEVELS
 from hil.hide.snr import WHEELS, difference, signal_to_noise, whitened
-from hil.study.fitting.candidates import PLACES
 from plant.effects.effect import Scope
 from plant.effects.theta import THETA
 

@@ -6,15 +6,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from hil.diagnosis.detection.result import Diagnosis, Settings
+from hil.diagnosis.estimation.gauss_newton import Fitter
+from hil.diagnosis.estimation.terms import candidates, columns
+from hil.diagnosis.explain import explain
+from hil.diagnosis.result.answer import Answer
+from hil.diagnosis.result.cross_validation import gains
+from hil.diagnosis.result.residual_patterns import WORDS
 from hil.hide.case import Case
 from hil.hide.files import write
-from hil.study.explain import explain
-from hil.study.fitting.candidates import candidates, columns
-from hil.study.fitting.fit import Fitter
-from hil.study.search.diagnosis import Diagnosis, Settings
-from hil.study.verdict.answer import Answer
-from hil.study.verdict.measure import gains
-from hil.study.verdict.patterns import WORDS
 from hil.trials.names import numbers
 
 Errors = dict[str, float]

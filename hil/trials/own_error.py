@@ -6,16 +6,16 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from hil.diagnosis.detection.group_score_test import LawRace
+from hil.diagnosis.detection.nonparametric import PIECES
+from hil.diagnosis.detection.result import Diagnosis
+from hil.diagnosis.detection.score_test import Score
+from hil.diagnosis.estimation.model_discrepancy import UNLISTED, USUAL
+from hil.diagnosis.estimation.terms import kind_of
+from hil.diagnosis.explain import explain
+from hil.diagnosis.result.answer import Answer
 from hil.hide.cases import draw
 from hil.hide.files import write
-from hil.study.explain import explain
-from hil.study.fitting.candidates import kind_of
-from hil.study.fitting.own_error import UNLISTED, USUAL
-from hil.study.search.basis import PIECES
-from hil.study.search.diagnosis import Diagnosis
-from hil.study.search.race import LawRace
-from hil.study.search.screen import Score
-from hil.study.verdict.answer import Answer
 
 _SELDOM_TOLD = (
     "suspension_", "vehicle_pitch_inertia_kg_m2", "vehicle_roll_inertia_kg_m2", "disc_", "node_latency_s",
@@ -37,7 +37,7 @@ def measure(count: int, seed: int, say: Callable[[str], None]) -> tuple[Gains, G
     Once with all that the car's set states, and once without its suspension, discs and latencies.
 
     All places count, not the better ones: the best of nine explains twice what one does by chance alone, and how many
-    looks are taken is the threshold's business (`hil.study.search.screen.threshold`). What may be on one side of
+    looks are taken is the threshold's business (`hil.diagnosis.detection.score_test.threshold`). What may be on one side of
     nothing only counts where it is there: else half its looks would be zeros, and its error seem smaller than that of
     the same law by another name. They are taken where the whole search ends, which may have begun again from numbers
     that explain more.

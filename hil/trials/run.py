@@ -6,14 +6,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from hil.diagnosis.data.log import UnusableError
+from hil.diagnosis.detection.result import Settings
+from hil.diagnosis.explain import explain
+from hil.diagnosis.result.answer import Answer
 from hil.errors import BrakebenchError
 from hil.hide.case import Case
 from hil.hide.cases import draw, followed_by
 from hil.hide.files import read_answer, write
-from hil.study.explain import explain
-from hil.study.logs.table import UnusableError
-from hil.study.search.diagnosis import Settings
-from hil.study.verdict.answer import Answer
 from hil.trials import oracle
 from hil.trials.sources import state
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from hil.diagnosis.detection.result import Settings
 from hil.hide.case import Hidden, make_case
 from hil.hide.cases import SEPARABLE, draw
-from hil.study.search.diagnosis import Settings
 from hil.trials.reading import in_set
 from hil.trials.run import run_case
 
@@ -181,8 +181,8 @@ def test_without_the_noise_model_nothing_hidden_raises_an_alarm() -> None:
 
 def test_the_sealed_answer_is_never_opened(tmp_path: Path) -> None:
     """With the answer gone the verdict is the same."""
+    from hil.diagnosis.explain import explain
     from hil.hide.files import sealed_folder, write
-    from hil.study.explain import explain
 
     write(draw("null", 0, SEED), tmp_path / "logs")
     for file in sealed_folder(tmp_path / "logs").iterdir():

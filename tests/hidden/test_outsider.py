@@ -8,10 +8,10 @@ import one_log
 import pytest
 from outsider import STEP_S, VEHICLE, drive, logs
 
-from hil.study.explain import explain
-from hil.study.logs.table import make_log
-from hil.study.search.diagnosis import Settings
-from hil.study.verdict.extension import load_extension
+from hil.diagnosis.data.log import make_log
+from hil.diagnosis.detection.result import Settings
+from hil.diagnosis.explain import explain
+from hil.diagnosis.vehicle.extension_file import load_extension
 from plant.effects.theta import THETA
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from hil.study.explain import explain, shipped
-from hil.study.logs.channel_map import load_map
-from hil.study.logs.read import read_logs
-from hil.study.logs.table import PRESSURE_DEMAND, Log
+from hil.diagnosis.data.channel_map import load_map
+from hil.diagnosis.data.log import PRESSURE_DEMAND, Log
+from hil.diagnosis.data.read import read_logs
+from hil.diagnosis.explain import explain, shipped
 
 pytestmark = [pytest.mark.slow, pytest.mark.long, pytest.mark.timeout(1800)]
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from dbc.database import parse_database
-from hil.study.explain import explain, shipped
-from hil.study.logs.channel_map import load_map
-from hil.study.logs.read import read_logs
-from hil.study.logs.table import WHEEL_SPEED, Log
+from hil.diagnosis.data.channel_map import load_map
+from hil.diagnosis.data.log import WHEEL_SPEED, Log
+from hil.diagnosis.data.read import read_logs
+from hil.diagnosis.explain import explain, shipped
 
 pytestmark = pytest.mark.slow
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hil.study.logs.table import WHEEL_SPEED, Log, make_log
+from hil.diagnosis.data.log import WHEEL_SPEED, Log, make_log
 
 RADIUS_M, STEP_S = 0.33, 0.01
 

@@ -11,7 +11,7 @@ import numpy as np
 import outsider
 import plant_logs
 
-from hil.study.explain import explain
+from hil.diagnosis.explain import explain
 from plant.effects.theta import THETA
 
 HERE = Path(__file__).parent.parent / "pinned"

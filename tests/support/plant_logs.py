@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hil.study.replay.vehicle_set import paper_car
+from hil.diagnosis.vehicle.load import paper_car
 from plant.model import initial_state, pack, replay
 from plant.vectors import INPUT
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from hil.study.logs.prepare import prepare
-from hil.study.logs.table import Log, make_log
-from hil.study.replay.rig import Rig
-from hil.study.replay.vehicle import Vehicle
-from hil.study.replay.world import nominal
+from hil.diagnosis.data.log import Log, make_log
+from hil.diagnosis.data.prepare import prepare
+from hil.diagnosis.simulation.parameter_set import nominal
+from hil.diagnosis.simulation.simulator import Rig
+from hil.diagnosis.vehicle.spec import Vehicle
 
 WHEELS = ("fl", "fr", "rl", "rr")
 FOLLOWED = (("pressure", "pa"), ("motor_torque", "nm"))

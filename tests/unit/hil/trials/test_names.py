@@ -1,7 +1,7 @@
 """Numbers of the hidden car by the plant's name: every one that can be, and the oracle's candidates with them."""
 
+from hil.diagnosis.estimation.terms import candidates, columns
 from hil.hide.cases import SEPARABLE
-from hil.study.fitting.candidates import candidates, columns
 from hil.trials.names import numbers
 
 PHASED = {"dtv_judder", "wheel_tooth_error"}  # an amplitude and a phase there, a sine and a cosine here

@@ -2,11 +2,11 @@
 
 import pytest
 
+from hil.diagnosis.detection.result import Settings
+from hil.diagnosis.explain import explain
+from hil.diagnosis.result.residual_patterns import WORDS
 from hil.hide.case import Hidden, make_case
 from hil.hide.files import read_answer, write
-from hil.study.explain import explain
-from hil.study.search.diagnosis import Settings
-from hil.study.verdict.patterns import WORDS
 from hil.trials.oracle import told
 
 

@@ -4,7 +4,7 @@ import tomllib
 
 import pytest
 
-from hil.study.fitting.own_error import USUAL
+from hil.diagnosis.estimation.model_discrepancy import USUAL
 from hil.trials.own_error import as_toml, ratios, tables
 
 
