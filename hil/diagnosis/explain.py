@@ -15,13 +15,13 @@ from hil.diagnosis.data.channel_map import load_map
 from hil.diagnosis.data.log import Log
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.data.read import from_frame, read_logs
-from hil.diagnosis.data.straight_line import kept_straight
-from hil.diagnosis.detection.result import Say, Settings
+from hil.diagnosis.data.straight_line import is_straight_line
+from hil.diagnosis.detection.result import Progress, Settings
 from hil.diagnosis.detection.stepwise import diagnose
 from hil.diagnosis.result.answer import Answer, answer
-from hil.diagnosis.result.cross_validation import gains
-from hil.diagnosis.result.residual_patterns import wrongs
-from hil.diagnosis.sensor_consistency.check import Consistency, check, unforced
+from hil.diagnosis.result.cross_validation import held_out_error
+from hil.diagnosis.result.residual_patterns import residual_patterns
+from hil.diagnosis.sensor_consistency.check import Consistency, check, why_not_simulatable
 from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.vehicle.extension_file import load_extension, write_extension
 from hil.diagnosis.vehicle.load import load_vehicle
@@ -31,7 +31,7 @@ from hil.diagnosis.vehicle.spec import Vehicle
 def explain(
     logs: Any, vehicle: Path | str | Mapping[str, Any] | None = None, *, channel_map: Path | None = None,
     database: Path | None = None, about: Path | None = None, extend: Path | None = None, out: Path | None = None,
-    settings: Settings | None = None, say: Say | None = None,
+    settings: Settings | None = None, say: Progress | None = None,
 ) -> Answer | Consistency:  # fmt: skip
     """Explain what measured data have and the simulation has not.
 
@@ -54,28 +54,28 @@ def explain(
     """
     car = load_vehicle(shipped(Path(vehicle), "vehicle") if isinstance(vehicle, str | Path) else vehicle)
     read = with_both_axles(_logs(logs, car, channel_map, database, about))
-    why = unforced(read, float(car.parameters.wheel.rolling_radius_m))
+    why = why_not_simulatable(read, float(car.parameters.wheel.rolling_radius_m))
     if why:
         return check(read, car, why, extend, out, say or (lambda _: None))
-    car = car.held_straight() if kept_straight(read) else car
-    car = car.asked(read)
+    car = car.without_lateral_dynamics() if is_straight_line(read) else car
+    car = car.with_motor_limits_from(read)
     case = prepare(read, float(car.parameters.wheel.rolling_radius_m), car.unstated)
     handed_in = nominal(car)
     base = handed_in if extend is None else load_extension(Path(extend)).applied(handed_in)
     with threadpool_limits(1, "blas"):  # replays fill the processors; linear algebra beside them only waits
         found = diagnose(case, car, base, settings, say)
         (say or (lambda _: None))("measuring the gain on held-out manoeuvres")
-        gained, missed = gains(found), wrongs(found)
+        gained, missed = held_out_error(found), residual_patterns(found)
     written = None
     if out is not None:
         Path(out).mkdir(parents=True, exist_ok=True)
         written = str(Path(out) / "extension.toml")
         names = ", ".join(term.candidate.name for term in found.final.terms) or "no effect"
         fitter, final = found.fitter, found.final
-        causes = fitter.world(np.zeros_like(final.z), final.terms).theta  # zeros of sensors are of these logs
-        extended = replace(fitter.world(final.z, final.terms), theta=causes)
+        causes = fitter.parameter_set(np.zeros_like(final.z), final.terms).theta  # zeros of sensors are of these logs
+        extended = replace(fitter.parameter_set(final.z, final.terms), theta=causes)
         write_extension(Path(written), handed_in, extended, f"Taught by {len(read)} logs: {names}")
-    read_so = (f"{drive.log.name}: {text}" for drive in case.drives for text in drive.log.remarks)
+    read_so = (f"{drive.log.name}: {text}" for drive in case.recordings for text in drive.log.remarks)
     remarks = [*car.remarks, *read_so, *found.remarks]
     return answer(found, gained, missed, written, remarks, None if out is None else Path(out))
 

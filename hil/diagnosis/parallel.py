@@ -20,7 +20,7 @@ def _idle() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(WORKERS)
 
 
-def side_by_side(of: Callable[[Item], Of], items: Sequence[Item]) -> list[Of]:
+def parallel_map(of: Callable[[Item], Of], items: Sequence[Item]) -> list[Of]:
     """Of each item, in order; over threads, unless others have them. ``of`` must not come back here."""
     each = _idle().map if (helped := _FREE.acquire(blocking=False)) else map
     try:

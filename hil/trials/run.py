@@ -91,7 +91,7 @@ def run_case(case: Case, seed: int, size: float | None, settings: Settings | Non
         "hidden": truth["causes"], **said,
     }  # fmt: skip
     if case.family == "single" and size in SURE and answered is not None:
-        record["oracle"] = oracle.told(answered.found, truth["causes"][0])
+        record["oracle"] = oracle.told(answered.diagnosis, truth["causes"][0])
     if case.family == "unlisted":
         record["oracle"] = oracle.untouched(case)
     if case.family == "confounded":

@@ -8,7 +8,7 @@ _REGULAR = 0.98
 """Share of the stamps within half a cycle of where a cycle has them, for a log to have one."""
 
 
-def begin_s(t_s: Floats) -> float:
+def clock_origin_s(t_s: Floats) -> float:
     """Stamp of the first row had its frame waited as long as most do: what is demanded acts by the cycle.
 
     Of the first stamp itself every demand of the log would be early or late by what that one frame waited.
@@ -24,7 +24,7 @@ def begin_s(t_s: Floats) -> float:
     return float(t_s[0]) + (usual if regular else 0.0)
 
 
-def wait_s(t_s: Floats) -> float:
+def timestamp_jitter_s(t_s: Floats) -> float:
     """How irregular the stamps of frames are, s: what one waits for the bus less what the one before did.
 
     All nodes wait alike and by themselves, so this is also how much later than its stamp a value of another node was

@@ -24,7 +24,7 @@ class Segment:
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class Recording:
     """One log, ready for replay.
 
     Attributes
@@ -49,7 +49,7 @@ class Drive:
     pressure_pa: Floats
     state_of_charge: float
     number: int = 0
-    wait_s: float = 0.0
+    timestamp_jitter_s: float = 0.0
     compared: Mapping[str, Floats] = field(default_factory=dict)
 
     @property
@@ -59,25 +59,25 @@ class Drive:
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class Dataset:
     """All drives of one diagnosis; ``followed`` are the groups whose demands the simulation follows."""
 
-    drives: tuple[Drive, ...]
-    cut: Floats
+    recordings: tuple[Recording, ...]
+    measured_input_mask: Floats
     groups: tuple[str, ...]
     sample_s: float
-    missing: tuple[str, ...]
-    followed: tuple[str, ...] = ("pressure", "motor")
+    missing_channels: tuple[str, ...]
+    tracked_actuators: tuple[str, ...] = ("pressure", "motor")
 
     @property
     def segments(self) -> list[tuple[int, Segment]]:
         """Every segment with its drive's number."""
-        return [(k, segment) for k, drive in enumerate(self.drives) for segment in drive.segments]
+        return [(k, segment) for k, drive in enumerate(self.recordings) for segment in drive.segments]
 
-    def blocks(self) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    def segment_ids(self) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
         """Segment number of every sample of all drives, in order."""
         numbers, parts = 0, []
-        for drive in self.drives:
+        for drive in self.recordings:
             part = np.zeros(drive.samples, np.int64)
             for segment in drive.segments:
                 part[segment.first // drive.stride : segment.last // drive.stride] = numbers

@@ -21,7 +21,7 @@ def cubic(values: Floats, k: int, place: float) -> float:
 
 
 @compiled
-def between(values: Floats, late: float, out: Floats) -> None:
+def shifted(values: Floats, late: float, out: Floats) -> None:
     """Columns of ``values`` (samples, columns) so many samples ``late``, into ``out``.
 
     Through the two samples on each side (Keys 1981, IEEE Trans. ASSP 29, 1153, a = -1/2): a wheel that swings on its
@@ -33,8 +33,8 @@ def between(values: Floats, late: float, out: Floats) -> None:
 
 
 @compiled
-def straight_at(values: Floats, every: int, late: float, out: Floats) -> None:
-    """As `between`, on straight lines, at one of ``every`` samples."""
+def shifted_linear(values: Floats, every: int, late: float, out: Floats) -> None:
+    """As `shifted`, on straight lines, at one of ``every`` samples."""
     last = values.shape[0] - 1
     for t in range(out.shape[0]):
         place = min(max(every * t - late, 0.0), float(last))
@@ -45,7 +45,7 @@ def straight_at(values: Floats, every: int, late: float, out: Floats) -> None:
 
 
 @compiled
-def finer(values: Floats, bend: Floats, out: Floats) -> None:
+def upsampled(values: Floats, bend: Floats, out: Floats) -> None:
     """Columns of ``values`` (rows, columns) at as many points a row as ``out`` has: between rows on a parabola that is
     off the straight line by ``bend`` in the middle."""
     points = out.shape[0] // values.shape[0]
@@ -64,7 +64,7 @@ def _at(values: Floats, places: Floats, out: Floats) -> None:
         out[t] = cubic(values, 0, places[t])
 
 
-def at_places(values: Floats, at: Floats) -> Floats:
+def at_samples(values: Floats, at: Floats) -> Floats:
     """One column (samples,) at fractional numbers of samples, (rows,)."""
     out = np.empty(len(at))
     _at(np.ascontiguousarray(values, np.float64)[:, None], np.asarray(at, np.float64), out)

@@ -15,7 +15,7 @@ _LASTS_S = 0.1
 _LEAST_MPS = 4.0  # below, sensors with teeth miss what a wheel does within a tenth of a second
 
 
-def since_sliding(
+def after_wheel_lock(
     wheels: Floats, ground_mps: Floats, acting: NDArray[np.bool_], segments: Sequence[Segment], radius_m: float
 ) -> NDArray[np.bool_]:
     """Rows, of 10 ms, from where a wheel that rolled slides, to the end of their segment.

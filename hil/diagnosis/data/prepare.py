@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.diagnosis.compiled import compiled
-from hil.diagnosis.data.clock import begin_s, wait_s
-from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Case, Drive, Segment
-from hil.diagnosis.data.interpolation import at_places
+from hil.diagnosis.data.clock import clock_origin_s, timestamp_jitter_s
+from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Dataset, Recording, Segment
+from hil.diagnosis.data.interpolation import at_samples
 from hil.diagnosis.data.log import (
     MOTOR_DEMAND,
     MOTOR_TORQUE,
@@ -21,7 +21,7 @@ from hil.diagnosis.data.log import (
     Log,
     UnusableError,
 )
-from hil.diagnosis.data.masks import since_sliding
+from hil.diagnosis.data.masks import after_wheel_lock
 from plant.vectors import CUT, INPUT, U
 
 SETTLE_S, _RINGS_S = 1.0, 2.0
@@ -67,7 +67,7 @@ def _without(logs: Sequence[Log], channels: Collection[str], *remarks: str) -> S
     ]
 
 
-def prepare(logs: Sequence[Log], radius_m: float, unstated: Collection[str] = ()) -> Case:
+def prepare(logs: Sequence[Log], radius_m: float, unstated: Collection[str] = ()) -> Dataset:
     """Cut and grid logs.
 
     Of sections that are ``unstated`` in the vehicle set no simulation can follow a demand: torques of such motors are
@@ -78,7 +78,7 @@ def prepare(logs: Sequence[Log], radius_m: float, unstated: Collection[str] = ()
     UnusableError
         Nothing that moves or nothing that drives the brakes is measured.
     """
-    logs = _without_contradicted(_without_unstated(logs, unstated))
+    logs = _without_contradicted_demands(_without_unstated(logs, unstated))
     there = set.intersection(*(set(log.channels) for log in logs))
     if not (set(WHEEL_SPEED) & there or "speed_mps" in there):
         raise UnusableError("neither wheel speeds nor a speed in every log; nothing says how the car moved")
@@ -105,14 +105,14 @@ def prepare(logs: Sequence[Log], radius_m: float, unstated: Collection[str] = ()
     rate = max(float(np.median(np.diff(log.t_s))) for log in logs)
     stride = max(2, int(np.ceil(rate / ROW_S - 0.2)))
     followed = ("motor",) if "ehb" in unstated else ("pressure", "motor")
-    drives = tuple(replace(_drive(log, groups, stride, radius_m, followed), number=k) for k, log in enumerate(logs))
+    drives = tuple(replace(_recording(log, groups, stride, radius_m, followed), number=k) for k, log in enumerate(logs))
     moving = sum(float(drive.moving.sum()) for drive in drives) * stride * ROW_S
     if moving < 4.0:
         raise UnusableError(f"the car moves for {moving:.1f} s in all; expected 4 s or more above {SLOW_MPS:g} m/s")
-    return Case(drives, cut, tuple(groups), stride * ROW_S, tuple(_costs(there)), followed)
+    return Dataset(drives, cut, tuple(groups), stride * ROW_S, tuple(_missing_channel_notes(there)), followed)
 
 
-def _without_contradicted(logs: Sequence[Log]) -> Sequence[Log]:
+def _without_contradicted_demands(logs: Sequence[Log]) -> Sequence[Log]:
     """Logs without the demands that any of them contradicts: brakes or motors that act for long with nothing asked.
 
     Who sent what acted is then not in the log, and its demands would accuse the actuators.
@@ -132,7 +132,7 @@ def _without_contradicted(logs: Sequence[Log]) -> Sequence[Log]:
     return _without(logs, dropped, "demands left out: the brakes or motors act while nothing is asked of them")
 
 
-def _costs(there: set[str]) -> list[str]:
+def _missing_channel_notes(there: set[str]) -> list[str]:
     """What each missing channel costs."""
     said = {
         "ax_mps2": "without acceleration: road grade, drag and a wrong accelerometer cannot be told apart",
@@ -153,8 +153,8 @@ def _costs(there: set[str]) -> list[str]:
     return costs
 
 
-def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float, followed: Collection[str]) -> Drive:
-    begin, end = begin_s(log.t_s), float(log.t_s[-1])
+def _recording(log: Log, groups: Sequence[str], stride: int, radius_m: float, followed: Collection[str]) -> Recording:
+    begin, end = clock_origin_s(log.t_s), float(log.t_s[-1])
     rows = int((end - begin) / ROW_S) // stride * stride
     grid = begin + ROW_S * np.arange(rows)
 
@@ -171,7 +171,7 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float, follow
             at = np.clip(np.searchsorted(log.t_s[good], grid + late, side="right") - 1, 0, None)
             return np.asarray(values[good][at], np.float64)
         if name in MOTION or (name in PRESSURE and cycle >= _SPARSE * ROW_S):
-            filled = at_places(values[good], np.interp(grid, log.t_s[good], np.arange(good.sum(), dtype=np.float64)))
+            filled = at_samples(values[good], np.interp(grid, log.t_s[good], np.arange(good.sum(), dtype=np.float64)))
         else:
             filled = np.interp(grid, log.t_s[good], values[good])
         nearest = np.clip(np.searchsorted(log.t_s[good], grid), 1, max(int(good.sum()) - 1, 1))
@@ -206,7 +206,7 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float, follow
     )
     quiet = (brakes < _RELEASED_PA) & (motors < _RELEASED_NM)
     bent = np.abs(inputs[:, U.steering_wheel_rad]) > STRAIGHT_RAD
-    bounds = _bounds(speed, quiet, bent, stride)
+    bounds = _segment_bounds(speed, quiet, bent, stride)
     smooth = _smoothed(_filled(spins))
     smooth_ground = _smoothed(_filled(ground)) if not turning else None
     segments = tuple(
@@ -230,11 +230,11 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float, follow
     rings = max(int(_RINGS_S / (stride * ROW_S)), 1)
     resting = np.convolve(slow > 0.02, np.ones(2 * rings + 1), mode="same") < 0.5
     resting[: 2 * after] = False  # the simulated body first sinks into its springs
-    slid = since_sliding(wheels, ground, ~quiet, segments, radius_m)
+    slid = after_wheel_lock(wheels, ground, ~quiet, segments, radius_m)
     if slid.any():
-        log = replace(log, remarks=(*log.remarks, _slides(slid)))
+        log = replace(log, remarks=(*log.remarks, _sliding_remark(slid)))
     held = averaged(slid[:, None] * 1.0, stride)[:, 0] == 0.0
-    return Drive(
+    return Recording(
         log,
         inputs,
         segments,
@@ -245,12 +245,12 @@ def _drive(log: Log, groups: Sequence[str], stride: int, radius_m: float, follow
         slow,
         averaged(brakes[:, None], stride)[:, 0],
         _charge(log),
-        wait_s=wait_s(log.t_s),
+        timestamp_jitter_s=timestamp_jitter_s(log.t_s),
         compared=compared,
     )
 
 
-def _slides(slid: NDArray[np.bool_]) -> str:
+def _sliding_remark(slid: NDArray[np.bool_]) -> str:
     since = np.flatnonzero(slid)[0] * ROW_S
     return f"a wheel slides from {since:.2f} s on; motion is not compared from there to the end of its segment"
 
@@ -336,7 +336,7 @@ def _smoothed(values: Floats) -> Floats:
     return np.asarray(windows.mean(axis=1) + slope * x[0])
 
 
-def _bounds(speed: Floats, quiet: Floats, bent: Floats, stride: int) -> list[int]:
+def _segment_bounds(speed: Floats, quiet: Floats, bent: Floats, stride: int) -> list[int]:
     """Where to restart: at rest, else released after 8 s, else after 25 s; in bends, which answer speed, after 3 s."""
     rows, bounds, begin = len(speed), [0], 0
     rest = speed < 0.3

@@ -42,7 +42,7 @@ def read_logs(
     files = [file for path in paths for file in _files(path)]
     if not files:
         raise UnusableError(f"no log in {', '.join(map(str, paths))}; give log files or a folder of them")
-    return [_described(read_one(file, database, channel_map, torque_constant_nm_a), file, about) for file in files]
+    return [_with_log_facts(read_one(file, database, channel_map, torque_constant_nm_a), file, about) for file in files]
 
 
 def _files(path: Path) -> list[Path]:
@@ -52,7 +52,7 @@ def _files(path: Path) -> list[Path]:
     return sorted(file for file in path.iterdir() if file.suffix.lower() in suffixes and not file.name.startswith("."))
 
 
-def _described(log: Log, file: Path, about: Path | None) -> Log:
+def _with_log_facts(log: Log, file: Path, about: Path | None) -> Log:
     """With what ``logs.toml`` says of the file: ``["name.csv"]`` with direction, initial_disc_temperature_k."""
     source = about or file.parent / "logs.toml"
     if not source.exists():
@@ -93,10 +93,10 @@ def read_one(
         )
     if database is not None:
         raise UnusableError(f"{path.name}: a foreign DBC needs --map CHANNELS.toml: which signal is which channel")
-    return _own(path.name, decoded, torque_constant_nm_a)
+    return _brakebench_log(path.name, decoded, torque_constant_nm_a)
 
 
-def _own(name: str, decoded: DecodedLog, torque_constant_nm_a: float) -> Log:
+def _brakebench_log(name: str, decoded: DecodedLog, torque_constant_nm_a: float) -> Log:
     series = own_channels(decoded, torque_constant_nm_a)
     if not series:
         raise UnusableError(f"{name}: no signal of our own DBC in it; give --dbc and --map for another car's log")

@@ -11,7 +11,7 @@ _OVER_S, _TURNS_RAD_S = 0.5, 0.003
 72 km/h."""
 
 
-def kept_straight(logs: Sequence[Log]) -> bool:
+def is_straight_line(logs: Sequence[Log]) -> bool:
     """Whether a driver who is not seen held the car on its line, against whatever pulls to one side.
 
     A steering wheel that is in no log, or in all of them one number, was not held still: brakes that pull are steered

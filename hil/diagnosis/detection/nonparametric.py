@@ -11,14 +11,14 @@ import numpy as np
 
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.estimation.model_discrepancy import UNLISTED
-from hil.diagnosis.estimation.terms import PLACES, Candidate
-from hil.diagnosis.simulation.parameter_set import World
-from hil.diagnosis.simulation.simulator import Rig
+from hil.diagnosis.estimation.terms import LOCATIONS, Candidate
+from hil.diagnosis.simulation.parameter_set import ParameterSet
+from hil.diagnosis.simulation.simulator import Simulator
 from plant.effects.bank import Shape, Variable, term
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.places import JOINTS
 
-PIECES = 5
+BASIS_SIZE = 5
 _WHEELS = Scope.WHEEL.members
 _CALLED = {
     Variable.SPEED: "speed", Variable.WHEEL_SPEED: "wheel_speed", Variable.PRESSURE: "pressure",
@@ -39,132 +39,136 @@ _EDGE, _LEAST_RANGE = 0.01, 1e-6
 
 
 @dataclass(frozen=True)
-class Law:
+class NonparametricTerm:
     """Where and on what an unlisted cause may depend: joint, variable, whether it is added, usual size (of the joint's
     unit, or a share), and whether single wheels are told apart in the race."""
 
-    joint: str
+    injection_point: str
     variable: Variable
     adds: bool
-    usual: float
+    typical: float
 
     @property
     def name(self) -> str:
         """For people and keys."""
-        return f"{self.joint}({_CALLED[self.variable]})"
+        return f"{self.injection_point}({_CALLED[self.variable]})"
 
     @property
     def scope(self) -> Scope:
         """Whether each wheel has its own."""
-        return Scope.WHEEL if JOINTS[self.joint][0] == 4 else Scope.CAR
+        return Scope.WHEEL if JOINTS[self.injection_point][0] == 4 else Scope.CAR
 
 
-LAWS = (
-    *(Law("friction.mu", v, False, 0.2) for v in (
+NONPARAMETRIC_TERMS = (
+    *(NonparametricTerm("friction.mu", v, False, 0.2) for v in (
         Variable.SPEED, Variable.PRESSURE, Variable.DISC_TEMPERATURE, Variable.APPLIED_TIME, Variable.TIME,
     )),
-    *(Law("motor.torque", v, False, 0.06) for v in (Variable.WHEEL_SPEED, Variable.MOTOR_TORQUE, Variable.TIME)),
-    *(Law("body.force", v, True, 200.0) for v in (
+    *(NonparametricTerm("motor.torque", v, False, 0.06) for v in (Variable.WHEEL_SPEED, Variable.MOTOR_TORQUE, Variable.TIME)),
+    *(NonparametricTerm("body.force", v, True, 200.0) for v in (
         Variable.SPEED, Variable.TIME, Variable.DISTANCE, Variable.YAW_RATE,
     )),
-    Law("wheel.rolling_torque", Variable.SPEED, False, 0.4),
-    Law("tyre.stiffness", Variable.SPEED, False, 0.2),
-    Law("wheel.radius", Variable.SPEED, False, 0.005),
-    Law("imu.ax", Variable.SPEED, True, 0.05),
-    Law("imu.ax", Variable.ACCELERATION, True, 0.05),
+    NonparametricTerm("wheel.rolling_torque", Variable.SPEED, False, 0.4),
+    NonparametricTerm("tyre.stiffness", Variable.SPEED, False, 0.2),
+    NonparametricTerm("wheel.radius", Variable.SPEED, False, 0.005),
+    NonparametricTerm("imu.ax", Variable.SPEED, True, 0.05),
+    NonparametricTerm("imu.ax", Variable.ACCELERATION, True, 0.05),
 )  # fmt: skip
 """The laws in the race; speed is the only variable of what is weakly seen. A force by acceleration is mass."""
 
 
 @dataclass(frozen=True, eq=False)
-class Piece(Candidate):
+class BasisFunction(Candidate):
     """One hat of a law at a place."""
 
-    law: Law
+    term: NonparametricTerm
     centre: float
     width: float
 
     @property
     def name(self) -> str:
         """For people and keys."""
-        return f"{UNLISTED}.{self.law.name}.{self.parameter.name}@{self.place}"
+        return f"{UNLISTED}.{self.term.name}.{self.parameter.name}@{self.location}"
 
     @property
     def variable(self) -> str:
         """What it depends on."""
-        return _CALLED[self.law.variable]
+        return _CALLED[self.term.variable]
 
     def members(self) -> tuple[int, ...]:
         """Members of the joint it acts on."""
-        return PLACES[self.law.scope][self.place]
+        return LOCATIONS[self.term.scope][self.location]
 
     def row(self, value: float) -> Floats:
         """Its row of the bank."""
-        coefficients = [value if k in self.members() else 0.0 for k in range(self.law.scope.size)]
-        shaped = (self.law.variable, Shape.HAT, self.centre, self.width)
-        return term(self.law.joint, coefficients, shaped, add=self.law.adds)
+        coefficients = [value if k in self.members() else 0.0 for k in range(self.term.scope.size)]
+        shaped = (self.term.variable, Shape.HAT, self.centre, self.width)
+        return term(self.term.injection_point, coefficients, shaped, add=self.term.adds)
 
-    def applied(self, world: World, value: float) -> World:
+    def applied(self, world: ParameterSet, value: float) -> ParameterSet:
         """The world with this number added."""
-        return replace(world, terms=np.vstack([world.terms, self.row(value)]))
+        return replace(world, nonparametric_rows=np.vstack([world.nonparametric_rows, self.row(value)]))
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class BasisExpansion:
     """A law at a place with its hats."""
 
-    law: Law
-    place: str
-    pieces: tuple[Piece, ...]
+    term: NonparametricTerm
+    location: str
+    functions: tuple[BasisFunction, ...]
 
     @property
     def variable(self) -> str:
         """Name of what it depends on."""
-        return _CALLED[self.law.variable]
+        return _CALLED[self.term.variable]
 
-    def at(self, place: str) -> "Curve":
+    def at(self, place: str) -> "BasisExpansion":
         """The same law elsewhere."""
-        return replace(self, place=place, pieces=tuple(replace(piece, place=place) for piece in self.pieces))
+        return replace(
+            self, location=place, functions=tuple(replace(piece, location=place) for piece in self.functions)
+        )
 
 
-def curves(rig: Rig, world: World) -> list[Curve]:
+def basis_expansions(rig: Simulator, world: ParameterSet) -> list[BasisExpansion]:
     """Every law over the range its variable covers in the logs, at all wheels; those with a range."""
     seen = _ranges(rig, world)
     found = []
-    for law in LAWS:
+    for law in NONPARAMETRIC_TERMS:
         low, high = seen[_acting(law), law.variable]
         if high - low > _LEAST_RANGE:
-            found.append(curve_of(law, low, high))
+            found.append(basis_expansion(law, low, high))
     return found
 
 
-def places(curve: Curve) -> Iterator[Curve]:
+def at_each_location(curve: BasisExpansion) -> Iterator[BasisExpansion]:
     """The law at every place."""
-    return (curve.at(place) for place in PLACES[curve.law.scope])
+    return (curve.at(place) for place in LOCATIONS[curve.term.scope])
 
 
-def curve_of(law: Law, low: float, high: float) -> Curve:
+def basis_expansion(law: NonparametricTerm, low: float, high: float) -> BasisExpansion:
     """A law at all members, its hats evenly over a range of its variable."""
-    centres = np.linspace(low, high, PIECES)
-    unit = JOINTS[law.joint][1] if law.adds else ""
-    bound = 20.0 * law.usual if law.adds else 0.9
-    numbers = tuple(Parameter(f"c{k + 1}", unit, -bound, bound, law.usual) for k in range(PIECES))
+    centres = np.linspace(low, high, BASIS_SIZE)
+    unit = JOINTS[law.injection_point][1] if law.adds else ""
+    bound = 20.0 * law.typical if law.adds else 0.9
+    numbers = tuple(Parameter(f"c{k + 1}", unit, -bound, bound, law.typical) for k in range(BASIS_SIZE))
     effect = Effect(
-        name=UNLISTED, row=0, title=f"{law.joint} depends on {_CALLED[law.variable]} in a way that no list has",
-        equation="sum c_k hat((v - v_k) / w)", joints=(law.joint,), scope=law.scope, parameters=numbers,
+        name=UNLISTED, row=0, title=f"{law.injection_point} depends on {_CALLED[law.variable]} in a way that no list has",
+        equation="sum c_k hat((v - v_k) / w)", joints=(law.injection_point,), scope=law.scope, parameters=numbers,
         source="measured data", signature="", manoeuvre="",
     )  # fmt: skip
     width = float(centres[1] - centres[0])
-    pieces = [Piece(effect, one, "car", (), 1, law, float(c), width) for one, c in zip(numbers, centres, strict=True)]
-    return Curve(law, "car", tuple(pieces))
+    pieces = [
+        BasisFunction(effect, one, "car", (), 1, law, float(c), width) for one, c in zip(numbers, centres, strict=True)
+    ]
+    return BasisExpansion(law, "car", tuple(pieces))
 
 
-def _acting(law: Law) -> str:
+def _acting(law: NonparametricTerm) -> str:
     """Over which samples the range counts."""
-    return {"friction.mu": "brake", "motor.torque": "motor"}.get(law.joint, "moving")
+    return {"friction.mu": "brake", "motor.torque": "motor"}.get(law.injection_point, "moving")
 
 
-def _ranges(rig: Rig, world: World) -> dict[tuple[str, Variable], tuple[float, float]]:
+def _ranges(rig: Simulator, world: ParameterSet) -> dict[tuple[str, Variable], tuple[float, float]]:
     names = [name for columns in _COLUMNS.values() for name in columns]
     table = rig.states(world, names)
     values, at = {}, 0
@@ -187,8 +191,8 @@ def _ranges(rig: Rig, world: World) -> dict[tuple[str, Variable], tuple[float, f
     return found
 
 
-def shown(
-    pieces: Sequence[Piece], values: Sequence[float], covariance: Floats, points: int = 21
+def estimate_curve(
+    pieces: Sequence[BasisFunction], values: Sequence[float], covariance: Floats, points: int = 21
 ) -> list[dict[str, float]]:
     """The curve with its 95 % band: factor less one, or addend in the joint's unit."""
     centres = np.array([piece.centre for piece in pieces])

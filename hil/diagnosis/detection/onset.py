@@ -6,32 +6,32 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2
 
-from hil.diagnosis.data.dataset import ROW_S, Case, Segment
+from hil.diagnosis.data.dataset import ROW_S, Dataset, Segment
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.detection.nonparametric import Piece
+from hil.diagnosis.detection.nonparametric import BasisFunction
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
-from hil.diagnosis.estimation.information import sums
-from hil.diagnosis.estimation.model_discrepancy import variance_of
-from hil.diagnosis.noise.model import Frame, Noise
+from hil.diagnosis.estimation.information import information_blocks
+from hil.diagnosis.estimation.model_discrepancy import variance_inflation
+from hil.diagnosis.noise.model import Noise, SampleMasks
 
-Moment = tuple[int, float]
+OnsetTime = tuple[int, float]
 """A time: which drive, and s in it."""
 _ALPHA = 3e-4
 _COARSE_S, _FINER, _MOST_TIMES = 0.25, (0.05, 0.01), 80
 """Steps of the time, s: what begins at once sets hubs swinging, so that only the neighbourhood of the truth fits."""
-LEAST_BEFORE = 3.0
+MIN_SNR_BEFORE_ONSET = 3.0
 """Standard deviations that the cause would have shown before it begins, had it been there."""
 
 
-def with_onsets(fitter: Fitter, model: Model, noise: Noise) -> Model:
+def estimate_onsets(fitter: Fitter, model: Model, noise: Noise) -> Model:
     """The model with a beginning for each cause that was clearly absent before, and for no other.
 
     A time that may be chosen is one more way to fit what the model gets wrong, and is asked for more than that.
     What was taken to begin, where the numbers still stood in for it, may always have been there.
     """
-    starts = begins(fitter.rig.case)
+    starts = segment_starts(fitter.simulator.dataset)
     for k, term in enumerate(model.terms):
-        if isinstance(term.candidate, Piece):
+        if isinstance(term.candidate, BasisFunction):
             continue
         if term.onset is None:
             later = _later(fitter, model, noise, k)
@@ -40,11 +40,11 @@ def with_onsets(fitter: Fitter, model: Model, noise: Noise) -> Model:
             moments = _about(fitter, starts.index(term.onset))
             begun = min(model, _begun(fitter, model, noise, k, moments, term.value), key=_cost)
             always = fitter.fit(fitter.at(model.z, _since(model, k, term.value, None), noise), noise, 3)
-            model = begun if begun.cost + price(fitter.frame) < always.cost else always
+            model = begun if begun.cost + onset_penalty(fitter.masks) < always.cost else always
     return model
 
 
-def dated_anew(fitter: Fitter, model: Model, noise: Noise) -> Model:
+def refine_onset(fitter: Fitter, model: Model, noise: Noise) -> Model:
     """The model with the beginning of its last cause where it fits best, near the one it has."""
     term = model.terms[-1]
     assert term.onset is not None
@@ -54,17 +54,17 @@ def dated_anew(fitter: Fitter, model: Model, noise: Noise) -> Model:
     return min(model, _begun(fitter, model, noise, len(model.terms) - 1, moments, term.value), key=_cost)
 
 
-def price(frame: Frame) -> float:
+def onset_penalty(frame: SampleMasks) -> float:
     """What of a gain goes to the choice of a time to begin at: twice the log of how many were offered."""
-    return 2.0 * float(np.log(len(frame.fresh) * frame.sample_s / _COARSE_S))
+    return 2.0 * float(np.log(len(frame.log_start) * frame.sample_s / _COARSE_S))
 
 
-def begins(case: Case) -> list[Moment]:
+def segment_starts(case: Dataset) -> list[OnsetTime]:
     """When each manoeuvre begins."""
     return [(drive, segment.first * ROW_S) for drive, segment in case.segments]
 
 
-def nearest(starts: Sequence[Moment], moment: Moment) -> int:
+def nearest(starts: Sequence[OnsetTime], moment: OnsetTime) -> int:
     """Number of the manoeuvre, of the same drive, that begins nearest to a moment."""
     drive, since_s = moment
     return min((abs(start - since_s), number) for number, (of, start) in enumerate(starts) if of == drive)[1]
@@ -72,25 +72,25 @@ def nearest(starts: Sequence[Moment], moment: Moment) -> int:
 
 def _later(fitter: Fitter, model: Model, noise: Noise, k: int) -> Model | None:
     b, q = _by_manoeuvre(fitter, model, noise, k)
-    block = begin_of(b, q)
+    block = detect_change_point(b, q)
     if block is None:
         return None
     value = float(np.clip(b[block:].sum() / q[block:].sum(), *_bounds(model.terms[k])))
     moments = _about(fitter, block)
-    least = float(chi2.isf(_ALPHA / (len(b) * len(moments)), 1)) * variance_of(model.terms[k].candidate)
+    least = float(chi2.isf(_ALPHA / (len(b) * len(moments)), 1)) * variance_inflation(model.terms[k].candidate)
     fitted = _begun(fitter, model, noise, k, moments, value)
     return fitted if model.cost - fitted.cost > least else None
 
 
-def _about(fitter: Fitter, block: int) -> list[Moment]:
+def _about(fitter: Fitter, block: int) -> list[OnsetTime]:
     """Times to try for what is seen from a manoeuvre on."""
-    segments = fitter.rig.case.segments
+    segments = fitter.simulator.dataset.segments
     return moments_of(segments[block - 1], segments[block])
 
 
-def _begun(fitter: Fitter, model: Model, noise: Noise, k: int, moments: list[Moment], value: float) -> Model:
+def _begun(fitter: Fitter, model: Model, noise: Noise, k: int, moments: list[OnsetTime], value: float) -> Model:
     """The model with a cause that begins at the best of these times, or near it."""
-    fitter.rig.keep(fitter.world(model.z, _since(model, k, value, moments[0])))
+    fitter.simulator.cache_baseline(fitter.parameter_set(model.z, _since(model, k, value, moments[0])))
     seen: list[Model] = []
     for finer in (*_FINER, None):
         tried = ((fitter.at(model.z, _since(model, k, value, moment), noise), moment) for moment in moments)
@@ -106,7 +106,7 @@ def _cost(model: Model) -> float:
     return model.cost
 
 
-def moments_of(before: tuple[int, Segment], after: tuple[int, Segment]) -> list[Moment]:
+def moments_of(before: tuple[int, Segment], after: tuple[int, Segment]) -> list[OnsetTime]:
     """Times to try, from the begin of the manoeuvre before to the end of the one after it, in one drive or in two."""
     (drive, first), (same, last) = before, after
     spans = [(drive, first.first, last.last)] if same == drive else [(d, s.first, s.last) for d, s in (before, after)]
@@ -117,7 +117,7 @@ def moments_of(before: tuple[int, Segment], after: tuple[int, Segment]) -> list[
     ]
 
 
-def _since(model: Model, k: int, value: float, moment: Moment | None) -> tuple[Term, ...]:
+def _since(model: Model, k: int, value: float, moment: OnsetTime | None) -> tuple[Term, ...]:
     """The terms of the model, one of them with another value, from a time on or always there."""
     changed = replace(model.terms[k], value=value, onset=moment)
     return (*model.terms[:k], changed, *model.terms[k + 1 :])
@@ -130,13 +130,13 @@ def _most(rows: int) -> int:
 
 def _by_manoeuvre(fitter: Fitter, model: Model, noise: Noise, k: int) -> tuple[Floats, Floats]:
     """Products of the cause's signature with what the data have beside all else, and with itself, by manoeuvre."""
-    own = {name: values[:, k : k + 1] for name, values in fitter.term_columns(model).items()}
-    matrix = sums(model.residual, own, fitter.frame, noise, 0).matrix
+    own = {name: values[:, k : k + 1] for name, values in fitter.term_jacobian(model).items()}
+    matrix = information_blocks(model.residual, own, fitter.masks, noise, 0).matrix
     q = matrix[:, 1, 1]
     return matrix[:, 0, 1] + q * model.terms[k].value, q
 
 
-def begin_of(b: Floats, q: Floats) -> int | None:
+def detect_change_point(b: Floats, q: Floats) -> int | None:
     """First manoeuvre in which a cause is seen; None where it may always have been there.
 
     Parameters
@@ -150,7 +150,7 @@ def begin_of(b: Floats, q: Floats) -> int | None:
         return None
     value = after_b[block] / after_q[block]
     before = float(q[:block].sum())
-    if abs(value) * np.sqrt(before) < LEAST_BEFORE:
+    if abs(value) * np.sqrt(before) < MIN_SNR_BEFORE_ONSET:
         return None
     gained = explained[block] - explained[0]
     return block if gained > float(chi2.isf(_ALPHA / len(b), 1)) else None

@@ -3,22 +3,22 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from hil.diagnosis.data.dataset import Case
-from hil.diagnosis.detection.nonparametric import Piece
-from hil.diagnosis.detection.profile_fit import Contender
-from hil.diagnosis.detection.score_test import Score
+from hil.diagnosis.data.dataset import Dataset
+from hil.diagnosis.detection.nonparametric import BasisFunction
+from hil.diagnosis.detection.profile_fit import FittedHypothesis
+from hil.diagnosis.detection.score_test import ScoreTest
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model
-from hil.diagnosis.estimation.information import Sums
+from hil.diagnosis.estimation.information import InformationBlocks
 from hil.diagnosis.noise.model import Noise
 from hil.diagnosis.vehicle.spec import Vehicle
 
-Say = Callable[[str], None]
+Progress = Callable[[str], None]
 """Told of the progress, a line each."""
-ALPHA = 1e-3
+FALSE_ALARM_PROBABILITY = 1e-3
 """Chance of a false alarm in one set of logs if the model's own error were normal. One in a hundred may be borne; the
 rest is kept for tails heavier than that (decision 0077)."""
 MOST_CAUSES = 3
-TIED = 9.2
+INDISTINGUISHABLE = 9.2
 """Twice the log of the odds, 100 to 1, within which causes are not told apart."""
 
 
@@ -29,14 +29,14 @@ class Settings:
     noise_model: bool = True
     relinearise: bool = True
     dictionary: bool = True
-    alpha: float = ALPHA
+    alpha: float = FALSE_ALARM_PROBABILITY
     most_causes: int = MOST_CAUSES
 
 
 def causes_in(model: Model) -> int:
     """How many causes a model has; the pieces of a law in no list are one."""
-    laws = {term.candidate.name.rsplit(".", 1)[0] for term in model.terms if isinstance(term.candidate, Piece)}
-    return sum(not isinstance(term.candidate, Piece) for term in model.terms) + len(laws)
+    laws = {term.candidate.name.rsplit(".", 1)[0] for term in model.terms if isinstance(term.candidate, BasisFunction)}
+    return sum(not isinstance(term.candidate, BasisFunction) for term in model.terms) + len(laws)
 
 
 @dataclass(eq=False)
@@ -48,7 +48,7 @@ class Diagnosis:
     were fitted in its place, best first.
     """
 
-    case: Case
+    dataset: Dataset
     vehicle: Vehicle
     fitter: Fitter
     noise: Noise
@@ -56,17 +56,17 @@ class Diagnosis:
     nominal: Model
     base: Model
     final: Model
-    contenders: list[list[Contender]] = field(default_factory=list)
-    screened: list[Score] = field(default_factory=list)
-    untestable: list[str] = field(default_factory=list)
-    sums: Sums | None = None
-    looks: int = 0
+    hypotheses: list[list[FittedHypothesis]] = field(default_factory=list)
+    scores: list[ScoreTest] = field(default_factory=list)
+    undetectable_effects: list[str] = field(default_factory=list)
+    information: InformationBlocks | None = None
+    number_of_tests: int = 0
     inflation: float = 1.0
-    least_gain: float = 0.0
+    detection_threshold: float = 0.0
     explained: float = 0.0
     remarks: list[str] = field(default_factory=list)
 
     @property
-    def races(self) -> list[list[Contender]]:
+    def selections(self) -> list[list[FittedHypothesis]]:
         """The contenders for each cause; the terms of a law in no list were accepted in one race."""
-        return list({id(listed): listed for listed in self.contenders}.values())
+        return list({id(listed): listed for listed in self.hypotheses}.values())

@@ -12,15 +12,15 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.detection.nonparametric import Piece
-from hil.diagnosis.detection.profile_fit import Contender, Contest, refitted
+from hil.diagnosis.detection.nonparametric import BasisFunction
+from hil.diagnosis.detection.profile_fit import CandidateFits, FittedHypothesis, refitted
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
-from hil.diagnosis.estimation.information import solve, sums, track_columns
-from hil.diagnosis.estimation.model_discrepancy import variance_of
+from hil.diagnosis.estimation.information import finite_difference_jacobian, information_blocks, solve
+from hil.diagnosis.estimation.model_discrepancy import variance_inflation
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.isolation.intervals import DEVIATION_BY_FORM
 from hil.diagnosis.noise.model import Noise
-from hil.diagnosis.simulation.parameter_set import World
+from hil.diagnosis.simulation.parameter_set import ParameterSet
 from plant.effects.effect import Parameter
 from plant.effects.theta import THETA
 
@@ -39,14 +39,14 @@ _TWO_SIDED_95 = 1.96
 
 
 @dataclass(frozen=True, eq=False)
-class Shaped(Candidate):
+class ShapedCandidate(Candidate):
     """A listed effect's number at a place, its ``shape`` ``at`` a value of its own; how well that is known."""
 
     shape: Parameter
     at: float
     deviation: float = 0.0
 
-    def applied(self, world: World, value: float) -> World:
+    def applied(self, world: ParameterSet, value: float) -> ParameterSet:
         """The world with this number added, and the shape set."""
         world = super().applied(world, value)
         world.theta[THETA.slice(self.effect.name, self.shape.name)] = self.at
@@ -58,7 +58,9 @@ class Shaped(Candidate):
         return max(self.at - half, self.shape.low), min(self.at + half, self.shape.high)
 
 
-def of_another_shape(contest: Contest, fitter: Fitter, listed: Sequence[Candidate], law: Contender) -> Contender | None:
+def fit_shape_parameters(
+    contest: CandidateFits, fitter: Fitter, listed: Sequence[Candidate], law: FittedHypothesis
+) -> FittedHypothesis | None:
     """The best listed cause at the joint and the place of a law, of any shape; None where no effect there has one.
 
     Parameters
@@ -66,36 +68,45 @@ def of_another_shape(contest: Contest, fitter: Fitter, listed: Sequence[Candidat
     contest : the race that the law leads.  listed : all candidates.  law : its pieces are the last terms of its model.
     """
     piece = law.term.candidate
-    assert isinstance(piece, Piece)
+    assert isinstance(piece, BasisFunction)
     offered = [
-        Shaped(one.effect, one.parameter, one.place, one.columns, one.places, shape, at, sprung=one.sprung)
+        ShapedCandidate(
+            one.effect,
+            one.parameter,
+            one.location,
+            one.columns,
+            one.locations,
+            shape,
+            at,
+            suspension_stated=one.suspension_stated,
+        )
         for one in listed
         for shape in one.effect.parameters
-        if shape.shape and piece.law.joint in one.effect.joints and one.place == piece.place
+        if shape.shape and piece.term.injection_point in one.effect.joints and one.location == piece.location
         for at in _values(shape)
     ]
     if not offered:
         return None
-    terms = tuple(term for term in law.model.terms if not isinstance(term.candidate, Piece))
+    terms = tuple(term for term in law.model.terms if not isinstance(term.candidate, BasisFunction))
     bare = fitter.at(law.model.z, terms, law.noise)
-    world = fitter.world(bare.z, terms)
-    fitter.rig.keep(world)
+    world = fitter.parameter_set(bare.z, terms)
+    fitter.simulator.cache_baseline(world)
     steps = [_SHARE * one.parameter.typical for one in offered]
     worlds = [one.applied(world, step) for one, step in zip(offered, steps, strict=True)]
-    columns = track_columns(fitter.rig, fitter.frame, bare.stack, worlds, steps)
+    columns = finite_difference_jacobian(fitter.simulator, fitter.masks, bare.channels, worlds, steps)
 
     def foreseen(k: int) -> Model:
         own = {name: values[:, k : k + 1] for name, values in columns.items()}
-        return contest.foreseen([Term(offered[k], 0.0)], own)[0]
+        return contest.linear_prediction([Term(offered[k], 0.0)], own)[0]
 
-    best: dict[str, tuple[Model, Shaped]] = {}  # of each effect, as foreseen by one step, which far off errs
+    best: dict[str, tuple[Model, ShapedCandidate]] = {}  # of each effect, as foreseen by one step, which far off errs
     for model, one in sorted(zip(contest.at_once(foreseen, range(len(offered))), offered, strict=True), key=_cost):
         best.setdefault(one.effect.name, (model, one))
     replayed = contest.at_once(lambda seen: fitter.at(seen[0].z, seen[0].terms, law.noise), list(best.values()))
     return _fitted(fitter, bare, min(zip(replayed, (one for _, one in best.values()), strict=True), key=_cost)[1], law)
 
 
-def _cost(seen: tuple[Model, Shaped]) -> float:
+def _cost(seen: tuple[Model, ShapedCandidate]) -> float:
     return seen[0].cost
 
 
@@ -105,13 +116,13 @@ def _values(shape: Parameter) -> list[float]:
     return list(map(float, (np.geomspace if far_apart else np.linspace)(shape.low, shape.high, _OFFERED)))
 
 
-def _fitted(fitter: Fitter, bare: Model, begun: Shaped, law: Contender) -> Contender | None:
+def _fitted(fitter: Fitter, bare: Model, begun: ShapedCandidate, law: FittedHypothesis) -> FittedHypothesis | None:
     """The cause with the shape that explains most, near the one at which it is offered; None far behind the law."""
     seen: list[tuple[float, Model]] = []
 
     def found_from(z: Floats, term: Term) -> Model:
-        own = fitter.copied()
-        model = own.sized(own.at(z, (*bare.terms, term), law.noise), law.noise)
+        own = fitter.copy()
+        model = own.refit_amplitudes(own.at(z, (*bare.terms, term), law.noise), law.noise)
         for _ in range(_TURNS):
             before = model.cost
             model = own.fit(model, law.noise, 4, follow=True)
@@ -123,7 +134,7 @@ def _fitted(fitter: Fitter, bare: Model, begun: Shaped, law: Contender) -> Conte
         best = min((model for _, model in seen), key=lambda model: model.cost, default=None)
         term = Term(replace(begun, at=at), begun.parameter.typical if best is None else best.terms[-1].value)
         starts = [bare.z] if best is None else [bare.z, best.z]
-        found = Contest.at_once(lambda z: found_from(z, term), starts)
+        found = CandidateFits.at_once(lambda z: found_from(z, term), starts)
         seen.append((at, min(found, key=lambda model: model.cost)))
         return seen[-1][1].cost
 
@@ -136,12 +147,14 @@ def _fitted(fitter: Fitter, bare: Model, begun: Shaped, law: Contender) -> Conte
     at, model = min(seen, key=lambda one: one[1].cost)
     by_noise = _deviation(at, model.cost, [(other, of.cost) for other, of in seen], begun.shape)
     by_form = DEVIATION_BY_FORM * (beyond[1] - beyond[0])
-    deviation = hypot(by_noise * sqrt(variance_of(begun)), by_form, _by_numbers(fitter, model, law.noise, by_noise))
+    deviation = hypot(
+        by_noise * sqrt(variance_inflation(begun)), by_form, _by_numbers(fitter, model, law.noise, by_noise)
+    )
     term = replace(model.terms[-1], candidate=replace(begun, at=at, deviation=deviation))
     model = replace(model, terms=(*model.terms[:-1], term))
-    found = refitted(replace(law, gained=0.0), model, law.noise)
+    found = refitted(replace(law, gain=0.0), model, law.noise)
     told = sqrt(2.0 * pi) * deviation / (begun.shape.high - begun.shape.low)
-    return replace(found, evidence=found.evidence + min(log(max(told, 1e-12)), 0.0))
+    return replace(found, log_occam_factor=found.log_occam_factor + min(log(max(told, 1e-12)), 0.0))
 
 
 def _deviation(at: float, least: float, seen: Sequence[tuple[float, float]], shape: Parameter) -> float:
@@ -156,18 +169,18 @@ def _by_numbers(fitter: Fitter, model: Model, noise: Noise, step: float) -> floa
     """Standard deviation of a shape by numbers that mattered to nothing before it (`Fitter.columns_at`)."""
     *others, term = model.terms
     shape = term.candidate
-    assert isinstance(shape, Shaped)
+    assert isinstance(shape, ShapedCandidate)
     step = _within(shape.at, step, shape.shape)
     moved = fitter.at(model.z, (*others, replace(term, candidate=replace(shape, at=shape.at + step))), noise)
     own = {
         name: np.hstack([values, (model.residual[name] - moved.residual[name]) / step])
-        for name, values in fitter.term_columns(model).items()
+        for name, values in fitter.term_jacobian(model).items()
     }
     count, free = len(model.z), range(len(model.terms) + 1)
     variances = []
-    for numbers in (fitter.nuisance_columns, fitter.columns_at(model)):
+    for numbers in (fitter.nuisance_jacobian, fitter.nuisance_jacobian_at(model)):
         columns = {name: np.hstack([values, own[name]]) for name, values in numbers.items()}
-        total = sums(model.residual, columns, fitter.frame, noise, count).total()
+        total = information_blocks(model.residual, columns, fitter.masks, noise, count).total()
         variances.append(float(solve(total, count, free, model.z)[1][-1, -1]))
     return sqrt(max(variances[1] - variances[0], 0.0))
 

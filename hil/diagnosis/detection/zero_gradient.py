@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from hil.diagnosis.detection.score_test import Score, sized
+from hil.diagnosis.detection.score_test import ScoreTest, replayed_score
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
 from hil.diagnosis.noise.model import Noise
 
@@ -10,12 +10,12 @@ _SILENT = 0.1
 _ROUNDS, _GOLDEN = 8, 0.618
 
 
-def silent(item: Score) -> bool:
+def has_zero_gradient(item: ScoreTest) -> bool:
     """Whether a small step of the candidate changes nothing."""
-    return item.reach < _SILENT and item.candidate.parameter.typical != 0.0
+    return item.max_snr < _SILENT and item.candidate.parameter.typical != 0.0
 
 
-def replayed(fitter: Fitter, model: Model, noise: Noise, item: Score) -> Score:
+def line_search(fitter: Fitter, model: Model, noise: Noise, item: ScoreTest) -> ScoreTest:
     """A silent candidate at the size that explains most; its value is 0 where none explains anything.
 
     The cost is flat up to the limit, falls and rises again: golden section (Kiefer 1953), farther off where two sizes
@@ -41,6 +41,6 @@ def replayed(fitter: Fitter, model: Model, noise: Noise, item: Score) -> Score:
             near, inner, outer = inner, outer, inner + _GOLDEN * (far - inner)
         else:
             far, inner, outer = outer, outer - _GOLDEN * (outer - near), inner
-    item = replace(item, reach=abs(most) ** 0.5, usual=abs(change(parameter.typical)) ** 0.5)
+    item = replace(item, max_snr=abs(most) ** 0.5, typical_snr=abs(change(parameter.typical)) ** 0.5)
     best = min(tried, key=lambda size: tried[size])
-    return sized(item, best, -tried[best]) if tried[best] < 0.0 else item
+    return replayed_score(item, best, -tried[best]) if tried[best] < 0.0 else item

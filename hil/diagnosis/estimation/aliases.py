@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.estimation.gauss_newton import Model, Term
-from hil.diagnosis.simulation.parameter_set import World
+from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.vehicle.priors import Nuisance
 from plant.effects.apply import Q
 from plant.effects.theta import THETA
@@ -24,7 +24,7 @@ _STAMPS = "timestamp_offset"
 
 
 @dataclass(frozen=True)
-class Same:
+class Alias:
     """The number of the vehicle that a cause is: which of the nuisances, where it lies, how much a unit of the cause
     moves it; whether it is a latency."""
 
@@ -33,23 +33,23 @@ class Same:
     slope: float
     latency: bool = False
 
-    def of(self, world: World) -> float:
+    def of(self, world: ParameterSet) -> float:
         """The number in a world, without the cause."""
-        return world.late_s[self.at] if self.latency else float(world.p[self.at])
+        return world.latency_s[self.at] if self.latency else float(world.p[self.at])
 
     def deviation(self, nuisances: Sequence[Nuisance]) -> float:
         """One standard deviation of the number, in units of the cause."""
         return abs(nuisances[self.nuisance].step[0] / self.slope)
 
 
-def same_number(term: Term, nuisances: Sequence[Nuisance], world: World) -> Same | None:
+def alias_of(term: Term, nuisances: Sequence[Nuisance], world: ParameterSet) -> Alias | None:
     """The number that the cause is in a world without it; None: it is none, or more than one."""
     if term.onset is not None:
         return None
     if term.candidate.effect.name == _STAMPS:
-        late = (k for k, one in enumerate(nuisances) if one.name == f"late_{term.candidate.place}")
-        return next((Same(k, nuisances[k].at[0], 1.0, True) for k in late), None)
-    if term.candidate.place != "car":
+        late = (k for k, one in enumerate(nuisances) if one.name == f"late_{term.candidate.location}")
+        return next((Alias(k, nuisances[k].at[0], 1.0, True) for k in late), None)
+    if term.candidate.location != "car":
         return None
     step = 0.01 * term.candidate.parameter.typical
     moved = [_numbers(term, value, world) for value in (term.value, term.value - step)]
@@ -59,25 +59,25 @@ def same_number(term: Term, nuisances: Sequence[Nuisance], world: World) -> Same
     for k, nuisance in enumerate(nuisances):
         if nuisance.kind == "vehicle" and list(nuisance.at) == changed:
             slope = float(moved[0][changed[0]] - moved[1][changed[0]]) / step
-            return Same(k, changed[0], slope) if slope else None
+            return Alias(k, changed[0], slope) if slope else None
     return None
 
 
-def restated(model: Model, nuisances: Sequence[Nuisance], base: World) -> Model:
+def resolve_aliases(model: Model, nuisances: Sequence[Nuisance], base: ParameterSet) -> Model:
     """The same car with the most likely share of each cause in the number that it is; ``base`` is as handed in."""
     for number, term in enumerate(model.terms):
-        same = same_number(term, nuisances, base.shifted(nuisances, model.z))
+        same = alias_of(term, nuisances, base.with_nuisances(nuisances, model.z))
         if same is None:
             continue
-        step, spread = nuisances[same.nuisance].step[0], term.candidate.spread * same.slope
-        wanted = _value(term, base.shifted(nuisances, model.z), same)
+        step, spread = nuisances[same.nuisance].step[0], term.candidate.prior_sd * same.slope
+        wanted = _value(term, base.with_nuisances(nuisances, model.z), same)
         z = model.z.copy()
         z[same.nuisance] = (wanted - same.of(base)) * step / (step**2 + spread**2)
-        without = base.shifted(nuisances, z)
+        without = base.with_nuisances(nuisances, z)
         parameter = term.candidate.parameter
 
         def off(
-            value: float, term: Term = term, without: World = without, same: Same = same, wanted: float = wanted
+            value: float, term: Term = term, without: ParameterSet = without, same: Alias = same, wanted: float = wanted
         ) -> float:
             return _value(replace(term, value=value), without, same) - wanted
 
@@ -90,7 +90,7 @@ def restated(model: Model, nuisances: Sequence[Nuisance], base: World) -> Model:
     return model
 
 
-def _value(term: Term, world: World, same: Same) -> float:
+def _value(term: Term, world: ParameterSet, same: Alias) -> float:
     """The number as the equations read it."""
     numbers = None if same.latency else _numbers(term, term.value, world)
     if numbers is None:
@@ -98,7 +98,7 @@ def _value(term: Term, world: World, same: Same) -> float:
     return float(numbers[same.at])
 
 
-def _numbers(term: Term, value: float, world: World) -> Floats | None:
+def _numbers(term: Term, value: float, world: ParameterSet) -> Floats | None:
     """Parameters as the equations read them with the cause; None where it is more than parameters."""
     effect = term.candidate.effect
     if effect.static is None or effect.dynamic is not None or effect.rates is not None or effect.sensing:

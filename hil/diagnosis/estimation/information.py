@@ -7,10 +7,10 @@ import numpy as np
 
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.noise.innovations import HUBER
-from hil.diagnosis.noise.model import Frame, Noise, tracks_of, whiten
+from hil.diagnosis.noise.model import Noise, SampleMasks, tracks_of, whiten
 from hil.diagnosis.simulation.measurement_model import Stack
-from hil.diagnosis.simulation.parameter_set import World
-from hil.diagnosis.simulation.simulator import Rig
+from hil.diagnosis.simulation.parameter_set import ParameterSet
+from hil.diagnosis.simulation.simulator import Simulator
 
 _CHUNK = 48
 _HELD = 1e15
@@ -18,7 +18,7 @@ _ROUNDS = 20
 
 
 @dataclass(frozen=True, eq=False)
-class Sums:
+class InformationBlocks:
     """Sums of products per manoeuvre: ``matrix`` (manoeuvres, m, m) of [residual, nuisances, columns]; how many
     samples, and the log-likelihood of the noise at the residual."""
 
@@ -40,12 +40,12 @@ class Sums:
         return total
 
 
-def track_columns(
-    rig: Rig, frame: Frame, base: Stack, worlds: Sequence[World], steps: Sequence[float]
+def finite_difference_jacobian(
+    rig: Simulator, frame: SampleMasks, base: Stack, worlds: Sequence[ParameterSet], steps: Sequence[float]
 ) -> dict[str, Floats]:
     """Finite differences of all worlds against ``base``, as tracks (samples, worlds)."""
     radius = float(rig.vehicle.parameters.wheel.rolling_radius_m)
-    out = {name: np.zeros((len(frame.fresh), len(worlds)), np.float32) for name in frame.names}
+    out = {name: np.zeros((len(frame.log_start), len(worlds)), np.float32) for name in frame.names}
     for k, (stack, step) in enumerate(zip(rig.run_all(worlds), steps, strict=True)):
         change = {group: (values - base[group]) / step for group, values in stack.items()}
         for name, values in tracks_of(change, frame, radius).items():
@@ -53,11 +53,13 @@ def track_columns(
     return out
 
 
-def sums(residual: dict[str, Floats], columns: dict[str, Floats], frame: Frame, noise: Noise, nuisances: int) -> Sums:
+def information_blocks(
+    residual: dict[str, Floats], columns: dict[str, Floats], frame: SampleMasks, noise: Noise, nuisances: int
+) -> InformationBlocks:
     """Whiten residual and columns, and sum their products by manoeuvre."""
     white_residual, likelihood = whiten(residual, frame, noise)
     count = next(iter(columns.values())).shape[1]
-    blocks = np.asarray(frame.blocks, np.int64)
+    blocks = np.asarray(frame.segment_id, np.int64)
     manoeuvres = int(blocks.max()) + 1
     order = np.argsort(blocks, kind="stable")
     bounds = np.searchsorted(blocks[order], np.arange(manoeuvres + 1))
@@ -75,7 +77,7 @@ def sums(residual: dict[str, Floats], columns: dict[str, Floats], frame: Frame, 
             part = ordered[bounds[k] : bounds[k + 1]]
             matrix[k] += part.T @ part
     samples = int(sum(float(known.sum()) for known in frame.present.values()))
-    return Sums(matrix, nuisances, samples, likelihood)
+    return InformationBlocks(matrix, nuisances, samples, likelihood)
 
 
 def _limited(innovations: Floats) -> Floats:
@@ -84,7 +86,7 @@ def _limited(innovations: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Projected:
+class Marginal:
     """Residual and columns after the nuisances (and what is accepted) have taken their part.
 
     ``b`` (columns,) products with the residual, ``q`` (columns, columns) among themselves, ``chi2`` of the residual.
@@ -95,25 +97,25 @@ class Projected:
     chi2: float
 
 
-def project(
+def marginalise(
     total: Floats, nuisances: int, free: Sequence[int] = (), z: Floats | None = None, held: Sequence[int] = ()
-) -> Projected:
+) -> Marginal:
     """Project out nuisances (normal, standard deviation 1, now ``z`` off) and the columns ``free`` (unbounded).
 
     Nuisances that are ``held`` take no part.
     """
-    a, right = _taking(total, nuisances, free, z, held)
+    a, right = _nuisance_system(total, nuisances, free, z, held)
     solved = np.linalg.solve(a, right) if len(a) else np.zeros((0, total.shape[1]))
     left = total - right.T @ solved
     keep = 1 + nuisances
     prior = float(z @ z) if z is not None else 0.0
-    return Projected(np.asarray(left[0, keep:]), np.asarray(left[keep:, keep:]), float(left[0, 0]) + prior)
+    return Marginal(np.asarray(left[0, keep:]), np.asarray(left[keep:, keep:]), float(left[0, 0]) + prior)
 
 
-def project_later(
-    found: Sums, columns: Sequence[Sequence[int]], free: Sequence[int], z: Floats, held: Sequence[int]
+def marginalise_from_onset(
+    found: InformationBlocks, columns: Sequence[Sequence[int]], free: Sequence[int], z: Floats, held: Sequence[int]
 ) -> tuple[Floats, Floats]:
-    """As `project`, for signatures that are nothing before the begin of each manoeuvre.
+    """As `marginalise`, for signatures that are nothing before the begin of each manoeuvre.
 
     Parameters
     ----------
@@ -123,7 +125,7 @@ def project_later(
     -------
     Products with the residual, and with itself, (manoeuvres, signatures).
     """
-    a, right = _taking(found.total(), found.nuisances, free, z, held)
+    a, right = _nuisance_system(found.total(), found.nuisances, free, z, held)
     taken, keep = _taken(found.nuisances, free), 1 + found.nuisances
     later = np.cumsum(found.matrix[::-1], axis=0)[::-1]
     along = np.linalg.solve(a, right[:, 0])
@@ -141,7 +143,7 @@ def _taken(nuisances: int, free: Sequence[int]) -> list[int]:
     return [1 + k for k in range(nuisances)] + [1 + nuisances + k for k in free]
 
 
-def _taking(
+def _nuisance_system(
     total: Floats, nuisances: int, free: Sequence[int], z: Floats | None, held: Sequence[int]
 ) -> tuple[Floats, Floats]:
     """Information of what takes its part, what is known before included, and its products with all there is."""
@@ -159,12 +161,12 @@ def _taking(
 
 def solve(total: Floats, nuisances: int, free: Sequence[int], z: Floats) -> tuple[Floats, Floats]:
     """Steps of the nuisances and of the columns ``free``, and the covariance of the latter."""
-    a, right = _normal(total, nuisances, free, z)
+    a, right = _normal_equations(total, nuisances, free, z)
     inverse = np.linalg.inv(a)
     return np.asarray(inverse @ right), np.asarray(inverse[nuisances:, nuisances:])
 
 
-def solve_within(
+def solve_bounded(
     total: Floats, nuisances: int, free: Sequence[int], z: Floats, low: Floats, high: Floats, damping: float = 0.0
 ) -> tuple[Floats, Floats, float]:
     """As `solve`, no step below ``low`` or above ``high``, and what it takes off the cost if the model is linear.
@@ -172,7 +174,7 @@ def solve_within(
     ``damping`` shortens the step in proportion to each number's own information (Marquardt 1963). What would go too far
     stays at its end while all others are solved for again (active set; Nocedal and Wright 2006, alg. 16.3).
     """
-    a, right = _normal(total, nuisances, free, z)
+    a, right = _normal_equations(total, nuisances, free, z)
     damped = a.copy()
     damped[range(len(a)), range(len(a))] *= 1.0 + damping
     change, ended = np.zeros(len(a)), np.zeros(len(a), bool)
@@ -195,7 +197,7 @@ def solve_within(
     return change, covariance[at:, at:], float(2.0 * right @ change - change @ a @ change)
 
 
-def _normal(total: Floats, nuisances: int, free: Sequence[int], z: Floats) -> tuple[Floats, Floats]:
+def _normal_equations(total: Floats, nuisances: int, free: Sequence[int], z: Floats) -> tuple[Floats, Floats]:
     """Normal equations: information with what is known before, and the pull."""
     taken = _taken(nuisances, free)
     a = total[np.ix_(taken, taken)].copy()

@@ -13,9 +13,9 @@ from collections.abc import Mapping
 from functools import cache
 from importlib import resources
 
-from hil.diagnosis.estimation.terms import Candidate, kind_of
+from hil.diagnosis.estimation.terms import Candidate, location_kind
 
-USUAL = 1.2
+UNMEASURED_RATIO = 1.2
 """Where nothing was measured."""
 UNSURE, FEW = 2.0, 1.4
 """Beyond this ratio an estimate is off by the model more than by noise, and by how much is known from thirty drives:
@@ -36,29 +36,29 @@ def _tables() -> Mapping[str, Table]:
     return tables
 
 
-def variance_of(candidate: Candidate) -> float:
+def variance_inflation(candidate: Candidate) -> float:
     """What the gain of a candidate is divided by, at least 1."""
-    return _variance(candidate.effect.name, candidate.parameter.name, candidate.place, candidate.sprung)
+    return _variance(candidate.effect.name, candidate.parameter.name, candidate.location, candidate.suspension_stated)
 
 
-def variance_of_law(name: str, place: str) -> float:
-    """The same for a law in no list, by `hil.diagnosis.detection.nonparametric.Law.name`, whatever is known of the springs."""
+def variance_inflation_nonparametric(name: str, place: str) -> float:
+    """The same for a law in no list, by `hil.diagnosis.detection.nonparametric.NonparametricTerm.name`, whatever is known of the springs."""
     return _variance(UNLISTED, name, place, sprung=False)
 
 
 def _variance(effect: str, number: str, place: str, sprung: bool) -> float:
-    kind = kind_of(place)
-    ratio = _ratio("ratio", effect, number, kind, USUAL)
+    kind = location_kind(place)
+    ratio = _ratio("ratio", effect, number, kind, UNMEASURED_RATIO)
     if not sprung:
         ratio = max(ratio, _ratio("unsprung", effect, number, kind, 1.0))
-    return shared_out(max(ratio, 1.0) ** 2)
+    return with_uncertainty(max(ratio, 1.0) ** 2)
 
 
 def _ratio(table: str, effect: str, number: str, kind: str, otherwise: float) -> float:
     return _tables().get(table, {}).get(effect, {}).get(number, {}).get(kind, otherwise)
 
 
-def shared_out(variance: float) -> float:
+def with_uncertainty(variance: float) -> float:
     """What a gain is divided by where the model errs by ``variance``, in variances of noise: more if it is large, for
     it is known from few drives or numbers."""
     return variance * (FEW if variance > UNSURE**2 else 1.0)

@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.simulation.parameter_set import World
+from hil.diagnosis.simulation.parameter_set import ParameterSet
 from plant.effects.effect import NODES, Effect, Parameter, Scope
 from plant.effects.theta import THETA
 
@@ -16,7 +16,7 @@ _SHARES = {
 """Of what is usual, for a finite difference; stiffer hubs would swing too fast for the replay's steps, motors are not
 compared just above the speed where they fade, a play narrower than what is left of noise in the measured pressures
 follows that, and a pressure that is held does nothing below the threshold."""
-PLACES: Mapping[Scope, Mapping[str, tuple[int, ...]]] = {
+LOCATIONS: Mapping[Scope, Mapping[str, tuple[int, ...]]] = {
     Scope.CAR: {"car": (0,)},
     Scope.AXLE: {"car": (0, 1), "front": (0,), "rear": (1,)},
     Scope.WHEEL: {
@@ -32,11 +32,11 @@ _KINDS = {
 }  # fmt: skip
 _MOTOR = "motor."
 """Joints of the motors."""
-USUAL = 1.5
+PRIOR_SD_IN_TYPICAL_SIZES = 1.5
 """Standard deviation before any data, in sizes met on real cars."""
 
 
-def kind_of(place: str) -> str:
+def location_kind(place: str) -> str:
     """Axle, side or wheel; the car, and each node, is a kind by itself."""
     return _KINDS.get(place, place)
 
@@ -60,7 +60,7 @@ class Column:
         share = _SHARES.get((self.effect.name, self.parameter.name), _SHARE)
         return self.parameter.typical * share if self.parameter.typical else 0.3 * share * self.parameter.high
 
-    def stepped(self, world: World) -> World:
+    def stepped(self, world: ParameterSet) -> ParameterSet:
         """The world with the number one step off."""
         theta: Floats = world.theta.copy()
         theta[self.at] += self.step
@@ -76,29 +76,33 @@ class Candidate:
 
     effect: Effect
     parameter: Parameter
-    place: str
+    location: str
     columns: tuple[int, ...]
-    places: int
-    sprung: bool = field(default=True, kw_only=True)
-    price: float = field(default=0.0, kw_only=True)
+    locations: int
+    suspension_stated: bool = field(default=True, kw_only=True)
+    selection_penalty: float = field(default=0.0, kw_only=True)
 
     @property
     def name(self) -> str:
         """For people and keys."""
         extra = "" if len(self.effect.strengths) == 1 else f".{self.parameter.name}"
-        return f"{self.effect.name}{extra}@{self.place}"
+        return f"{self.effect.name}{extra}@{self.location}"
 
     @property
-    def spread(self) -> float:
+    def prior_sd(self) -> float:
         """Standard deviation of its value before any data."""
         parameter = self.parameter
-        return USUAL * abs(parameter.typical) if parameter.typical else 0.5 * (parameter.high - parameter.low)
+        return (
+            PRIOR_SD_IN_TYPICAL_SIZES * abs(parameter.typical)
+            if parameter.typical
+            else 0.5 * (parameter.high - parameter.low)
+        )
 
     def members(self) -> tuple[int, ...]:
         """Members of the effect's scope it moves."""
-        return PLACES[self.effect.scope][self.place]
+        return LOCATIONS[self.effect.scope][self.location]
 
-    def applied(self, world: World, value: float) -> World:
+    def applied(self, world: ParameterSet, value: float) -> ParameterSet:
         """The world with this number set (added to what is there) at this place."""
         theta: Floats = world.theta.copy()
         start = THETA.slice(self.effect.name, self.parameter.name).start
@@ -131,7 +135,7 @@ def candidates(
     }
     found = []
     for effect in dict.fromkeys(column.effect for column in of):
-        groups = PLACES[effect.scope]
+        groups = LOCATIONS[effect.scope]
         if effect.scope is Scope.WHEEL and all(joint.startswith(_MOTOR) for joint in effect.joints):
             groups = {place: members for place, members in groups.items() if not {*members} & {*undriven}}
         if effect.scope is Scope.NODE:
@@ -140,6 +144,8 @@ def candidates(
             for place, members in groups.items():
                 at = tuple(index[effect.name, parameter.name, member] for member in members)
                 found.append(
-                    Candidate(effect, parameter, place, at, len(groups) * len(effect.strengths), sprung=sprung)
+                    Candidate(
+                        effect, parameter, place, at, len(groups) * len(effect.strengths), suspension_stated=sprung
+                    )
                 )
     return found

@@ -19,14 +19,14 @@ import numpy as np
 from dbc.bench_messages import ManoeuvreState
 from hil.diagnosis.data.log import CHANNELS, MOTOR_DEMAND, PRESSURE_DEMAND, Floats, Log, make_log
 from hil.diagnosis.data.prepare import prepare
-from hil.diagnosis.estimation.information import project, sums, track_columns
+from hil.diagnosis.estimation.information import finite_difference_jacobian, information_blocks, marginalise
 from hil.diagnosis.estimation.terms import Candidate, Column, candidates, columns
-from hil.diagnosis.isolation.groups import APART, remaining, summed
+from hil.diagnosis.isolation.groups import ISOLABILITY_SIGMA, remaining, summed
 from hil.diagnosis.noise.estimate import first_guess
-from hil.diagnosis.noise.model import Frame, Noise, tracks_of
+from hil.diagnosis.noise.model import Noise, SampleMasks, tracks_of
 from hil.diagnosis.simulation.measurement_model import Stack
-from hil.diagnosis.simulation.parameter_set import World, nominal
-from hil.diagnosis.simulation.simulator import Rig
+from hil.diagnosis.simulation.parameter_set import ParameterSet, nominal
+from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import paper_car
 from hil.diagnosis.vehicle.spec import Vehicle
 from hil.errors import BrakebenchError
@@ -38,7 +38,7 @@ from plant.model import pack
 from plant.node import PlantNode
 from plant.vectors import INPUT
 
-MOST = 3
+MAX_RECOMMENDATIONS = 3
 STRAIGHT_STOP = "straight_stop"
 """Of `plant.effects.manoeuvres`: what every drive is compared with."""
 FOLDER = "decide_with"
@@ -49,7 +49,7 @@ _OF_THE_ROAD = ("road_grade.grade", "headwind.wind_mps")
 
 
 @dataclass(frozen=True, slots=True)
-class Advice:
+class Recommendation:
     """One drive.
 
     Attributes
@@ -67,7 +67,7 @@ class Advice:
     both_ways: bool
 
     def as_json(self, path: Path | None = None) -> dict[str, Any]:
-        """Entry of ``decide_with``; the scenario by its file where it was written."""
+        """Entry of ``discriminating_manoeuvres``; the scenario by its file where it was written."""
         return {
             "scenario": self.scenario if path is None else str(path),
             "why": self.why,
@@ -75,7 +75,7 @@ class Advice:
         }
 
 
-def decide_with(effects: Sequence[str], most: int = MOST) -> list[Advice]:
+def discriminating_manoeuvres(effects: Sequence[str], most: int = MAX_RECOMMENDATIONS) -> list[Recommendation]:
     """Scenarios that tell these effects apart, the best first; none where no scenario of the library does.
 
     Places and numbers of one effect need not be told from each other.
@@ -97,8 +97,8 @@ def decide_with(effects: Sequence[str], most: int = MOST) -> list[Advice]:
     found = []
     for name in _library():
         apart = _separation(name, items, both)
-        if apart >= APART:
-            found.append(Advice(name, _why(name, items, apart, before, both), apart, before, both))
+        if apart >= ISOLABILITY_SIGMA:
+            found.append(Recommendation(name, _why(name, items, apart, before, both), apart, before, both))
     return sorted(found, key=lambda advice: -advice.separation)[:most]
 
 
@@ -109,7 +109,7 @@ def separation(scenario: str, effects: Sequence[str]) -> float:
     return _separation(scenario, items, both)
 
 
-def write(advice: Sequence[Advice], folder: Path) -> list[Path]:
+def write(advice: Sequence[Recommendation], folder: Path) -> list[Path]:
     """Write the scenarios into ``folder/decide_with``, for ``brakebench run FILE``; their paths, in order."""
     into = Path(folder) / FOLDER
     if advice:
@@ -139,7 +139,7 @@ def _items(effects: Sequence[str]) -> list[Candidate]:
         return [listed[0] for listed in choices]
     flat = [candidate for listed in choices for candidate in listed]
     products = _products(STRAIGHT_STOP, flat, False)
-    precision, sizes = np.array([c.spread**-2.0 for c in flat]), [c.parameter.typical for c in flat]
+    precision, sizes = np.array([c.prior_sd**-2.0 for c in flat]), [c.parameter.typical for c in flat]
     found, begin = [], 0
     for listed in choices:
         own = range(begin, begin + len(listed))
@@ -160,7 +160,7 @@ def _choices(name: str) -> list[Candidate]:
     exact = [c for c in listed if c.name == name]
     if exact:
         return exact
-    of_effect = [c for c in listed if c.effect.name == name and (c.place == "car" or c.effect.scope is Scope.NODE)]
+    of_effect = [c for c in listed if c.effect.name == name and (c.location == "car" or c.effect.scope is Scope.NODE)]
     if not of_effect:
         known = sorted({c.effect.name for c in listed} | {c.name for c in listed})
         near = get_close_matches(name, known, 3) or ["`brakebench effects` lists them"]
@@ -204,18 +204,18 @@ def _driven(scenario: Scenario) -> Drive:
 
 
 @dataclass(frozen=True, eq=False)
-class _Ground:
+class _Linearisation:
     """A drive ready for signatures: the car in the study as it is, and the noise."""
 
-    rig: Rig
-    frame: Frame
+    rig: Simulator
+    frame: SampleMasks
     noise: Noise
-    world: World
+    world: ParameterSet
     base: Stack
 
 
 @cache
-def _ground(name: str, both_ways: bool, to_ground: bool) -> _Ground:
+def _ground(name: str, both_ways: bool, to_ground: bool) -> _Linearisation:
     """A scenario as logs of our own car with nothing hidden, prepared as measured ones are; ``to_ground``: with the
     speed over ground."""
     car = _car()
@@ -228,17 +228,17 @@ def _ground(name: str, both_ways: bool, to_ground: bool) -> _Ground:
     radius = float(car.parameters.wheel.rolling_radius_m)
     logs = [_log(name, driven, disc_k, direction, to_ground) for direction in ((1, -1) if both_ways else (1,))]
     world = nominal(car)
-    rig = Rig(prepare(logs, radius), car).quieted(world)
-    rig.keep(world)
-    frame, base = _settled(Frame.of(rig.case)), rig.run(world)
+    rig = Simulator(prepare(logs, radius), car).denoised(world)
+    rig.cache_baseline(world)
+    frame, base = _settled(SampleMasks.of(rig.dataset)), rig.run(world)
     residual = tracks_of(rig.residual(world), frame, radius)
-    return _Ground(rig, frame, first_guess(residual, frame), world, base)
+    return _Linearisation(rig, frame, first_guess(residual, frame), world, base)
 
 
-def _settled(frame: Frame) -> Frame:
+def _settled(frame: SampleMasks) -> SampleMasks:
     """Without the first moments of each segment: replays begin them without slip, a driven car does not."""
-    begun = np.flatnonzero((frame.fresh > 0.5) | (frame.restart > 0.5))
-    late = np.ones(len(frame.fresh))
+    begun = np.flatnonzero((frame.log_start > 0.5) | (frame.segment_start > 0.5))
+    late = np.ones(len(frame.log_start))
     for k in begun:
         late[k : k + round(_SETTLE_S / frame.sample_s)] = 0.0
     return replace(frame, present={name: known * late for name, known in frame.present.items()})
@@ -265,7 +265,7 @@ def _log(name: str, driven: Drive, disc_k: float, direction: int, to_ground: boo
 def _separation(name: str, items: Sequence[Candidate], both_ways: bool) -> float:
     """Worst separation of the items at their usual sizes."""
     products = _products(name, items, both_ways)
-    precision = np.array([c.spread**-2.0 for c in items])
+    precision = np.array([c.prior_sd**-2.0 for c in items])
     left = []
     for k, item in enumerate(items):
         others = [j for j, other in enumerate(items) if other.effect.name != item.effect.name]
@@ -279,9 +279,9 @@ def _products(name: str, items: Sequence[Candidate], both_ways: bool) -> Floats:
     ground, of = _ground(name, both_ways, to_ground), _all()[0]
     needed = sorted({k for candidate in items for k in candidate.columns})
     worlds = [of[k].stepped(ground.world) for k in needed]
-    tracks = track_columns(ground.rig, ground.frame, ground.base, worlds, [of[k].step for k in needed])
+    tracks = finite_difference_jacobian(ground.rig, ground.frame, ground.base, worlds, [of[k].step for k in needed])
     nothing = {track: np.zeros((len(values), 1)) for track, values in tracks.items()}
-    q = project(sums(nothing, tracks, ground.frame, ground.noise, 0).total(), 0).q
+    q = marginalise(information_blocks(nothing, tracks, ground.frame, ground.noise, 0).total(), 0).q
     return summed(q, [replace(c, columns=tuple(needed.index(k) for k in c.columns)) for c in items])
 
 

@@ -12,14 +12,14 @@ import numpy as np
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.estimation.terms import Candidate
 
-APART = 2.0
+ISOLABILITY_SIGMA = 2.0
 """Standard deviations that must be left of a signature for it to be told from its imitation."""
 MOST_RIVALS = 4
 _LEAST_SHARE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Tied:
+class IsolabilityGroup:
     """What imitates a candidate of a certain value.
 
     Attributes
@@ -28,13 +28,13 @@ class Tied:
         be tied with it. A single one where that is enough.
     values : their values in the imitation: with the named one's, a null vector of the information.
     apart : standard deviations left after the best imitation, the rivals' usual sizes held against them.
-    alone : standard deviations it stands out with nothing to imitate it; below `APART` nothing is to be told.
+    alone : standard deviations it stands out with nothing to imitate it; below `ISOLABILITY_SIGMA` nothing is to be told.
     pairs : each rival that imitates it alone, with the standard deviations left, the closest first.
     """
 
     members: tuple[int, ...]
     values: tuple[float, ...]
-    apart: float
+    separation: float
     alone: float
     pairs: tuple[tuple[int, float], ...]
 
@@ -52,7 +52,9 @@ def summed(q: Floats, candidates: Sequence[Candidate], offset: int = 0) -> Float
     return np.asarray(moves @ q @ moves.T)
 
 
-def tied_set(q: Floats, candidates: Sequence[Candidate], named: int, value: float, offset: int = 0) -> Tied:
+def isolability_group(
+    q: Floats, candidates: Sequence[Candidate], named: int, value: float, offset: int = 0
+) -> IsolabilityGroup:
     """What cannot be told from ``candidates[named]`` of size ``value`` by these data.
 
     Places of the same effect are no rivals; values of rivals stay within their bounds.
@@ -60,12 +62,12 @@ def tied_set(q: Floats, candidates: Sequence[Candidate], named: int, value: floa
     Parameters
     ----------
     q : (columns, columns) whitened products after the nuisances are projected out
-        (`hil.diagnosis.estimation.information.Projected`); the named candidate must not be projected out.
+        (`hil.diagnosis.estimation.information.Marginal`); the named candidate must not be projected out.
     candidates : their ``columns`` count from ``offset`` in ``q``.
     value : of the named one, in its unit.
     """
     bounds = np.array([(c.parameter.low, c.parameter.high) for c in candidates])
-    precision = np.array([c.spread for c in candidates]) ** -2.0
+    precision = np.array([c.prior_sd for c in candidates]) ** -2.0
     own = candidates[named].effect.name
     allowed = np.array([c.effect.name != own for c in candidates])
     return imitation(summed(q, candidates, offset), precision, bounds, named, value, allowed)
@@ -73,8 +75,8 @@ def tied_set(q: Floats, candidates: Sequence[Candidate], named: int, value: floa
 
 def imitation(
     products: Floats, precision: Floats, bounds: Floats, named: int, value: float, allowed: Floats | None = None
-) -> Tied:
-    """`tied_set` on plain numbers.
+) -> IsolabilityGroup:
+    """`isolability_group` on plain numbers.
 
     Parameters
     ----------
@@ -86,17 +88,17 @@ def imitation(
     rivals &= np.diag(products) > 0.0
     total = value * value * max(float(products[named, named]), 0.0)
     alone = float(np.sqrt(total))
-    if alone < APART:
-        return Tied((), (), alone, alone, ())
+    if alone < ISOLABILITY_SIGMA:
+        return IsolabilityGroup((), (), alone, alone, ())
     left = _pairwise(products, precision, bounds, named, value)
     left[~rivals] = np.inf
-    pairs = tuple((int(k), float(left[k])) for k in np.argsort(left) if left[k] < APART)
+    pairs = tuple((int(k), float(left[k])) for k in np.argsort(left) if left[k] < ISOLABILITY_SIGMA)
     chosen = _forward(products, precision, bounds, named, value, rivals)
     chosen = _backward(products, precision, bounds, named, value, chosen)
     values, apart = _jointly(products, precision, named, value, chosen)
-    if apart >= APART:
-        return Tied((), (), apart, alone, pairs)
-    return Tied(tuple(chosen), tuple(values.tolist()), apart, alone, pairs)
+    if apart >= ISOLABILITY_SIGMA:
+        return IsolabilityGroup((), (), apart, alone, pairs)
+    return IsolabilityGroup(tuple(chosen), tuple(values.tolist()), apart, alone, pairs)
 
 
 def remaining(products: Floats, precision: Floats, named: int, value: float, rivals: Sequence[int]) -> float:
@@ -134,7 +136,7 @@ def _forward(
     """The rival that helps most, again and again, until what is left is within the noise."""
     chosen: list[int] = []
     left = remaining(products, precision, named, value, chosen)
-    while left >= APART and len(chosen) < MOST_RIVALS:
+    while left >= ISOLABILITY_SIGMA and len(chosen) < MOST_RIVALS:
         found = _next(products, precision, bounds, named, value, rivals, chosen)
         if found is None:
             break
@@ -174,6 +176,6 @@ def _backward(
     for k in list(chosen):
         rest = [other for other in chosen if other != k]
         values, left = _jointly(products, precision, named, value, rest)
-        if rest and left < APART and np.all((values >= bounds[rest, 0]) & (values <= bounds[rest, 1])):
+        if rest and left < ISOLABILITY_SIGMA and np.all((values >= bounds[rest, 0]) & (values <= bounds[rest, 1])):
             chosen = rest
     return chosen

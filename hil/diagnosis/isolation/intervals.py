@@ -4,9 +4,9 @@ import numpy as np
 
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.result import Diagnosis
-from hil.diagnosis.estimation.aliases import same_number
-from hil.diagnosis.estimation.information import Sums, solve, sums
-from hil.diagnosis.estimation.model_discrepancy import variance_of
+from hil.diagnosis.estimation.aliases import alias_of
+from hil.diagnosis.estimation.information import InformationBlocks, information_blocks, solve
+from hil.diagnosis.estimation.model_discrepancy import variance_inflation
 from hil.diagnosis.estimation.terms import Candidate
 
 DEVIATION_BY_FORM = 0.05
@@ -19,7 +19,9 @@ _TWO_SIDED_95 = 1.96
 
 def half_width(candidate: Candidate, value: float, deviation: float) -> float:
     """Half of a 95 % interval, of a value whose standard deviation by noise is ``deviation``."""
-    return _TWO_SIDED_95 * float(np.sqrt(variance_of(candidate) * deviation**2 + (DEVIATION_BY_FORM * value) ** 2))
+    return _TWO_SIDED_95 * float(
+        np.sqrt(variance_inflation(candidate) * deviation**2 + (DEVIATION_BY_FORM * value) ** 2)
+    )
 
 
 def intervals(found: Diagnosis) -> list[tuple[float, float]]:
@@ -30,11 +32,11 @@ def intervals(found: Diagnosis) -> list[tuple[float, float]]:
     model, fitter = found.final, found.fitter
     if not model.terms:
         return []
-    world, nuisances = fitter.base.shifted(fitter.nuisances, model.z), fitter.nuisances
+    world, nuisances = fitter.base.with_nuisances(fitter.nuisances, model.z), fitter.nuisances
     bounds = []
-    for term, deviation in zip(model.terms, deviations(found), strict=True):
+    for term, deviation in zip(model.terms, standard_deviations(found), strict=True):
         half = half_width(term.candidate, term.value, float(deviation))
-        same = same_number(term, nuisances, world)
+        same = alias_of(term, nuisances, world)
         if same is not None:
             half = max(half, _TWO_SIDED_95 * same.deviation(nuisances))
         parameter = term.candidate.parameter
@@ -43,12 +45,12 @@ def intervals(found: Diagnosis) -> list[tuple[float, float]]:
     return bounds
 
 
-def deviations(found: Diagnosis) -> Floats:
+def standard_deviations(found: Diagnosis) -> Floats:
     """Standard deviation of each value by noise: curvature of the likelihood, more where manoeuvres disagree."""
     model, fitter = found.final, found.fitter
-    own, count = fitter.term_columns(model), len(fitter.nuisances)
-    columns = {name: np.hstack([values, own[name]]) for name, values in fitter.columns_at(model).items()}
-    of = sums(model.residual, columns, fitter.frame, found.noise, count)
+    own, count = fitter.term_jacobian(model), len(fitter.nuisances)
+    columns = {name: np.hstack([values, own[name]]) for name, values in fitter.nuisance_jacobian_at(model).items()}
+    of = information_blocks(model.residual, columns, fitter.masks, found.noise, count)
     _, covariance = solve(of.total(), count, range(len(model.terms)), model.z)
     curvature = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     if len(of.matrix) < _FEW:
@@ -56,7 +58,7 @@ def deviations(found: Diagnosis) -> Floats:
     return np.clip(_drawn(of, count, model.z), curvature, _MOST_SPREAD * curvature)
 
 
-def _drawn(of: Sums, count: int, z: Floats) -> Floats:
+def _drawn(of: InformationBlocks, count: int, z: Floats) -> Floats:
     """Spread of the values over manoeuvres drawn again and again."""
     rng, manoeuvres, width = np.random.default_rng(1), len(of.matrix), of.matrix.shape[1] - 1 - count
     shares = np.full(manoeuvres, 1.0 / manoeuvres)

@@ -8,12 +8,12 @@ import numpy as np
 
 from hil.diagnosis.compiled import compiled
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.noise.innovations import HUBER, UNKNOWN
+from hil.diagnosis.noise.innovations import DIFFUSE_VARIANCE, HUBER
 
 _TOGETHER = 4  # samples whose variances are multiplied before one logarithm is taken
 
 
-def _coloured_each(
+def _channel_likelihoods(
     y: Floats, fresh: Floats, known: Floats, white: Floats, keep: Floats, colour: Floats, off: Floats, size: Floats
 ) -> Floats:  # fmt: skip
     lanes = len(keep)
@@ -46,7 +46,7 @@ def _coloured_each(
     return likelihood - 0.5 * np.log(product)
 
 
-def _moving_each(
+def _longitudinal_likelihoods(
     y: Floats, fresh: Floats, restart: Floats, rolling: Floats, known: Floats, white: Floats, share: Floats,
     step_s: float, keep: Floats, colour: Floats, sensor: Floats, off: Floats, size: Floats,
 ) -> Floats:  # fmt: skip
@@ -59,7 +59,7 @@ def _moving_each(
         if fresh[t] > 0.5:
             x[:] = 0.0
             cov[:] = 0.0
-            cov[0, 0] = UNKNOWN
+            cov[0, 0] = DIFFUSE_VARIANCE
             for i in range(count):
                 cov[1 + i, 1 + i] = colour[i]
         else:
@@ -85,7 +85,7 @@ def _moving_each(
                 x[0] = 0.0
                 cov[0] = 0.0
                 cov[:, 0] = 0.0
-                cov[0, 0] = UNKNOWN
+                cov[0, 0] = DIFFUSE_VARIANCE
         for m in range(3):
             if known[t, m] < 0.5:
                 continue
@@ -134,15 +134,15 @@ def _information_of(off: Floats, size: Floats, limit: float) -> Floats:
     return found
 
 
-coloured_each = compiled(_coloured_each)
+channel_likelihoods = compiled(_channel_likelihoods)
 """One track (samples,), ``known`` (samples,) where it is compared, ``white`` (samples, lanes) variance, ``keep`` and
 ``colour`` (lanes,): what is left of the coloured noise from sample to sample, and its variance. Innovations go into
 ``off`` (samples, lanes), their variances into ``size``, where the track is compared."""
-moving_each = compiled(_moving_each)
+longitudinal_likelihoods = compiled(_longitudinal_likelihoods)
 """The moving car: ``y``, ``known`` and the ``white`` variance that all lanes share are (samples, 3 tracks); ``keep``
 and ``colour`` are (disturbances, lanes), ``sensor`` (3 tracks, lanes) is white variance of their own; ``off`` and
 ``size`` are (samples, 3 tracks, lanes)."""
 
-information_of = compiled(_information_of)
+information_matrix = compiled(_information_of)
 """Products, (lanes, lanes), of what innovations and their variances (samples, 1 + lanes) change from the first lane to
 the others; innovations beyond ``limit`` standard deviations count less, as in the likelihood."""

@@ -7,23 +7,23 @@ from functools import partial
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.noise.batched import coloured_each, information_of, moving_each
+from hil.diagnosis.noise.batched import channel_likelihoods, information_matrix, longitudinal_likelihoods
 from hil.diagnosis.noise.innovations import HUBER
 from hil.diagnosis.noise.model import (
-    LONG,
+    LONGITUDINAL,
     REFERENCE_MPS,
-    Frame,
+    ChannelNoise,
     Noise,
-    Track,
+    SampleMasks,
     scale_of,
     white_variance,
     whiten,
 )
-from hil.diagnosis.parallel import side_by_side
+from hil.diagnosis.parallel import parallel_map
 
 _FLOOR = {"wheel": 5e-4, "ax": 2e-3, "gps": 2e-3, "ay": 2e-3, "yaw": 2e-4, "pressure": 500.0, "motor": 0.05}
 _SHORTEST_S, _LONGEST_S, _LONGEST_MOVING_S = 0.02, 2.0, 30.0  # what is slower is no noise but wants a cause
-_USUAL = ((0.05, 1.0), (0.03, 3.0), (0.03, 2.0), (0.005, 1.0), (0.03, 2.0))
+_TYPICAL = ((0.05, 1.0), (0.03, 3.0), (0.03, 2.0), (0.005, 1.0), (0.03, 2.0))
 _SPREAD = (1.5, 0.7)
 """Disturbances that roads, drivers and sensors usually make (size, time), as in `hil.diagnosis.noise.model.Noise`, and
 the spread of their logarithms."""
@@ -39,13 +39,13 @@ Costs = Callable[[Floats], tuple[Floats, Floats, Floats]]
 """Negative log-likelihoods of points, (points,); innovations and their variances, (samples, points)."""
 
 
-def first_guess(tracks: Mapping[str, Floats], frame: Frame, enabled: bool = True) -> Noise:
+def first_guess(tracks: Mapping[str, Floats], frame: SampleMasks, enabled: bool = True) -> Noise:
     """Sensor noise from second differences of the residual, disturbances of what a road and a driver make."""
     found = {}
     for name, values in tracks.items():
         a = max(_differences(values[:, 0], frame.present[name]), _floor(name))
-        found[name] = Track(a, 1e-6, 3.0 * a, 0.5)
-    return Noise(found, _USUAL if "gps" in tracks else _USUAL[:-1], enabled)
+        found[name] = ChannelNoise(a, 1e-6, 3.0 * a, 0.5)
+    return Noise(found, _TYPICAL if "gps" in tracks else _TYPICAL[:-1], enabled)
 
 
 def _floor(track: str) -> float:
@@ -58,14 +58,14 @@ def _differences(values: Floats, known: Floats) -> float:
     return float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0)) if second.size else 0.0
 
 
-def estimate(tracks: Mapping[str, Floats], frame: Frame, start: Noise) -> Noise:
+def estimate(tracks: Mapping[str, Floats], frame: SampleMasks, start: Noise) -> Noise:
     """Noise of largest likelihood for residual tracks (samples, 1)."""
     noise = start
     for _ in range(1 if start.scales else 2):
-        sides = [name for name in tracks if name not in LONG]
-        found = side_by_side(partial(_of_side, tracks, frame, noise), sides)
+        sides = [name for name in tracks if name not in LONGITUDINAL]
+        found = parallel_map(partial(_channel_noise, tracks, frame, noise), sides)
         noise = replace(noise, tracks={**noise.tracks, **dict(zip(sides, found, strict=True))})
-        noise = _rescaled(tracks, frame, _of_moving(tracks, frame, noise))
+        noise = _rescaled(tracks, frame, _longitudinal_noise(tracks, frame, noise))
     return noise
 
 
@@ -87,7 +87,7 @@ class _Place:
         return step, -0.5 * float(self.slope @ step)
 
 
-def _smallest(costs: Costs, starts: Sequence[Floats], low: Floats, high: Floats, known: Floats) -> Floats:
+def _minimise(costs: Costs, starts: Sequence[Floats], low: Floats, high: Floats, known: Floats) -> Floats:
     """Where the cost is least: from the first start if it is there already, else from the best of all, by scoring.
 
     ``costs`` takes points, (points, numbers), all at once. Steps are those of the information that innovations have of
@@ -98,7 +98,7 @@ def _smallest(costs: Costs, starts: Sequence[Floats], low: Floats, high: Floats,
 
     def here(z: Floats) -> _Place:
         found, off, size = costs(np.vstack([z, z + steps]))
-        information = information_of(off, size, HUBER) / _DIFFERENCE**2 + np.diag(known)
+        information = information_matrix(off, size, HUBER) / _DIFFERENCE**2 + np.diag(known)
         return _Place(z, float(found[0]), (found[1:] - found[0]) / _DIFFERENCE, information)
 
     offered = np.clip(starts, low, high)
@@ -120,11 +120,11 @@ def _smallest(costs: Costs, starts: Sequence[Floats], low: Floats, high: Floats,
     return now.z
 
 
-def _of_side(tracks: Mapping[str, Floats], frame: Frame, noise: Noise, name: str) -> Track:
+def _channel_noise(tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise, name: str) -> ChannelNoise:
     """Noise of a track that all others say nothing of."""
     values, at, floor, known = tracks[name], noise.tracks[name], _floor(name), frame.present[name]
     scaled = values[:, 0] / scale_of(name, frame, noise)
-    common = white_variance(name, Track(0.0, 0.0, 0.0, 1.0), frame)
+    common = white_variance(name, ChannelNoise(0.0, 0.0, 0.0, 1.0), frame)
     faster = np.square(frame.speed_mps / REFERENCE_MPS)
     by_speed = name.startswith("wheel")
 
@@ -134,44 +134,44 @@ def _of_side(tracks: Mapping[str, Floats], frame: Frame, noise: Noise, name: str
         colour = (c**2 if noise.enabled else 0.0 * c) + 1e-16
         keep = np.exp(-frame.sample_s / tau_s)
         off, size = np.zeros(white.shape), np.ones(white.shape)
-        return -coloured_each(scaled, frame.fresh, known, white, keep, colour, off, size), off, size
+        return -channel_likelihoods(scaled, frame.log_start, known, white, keep, colour, off, size), off, size
 
     a = max(_differences(values[:, 0], known), floor)
-    offered = [at, *(Track(a, 0.0, share * a, tau_s) for share in _COLOURS for tau_s in _TIMES_S)]
+    offered = [at, *(ChannelNoise(a, 0.0, share * a, tau_s) for share in _COLOURS for tau_s in _TIMES_S)]
     starts = [np.log([one.a, one.c, one.tau_s, max(one.b, 0.3 * one.a)]) for one in offered]
     low = np.array([np.log(floor), -_FAR, np.log(_SHORTEST_S), -_FAR])
     high = np.array([_FAR, _FAR, np.log(_LONGEST_S), _FAR])
     count = 4 if by_speed else 3
     found = np.exp(
-        _smallest(costs, [start[:count] for start in starts], low[:count], high[:count], np.zeros(count))
+        _minimise(costs, [start[:count] for start in starts], low[:count], high[:count], np.zeros(count))
     ).tolist()
-    return Track(found[0], found[3] if by_speed else 0.0, found[1], found[2])
+    return ChannelNoise(found[0], found[3] if by_speed else 0.0, found[1], found[2])
 
 
-def _of_moving(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> Noise:
+def _longitudinal_noise(tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise) -> Noise:
     """Noise with that of the moving car's tracks, and of all that disturbs it."""
-    there = [name for name in LONG if name in tracks]
+    there = [name for name in LONGITUDINAL if name in tracks]
     if not there:
         return noise
-    samples, scale, count = len(frame.fresh), scale_of("long", frame, noise), len(noise.disturbances)
-    usual, spread = np.log(np.array(_USUAL[:count]).T.ravel()), np.repeat(_SPREAD, count)
+    samples, scale, count = len(frame.log_start), scale_of("long", frame, noise), len(noise.disturbances)
+    usual, spread = np.log(np.array(_TYPICAL[:count]).T.ravel()), np.repeat(_SPREAD, count)
     share = frame.speed_mps / REFERENCE_MPS
     b = noise.tracks["wheel.front-rear"].b if "wheel.front-rear" in noise.tracks else 0.0
     y, known, white = np.zeros((samples, 3)), np.zeros((samples, 3)), np.zeros((samples, 3))
     for name in there:
-        m = LONG.index(name)
+        m = LONGITUDINAL.index(name)
         y[:, m], known[:, m] = tracks[name][:, 0] / scale, frame.present[name]
-        white[:, m] = white_variance(name, Track(0.0, b if name == "wheel.mean" else 0.0, 0.0, 1.0), frame)
+        white[:, m] = white_variance(name, ChannelNoise(0.0, b if name == "wheel.mean" else 0.0, 0.0, 1.0), frame)
     on = 1.0 if noise.enabled else 0.0
 
     def costs(points: Floats) -> tuple[Floats, Floats, Floats]:
         sizes = np.exp(points.T)
         sensor = np.zeros((3, len(points)))
-        sensor[[LONG.index(name) for name in there]] = sizes[2 * count :] ** 2
+        sensor[[LONGITUDINAL.index(name) for name in there]] = sizes[2 * count :] ** 2
         keep, colour = np.exp(-frame.sample_s / sizes[count : 2 * count]), on * sizes[:count] ** 2 + 1e-12
         off, size = np.zeros((samples, 3, len(points))), np.ones((samples, 3, len(points)))
-        found = moving_each(
-            y, frame.fresh, frame.restart, frame.moving, known, white, share, frame.sample_s, keep, colour, sensor,
+        found = longitudinal_likelihoods(
+            y, frame.log_start, frame.segment_start, frame.moving, known, white, share, frame.sample_s, keep, colour, sensor,
             off, size,
         )  # fmt: skip
         # weak knowledge of sizes and times keeps what the data do not show where roads and cars have it
@@ -185,10 +185,11 @@ def _of_moving(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> Nois
     low = np.array([-_FAR] * count + [np.log(_SHORTEST_S)] * count + [np.log(_floor(name)) for name in there])
     high = np.array([_FAR] * count + [np.log(_LONGEST_MOVING_S)] * count + [_FAR] * len(there))
     before = np.array([*spread**-2, *np.zeros(len(there))])
-    found = np.exp(_smallest(costs, starts, low, high, before)).tolist()
+    found = np.exp(_minimise(costs, starts, low, high, before)).tolist()
     disturbances, white_sizes = tuple(zip(found[:count], found[count : 2 * count], strict=True)), found[2 * count :]
     changed = {
-        name: Track(a, b if name == "wheel.mean" else 0.0, 0.0, 1.0) for name, a in zip(there, white_sizes, strict=True)
+        name: ChannelNoise(a, b if name == "wheel.mean" else 0.0, 0.0, 1.0)
+        for name, a in zip(there, white_sizes, strict=True)
     }
     return replace(noise, tracks={**noise.tracks, **changed}, disturbances=disturbances)
 
@@ -198,14 +199,14 @@ def _limited(innovations: Floats) -> Floats:
     return np.asarray(np.minimum(innovations**2, HUBER * np.abs(innovations)))
 
 
-def _rescaled(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> Noise:
+def _rescaled(tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise) -> Noise:
     """Scales of the manoeuvres from the innovations, weak ones drawn towards 1."""
     innovations, _ = whiten(tracks, frame, noise)
-    blocks = np.asarray(frame.blocks, np.int64)
+    blocks = np.asarray(frame.segment_id, np.int64)
     count = int(blocks.max()) + 1
     found: dict[str, Floats] = {}
-    for name in ("long", *(track for track in tracks if track not in LONG)):
-        members = [track for track in LONG if track in tracks] if name == "long" else [name]
+    for name in ("long", *(track for track in tracks if track not in LONGITUDINAL)):
+        members = [track for track in LONGITUDINAL if track in tracks] if name == "long" else [name]
         squares = sum(np.bincount(blocks, _limited(innovations[m][:, 0]), count) for m in members)
         samples = sum(np.bincount(blocks, frame.present[m], count) for m in members)
         share = np.sqrt((squares + _PRIOR_SAMPLES) / (samples + _PRIOR_SAMPLES))

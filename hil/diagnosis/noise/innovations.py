@@ -10,11 +10,13 @@ from hil.diagnosis.data.log import Floats
 
 HUBER = 6.0
 """Innovations beyond so many standard deviations count in proportion, not squared (Huber 1964)."""
-UNKNOWN = 1e4  # variance of a start that nothing is known of
+DIFFUSE_VARIANCE = 1e4  # variance of a start that nothing is known of
 Three = tuple[Floats, Floats, Floats]
 
 
-def _coloured(y: Floats, scale: Floats, fresh: Floats, white: Floats, phi: float, colour: float, out: Floats) -> float:
+def _channel_innovations(
+    y: Floats, scale: Floats, fresh: Floats, white: Floats, phi: float, colour: float, out: Floats
+) -> float:
     columns = y.shape[1]
     state, innovation = np.zeros(columns), np.zeros(columns)
     variance, likelihood = colour, 0.0
@@ -43,7 +45,7 @@ def _coloured(y: Floats, scale: Floats, fresh: Floats, white: Floats, phi: float
     return likelihood
 
 
-def _moving(
+def _longitudinal_innovations(
     tracks: Three, scale: Floats, fresh: Floats, restart: Floats, rolling: Floats, white: Floats, share: Floats,
     step_s: float, colours: Floats, outs: Three,
 ) -> float:  # fmt: skip
@@ -62,7 +64,7 @@ def _moving(
             cov[:] = 0.0
             for i in range(count):
                 cov[1 + i, 1 + i] = colours[i, 1]
-            cov[0, 0] = UNKNOWN
+            cov[0, 0] = DIFFUSE_VARIANCE
         else:
             step = step_s * rolling[t]
             for k in range(columns):
@@ -87,7 +89,7 @@ def _moving(
                 for i in range(size):
                     cov[0, i] = 0.0
                     cov[i, 0] = 0.0
-                cov[0, 0] = UNKNOWN
+                cov[0, 0] = DIFFUSE_VARIANCE
                 for k in range(columns):
                     x[0, k] = 0.0
         for m in range(3):
@@ -120,11 +122,11 @@ def _moving(
     return likelihood
 
 
-coloured = compiled(_coloured)
+channel_innovations = compiled(_channel_innovations)
 """White noise and AR(1) on one track: (samples, columns) in, innovations of variance 1 into ``out``; log-likelihood of
 the first column, over the ``scale`` of each sample. ``white`` is the variance of each sample, 0 where nothing is
 compared; ``fresh`` begins a log."""
-moving = compiled(_moving)
+longitudinal_innovations = compiled(_longitudinal_innovations)
 """The moving car: three tracks, (samples, columns), of speed, acceleration, ground speed, over their ``scale``.
 
 ``colours`` holds rows (factor from sample to sample, variance) of force, slope, accelerometer and wheel disturbance,

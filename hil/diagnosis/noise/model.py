@@ -7,22 +7,22 @@ from functools import partial
 
 import numpy as np
 
-from hil.diagnosis.data.dataset import SINGLES, Case
+from hil.diagnosis.data.dataset import SINGLES, Dataset
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.noise.innovations import coloured, moving
-from hil.diagnosis.parallel import side_by_side
+from hil.diagnosis.noise.innovations import channel_innovations, longitudinal_innovations
+from hil.diagnosis.parallel import parallel_map
 
 Stack = Mapping[str, Floats]
 REFERENCE_MPS = 20.0
 MODES = np.array([[0.25, 0.25, 0.25, 0.25], [0.25, 0.25, -0.25, -0.25], [0.5, -0.5, 0.0, 0.0], [0.0, 0.0, 0.5, -0.5]])
 MODE_NAMES = ("mean", "front-rear", "left-right front", "left-right rear")
 _SWING_S = 0.3
-LONG = ("wheel.mean", "ax", "gps")
+LONGITUDINAL = ("wheel.mean", "ax", "gps")
 _WIDE = 8  # columns from which on threads are worth their while
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class ChannelNoise:
     """Noise of one track: white variance a^2 + (b v / 20)^2, AR(1) of standard deviation c and time constant tau."""
 
     a: float
@@ -43,34 +43,34 @@ class Noise:
     ``enabled`` False keeps white sensor noise alone: what every test of a free-running simulation must not do.
     """
 
-    tracks: Mapping[str, Track]
+    tracks: Mapping[str, ChannelNoise]
     disturbances: tuple[tuple[float, float], ...]
     enabled: bool = True
     scales: Mapping[str, Floats] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class SampleMasks:
     """What does not change with the residual: masks, starts, speeds, per sample of all drives.
 
     ``waited`` is the variance of each track that comes of frames that wait for the bus: its slope times their time.
     """
 
-    fresh: Floats
-    restart: Floats
+    log_start: Floats
+    segment_start: Floats
     moving: Floats
     speed_mps: Floats
-    blocks: Floats
+    segment_id: Floats
     sample_s: float
     present: Mapping[str, Floats]
     names: tuple[str, ...]
-    waited: Mapping[str, Floats] = field(default_factory=dict)
+    jitter_variance: Mapping[str, Floats] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, case: Case) -> "Frame":
+    def of(cls, case: Dataset) -> "SampleMasks":
         """Of a case."""
         fresh, restart = [], []
-        for drive in case.drives:
+        for drive in case.recordings:
             begin, again = np.zeros(drive.samples), np.zeros(drive.samples)
             begin[0] = 1.0
             for segment in drive.segments[1:]:
@@ -78,7 +78,7 @@ class Frame:
             fresh.append(begin)
             restart.append(again)
         tracks: dict[str, list[Floats]] = {}
-        for drive in case.drives:
+        for drive in case.recordings:
             for group, values in drive.measured.items():
                 shown = _known(group, values, drive.moving, drive.resting)
                 for name, known in shown.items():
@@ -90,32 +90,32 @@ class Frame:
             name: np.where((swings if name in ("ay", "yaw") else begun) > 0.5, 0.0, known)
             for name, known in present.items()
         }
-        twice = _told_twice(case)
+        twice = _redundant_channels(case)
         present = {name: known for name, known in present.items() if known.sum() > 50 and name not in twice}
         return cls(
-            np.concatenate(fresh), np.concatenate(restart), np.concatenate([d.moving for d in case.drives]) * 1.0,
-            np.concatenate([d.speed_mps for d in case.drives]), case.blocks(), case.sample_s, present, tuple(present),
-            _waited(case),
+            np.concatenate(fresh), np.concatenate(restart), np.concatenate([d.moving for d in case.recordings]) * 1.0,
+            np.concatenate([d.speed_mps for d in case.recordings]), case.segment_ids(), case.sample_s, present, tuple(present),
+            _jitter_variance(case),
         )  # fmt: skip
 
 
-def _told_twice(case: Case) -> set[str]:
+def _redundant_channels(case: Dataset) -> set[str]:
     """Tracks of the torques where motors act at one axle alone: what front and rear differ by is the mean again."""
-    torques = [np.nan_to_num(drive.measured["motor"]) for drive in case.drives if "motor" in drive.measured]
+    torques = [np.nan_to_num(drive.measured["motor"]) for drive in case.recordings if "motor" in drive.measured]
     acts = [any(one[:, axle].any() for one in torques) for axle in (slice(0, 2), slice(2, 4))]
     if acts[0] == acts[1]:
         return set()
     return {"motor.front-rear", f"motor.left-right {'rear' if acts[0] else 'front'}"}
 
 
-def _waited(case: Case) -> dict[str, Floats]:
+def _jitter_variance(case: Dataset) -> dict[str, Floats]:
     """Variance by waiting of all tracks but the wheels', whose stamps are the log's.
 
     At a corner the steeper side counts; two rows of a sample wait apart.
     """
     found: dict[str, list[Floats]] = {}
-    for drive in case.drives:
-        wait = drive.wait_s / (drive.stride**0.5 * case.sample_s)
+    for drive in case.recordings:
+        wait = drive.timestamp_jitter_s / (drive.stride**0.5 * case.sample_s)
         for group, values in drive.measured.items():
             if group in ("wheel", "gps"):
                 continue
@@ -141,7 +141,7 @@ def _known(group: str, values: Floats, moving_now: Floats, resting: Floats) -> d
     return {f"{group}.{mode}": known * 1.0 for mode in MODE_NAMES}
 
 
-def tracks_of(stack: Stack, frame: Frame, radius_m: float) -> dict[str, Floats]:
+def tracks_of(stack: Stack, frame: SampleMasks, radius_m: float) -> dict[str, Floats]:
     """Residuals or sensitivities (samples, channels) of groups as tracks (samples, 1); wheel speeds as m/s."""
     found: dict[str, Floats] = {}
     for group, values in stack.items():
@@ -158,7 +158,7 @@ def tracks_of(stack: Stack, frame: Frame, radius_m: float) -> dict[str, Floats]:
 
 
 def whiten(
-    tracks: Mapping[str, Floats], frame: Frame, noise: Noise, into: Mapping[str, Floats] | None = None
+    tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise, into: Mapping[str, Floats] | None = None
 ) -> tuple[dict[str, Floats], float]:
     """Innovations by track, (samples, columns), in the precision given, and the log-likelihood of the first column.
 
@@ -166,64 +166,72 @@ def whiten(
     """
     out = {name: np.empty_like(values) for name, values in tracks.items()} if into is None else dict(into)
     apart: list[Callable[[], float]] = [
-        partial(_side, name, values, frame, noise, out[name]) for name, values in tracks.items() if name not in LONG
+        partial(_whiten_channel, name, values, frame, noise, out[name])
+        for name, values in tracks.items()
+        if name not in LONGITUDINAL
     ]
-    if any(name in tracks for name in LONG):
-        apart.insert(0, partial(_long, tracks, frame, noise, out))
+    if any(name in tracks for name in LONGITUDINAL):
+        apart.insert(0, partial(_whiten_longitudinal, tracks, frame, noise, out))
     wide = max((values.shape[1] for values in tracks.values()), default=0) >= _WIDE
-    return out, sum(side_by_side(operator.call, apart) if wide else (one() for one in apart))
+    return out, sum(parallel_map(operator.call, apart) if wide else (one() for one in apart))
 
 
-def whitened(tracks: Mapping[str, Floats], frame: Frame, noise: Noise) -> Floats:
+def whitened(tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise) -> Floats:
     """Innovations of all tracks, one below the other in the frame's order, (tracks samples, columns)."""
-    samples, (columns, kind) = len(frame.fresh), next((one.shape[1], one.dtype) for one in tracks.values())
+    samples, (columns, kind) = len(frame.log_start), next((one.shape[1], one.dtype) for one in tracks.values())
     joined = np.empty((len(frame.names) * samples, columns), kind)
     parts = {name: joined[k * samples : (k + 1) * samples] for k, name in enumerate(frame.names)}
     whiten(tracks, frame, noise, parts)
     return joined
 
 
-def white_variance(name: str, track: Track, frame: Frame) -> Floats:
+def white_variance(name: str, track: ChannelNoise, frame: SampleMasks) -> Floats:
     """Variance of the white noise of a track, by sample; 0 where nothing is known."""
     variance: float | Floats = track.a**2
     if track.b:
         variance = variance + (track.b * frame.speed_mps / REFERENCE_MPS) ** 2
-    if name in frame.waited:
-        variance = variance + frame.waited[name]
+    if name in frame.jitter_variance:
+        variance = variance + frame.jitter_variance[name]
     return np.asarray(variance * frame.present[name])
 
 
-def scale_of(name: str, frame: Frame, noise: Noise) -> Floats:
+def scale_of(name: str, frame: SampleMasks, noise: Noise) -> Floats:
     """Scale of every sample."""
     scales = noise.scales.get(name)
-    return np.ones(len(frame.fresh)) if scales is None else np.asarray(scales[np.asarray(frame.blocks, np.int64)])
+    return (
+        np.ones(len(frame.log_start)) if scales is None else np.asarray(scales[np.asarray(frame.segment_id, np.int64)])
+    )
 
 
-def kept(tau_s: float, step_s: float) -> float:
+def ar1_coefficient(tau_s: float, step_s: float) -> float:
     """What is left of coloured noise from sample to sample."""
     return float(np.exp(-step_s / max(tau_s, 1e-3)))
 
 
-def _long(tracks: Mapping[str, Floats], frame: Frame, noise: Noise, out: Mapping[str, Floats]) -> float:
-    scale, white = scale_of("long", frame, noise), np.zeros((len(frame.fresh), 3))
-    likelihood, there = 0.0, [name for name in LONG if name in tracks]
+def _whiten_longitudinal(
+    tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise, out: Mapping[str, Floats]
+) -> float:
+    scale, white = scale_of("long", frame, noise), np.zeros((len(frame.log_start), 3))
+    likelihood, there = 0.0, [name for name in LONGITUDINAL if name in tracks]
     for name in there:
         likelihood -= float(np.log(scale) @ frame.present[name])
-        white[:, LONG.index(name)] = white_variance(name, noise.tracks[name], frame)
+        white[:, LONGITUDINAL.index(name)] = white_variance(name, noise.tracks[name], frame)
     on = 1.0 if noise.enabled else 0.0
-    colours = np.array([(kept(tau, frame.sample_s), on * size**2 + 1e-12) for size, tau in noise.disturbances])
+    colours = np.array(
+        [(ar1_coefficient(tau, frame.sample_s), on * size**2 + 1e-12) for size, tau in noise.disturbances]
+    )
     share = frame.speed_mps / REFERENCE_MPS
-    nothing = np.empty_like(tracks[there[0]]) if len(there) < len(LONG) else None
-    given = tuple(np.ascontiguousarray(tracks.get(name, nothing)) for name in LONG)
-    told = tuple(out.get(name, nothing) for name in LONG)
-    how = (scale, frame.fresh, frame.restart, frame.moving, white, share, frame.sample_s, colours)
-    return likelihood + float(moving(given, *how, told))
+    nothing = np.empty_like(tracks[there[0]]) if len(there) < len(LONGITUDINAL) else None
+    given = tuple(np.ascontiguousarray(tracks.get(name, nothing)) for name in LONGITUDINAL)
+    told = tuple(out.get(name, nothing) for name in LONGITUDINAL)
+    how = (scale, frame.log_start, frame.segment_start, frame.moving, white, share, frame.sample_s, colours)
+    return likelihood + float(longitudinal_innovations(given, *how, told))
 
 
-def _side(name: str, values: Floats, frame: Frame, noise: Noise, out: Floats) -> float:
+def _whiten_channel(name: str, values: Floats, frame: SampleMasks, noise: Noise, out: Floats) -> float:
     track, scale = noise.tracks[name], scale_of(name, frame, noise)
     white = white_variance(name, track, frame)
     colour = track.c**2 if noise.enabled else 0.0
-    keep = kept(track.tau_s, frame.sample_s)
-    value = coloured(values, scale, frame.fresh, white, keep, colour + 1e-16, out)
+    keep = ar1_coefficient(track.tau_s, frame.sample_s)
+    value = channel_innovations(values, scale, frame.log_start, white, keep, colour + 1e-16, out)
     return float(value) - float(np.log(scale) @ frame.present[name])

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.detection.profile_fit import Contender, worse
-from hil.diagnosis.detection.result import TIED
+from hil.diagnosis.detection.profile_fit import FittedHypothesis, delta_chi2
+from hil.diagnosis.detection.result import INDISTINGUISHABLE
 from hil.diagnosis.estimation.gauss_newton import Model
 from hil.diagnosis.result.answer import Answer
-from hil.diagnosis.result.cross_validation import Gain, probabilities
+from hil.diagnosis.result.cross_validation import HeldOutError, probabilities
 from hil.diagnosis.result.residual_patterns import UNITS, WORDS
 from hil.report.report import Chart, Curve, Number, Panel, Report, Section, Table, Trace, Verdict
 from hil.report.units import BAR, Display, Unit
@@ -38,7 +38,7 @@ _PANELS = (
 
 def build_report(answer: Answer, sources: Sequence[str]) -> Report:
     """Build the report."""
-    content, found = answer.json, answer.found
+    content, found = answer.json, answer.diagnosis
     verdict = content["verdict"]
     return Report(
         title="Measured data against the simulation",
@@ -49,7 +49,7 @@ def build_report(answer: Answer, sources: Sequence[str]) -> Report:
             _comparison(answer), _missed(answer), *_laws(answer), _race(answer), _gained(answer), _limits(answer),
         ),
         provenance={
-            "logs": list(sources), "segments": len(found.case.segments), "replays": found.fitter.rig.runs,
+            "logs": list(sources), "segments": len(found.dataset.segments), "replays": found.fitter.simulator.runs,
             "extension": content["extension"] or "not written", "remarks": content["remarks"],
         },
     )  # fmt: skip
@@ -73,14 +73,14 @@ def _numbers(answer: Answer) -> list[Number]:
             label = f"{cause['effect']}{which}, {cause['wheel']}"
             numbers.append(Number(label, entry["value"], entry["unit"], note=f"95 %: {low:.4g} to {high:.4g}"))
         numbers.append(Number("its probability", 100.0 * cause["probability"], "%"))
-    best = _most_gained(answer.gains)
+    best = _most_gained(answer.held_out)
     if best is not None and best.before > 0.0:
         note = f"{WORDS[best.channel]}, on manoeuvres no fit saw"
         numbers.append(Number("Held-out error removed", 100.0 * (1.0 - best.after / best.before), "%", note=note))
     return numbers
 
 
-def _most_gained(gains: Sequence[Gain]) -> Gain | None:
+def _most_gained(gains: Sequence[HeldOutError]) -> HeldOutError | None:
     shown = [g for g in gains if g.channel in ("wheel.mean", "ax", "gps", "pressure.mean", "motor.mean")]
     return max(shown, key=lambda g: 1.0 - g.after / max(g.before, 1e-12), default=None)
 
@@ -88,8 +88,8 @@ def _most_gained(gains: Sequence[Gain]) -> Gain | None:
 def _joined_time(answer: Answer) -> tuple[Floats, Floats]:
     """Time over all logs in a row, and a gap before each log."""
     times, gaps, begin = [], [], 0.0
-    for drive in answer.found.case.drives:
-        times.append(begin + np.arange(drive.samples) * answer.found.case.sample_s)
+    for drive in answer.diagnosis.dataset.recordings:
+        times.append(begin + np.arange(drive.samples) * answer.diagnosis.dataset.sample_s)
         gap = np.zeros(drive.samples, bool)
         gap[0] = True
         gaps.append(gap)
@@ -105,20 +105,20 @@ def _mean(values: Floats) -> Floats:
 
 def _comparison(answer: Answer) -> Section:
     """Measured, as handed in, and extended, over all logs in a row; residuals below."""
-    found = answer.found
+    found = answer.diagnosis
     t, gaps = _joined_time(answer)
-    measured = found.fitter.rig.measured()
+    measured = found.fitter.simulator.measured()
     panels = []
     for group, title in _PANELS:
-        if group not in found.case.groups:
+        if group not in found.dataset.groups:
             continue
         factor = found.fitter.radius if group == "wheel" else 1.0
         unit: Unit = _SHOWN.get(group, "m/s²")
         known = _mean(measured[group]) * factor
-        shown = ~gaps & (found.fitter.frame.present.get("ax", ~gaps) > 0.5) if group == "ax" else ~gaps
+        shown = ~gaps & (found.fitter.masks.present.get("ax", ~gaps) > 0.5) if group == "ax" else ~gaps
         traces = []
         for name, model in _models(answer):
-            simulated = _mean(model.stack[group]) * factor
+            simulated = _mean(model.channels[group]) * factor
             traces.append(
                 Trace(name, t, np.where(shown, simulated, np.nan), group="rl" if name == "handed in" else "fl")
             )
@@ -126,7 +126,7 @@ def _comparison(answer: Answer) -> Section:
         panels.append(Panel(title, unit, tuple(traces)))
         residuals = []
         for name, model in _models(answer):
-            left = known - _mean(model.stack[group]) * factor
+            left = known - _mean(model.channels[group]) * factor
             residuals.append(Trace(name, t, np.where(shown, left, np.nan), group="rl" if name == "handed in" else "fl"))
         panels.append(Panel(f"{title.split(',')[0]}: measured less simulated", unit, tuple(residuals)))
     return Section(
@@ -136,7 +136,7 @@ def _comparison(answer: Answer) -> Section:
 
 
 def _models(answer: Answer) -> list[tuple[str, Model]]:
-    found = answer.found
+    found = answer.diagnosis
     extended = found.final if found.final.terms else found.base
     return [("handed in", found.nominal), ("extended" if found.final.terms else "tuned", extended)]
 
@@ -150,7 +150,7 @@ def _missed(answer: Answer) -> Section:
             round(w.rms / max(w.noise, 1e-12), 1),
             w.pattern,
         )
-        for w in sorted(answer.wrongs, key=lambda w: -w.rms / max(w.noise, 1e-12))
+        for w in sorted(answer.patterns, key=lambda w: -w.rms / max(w.noise, 1e-12))
     )
     table = Table(
         "What the simulation as handed in misses", ("channel", "rms", "unit", "noise", "rms/noise", "goes with"), rows
@@ -167,12 +167,12 @@ def _scaled(value: float, track: str) -> tuple[float, str]:
 
 def _residual_charts(answer: Answer) -> list[Chart]:
     """Residual of the acceleration over what it may go with, in bins, before and after."""
-    found = answer.found
-    if "ax" not in found.case.groups:
+    found = answer.diagnosis
+    if "ax" not in found.dataset.groups:
         return []
-    pressure = np.concatenate([d.pressure_pa for d in found.case.drives])
-    speed = np.concatenate([d.speed_mps for d in found.case.drives])
-    known = found.fitter.frame.present["ax"] > 0.5
+    pressure = np.concatenate([d.pressure_pa for d in found.dataset.recordings])
+    speed = np.concatenate([d.speed_mps for d in found.dataset.recordings])
+    known = found.fitter.masks.present["ax"] > 0.5
     charts = []
     for title, x, mask, label, unit in (
         ("Acceleration residual over pressure", pressure, known, "pressure", BAR),
@@ -222,15 +222,15 @@ def _laws(answer: Answer) -> list[Section]:
 
 def _race(answer: Answer) -> Section:
     """Who was in the race, and how far apart they are."""
-    found = answer.found
+    found = answer.diagnosis
     tables, charts = [], []
-    for k, listed in enumerate(found.races):
+    for k, listed in enumerate(found.selections):
         charts += _behind(f"Cause {k + 1}: how much worse than the best each candidate fits", listed)
         chances = probabilities(listed)
         rows = tuple(
             (
                 c.term.candidate.effect.title, c.term.candidate.name, float(f"{c.term.value:.4g}"),
-                c.term.candidate.parameter.unit, round(worse(c, listed[0]), 1), round(100.0 * p, 1),
+                c.term.candidate.parameter.unit, round(delta_chi2(c, listed[0]), 1), round(100.0 * p, 1),
             )
             for c, p in zip(listed, chances, strict=True)
         )  # fmt: skip
@@ -239,10 +239,10 @@ def _race(answer: Answer) -> Section:
                 f"Cause {k + 1}: candidates, fitted non-linearly",
                 ("candidate", "name", "value", "unit", "Δχ² to the best", "probability %"),
                 rows,
-                note=f"Below Δχ² {TIED} two candidates are rivals. It is divided by the numbers' strain.",
+                note=f"Below Δχ² {INDISTINGUISHABLE} two candidates are rivals. It is divided by the numbers' strain.",
             )
         )
-    top = sorted(found.screened, key=lambda s: -s.gain)[:15]
+    top = sorted(found.scores, key=lambda s: -s.gain)[:15]
     screened = tuple(
         (s.candidate.name, round(s.gain, 1), float(f"{s.value:.4g}"), s.candidate.parameter.unit) for s in top
     )
@@ -251,23 +251,25 @@ def _race(answer: Answer) -> Section:
             "Screen: one linear step each, against noise and tolerances",
             ("candidate", "Δχ²", "value", "unit"),
             screened,
-            note=f"Asked of a cause: Δχ² {found.least_gain:.0f}.",
+            note=f"Asked of a cause: Δχ² {found.detection_threshold:.0f}.",
         )
     )
     bars = Curve("gain", np.arange(1.0, len(top) + 1.0), np.array([s.gain for s in top]), style="points")
-    asked = Curve("asked of a cause", np.array([0.5, len(top) + 0.5]), np.full(2, found.least_gain), style="demand")
+    asked = Curve(
+        "asked of a cause", np.array([0.5, len(top) + 0.5]), np.full(2, found.detection_threshold), style="demand"
+    )
     names = tuple(s.candidate.name for s in top)
     alone = Chart("Screen: explained by each candidate alone", "candidate", "", "Δχ²", "", (bars, asked), names)
     return Section("Candidates", tables=tuple(tables), charts=(*charts, alone) if top else ())
 
 
-def _behind(title: str, listed: Sequence[Contender]) -> list[Chart]:
+def _behind(title: str, listed: Sequence[FittedHypothesis]) -> list[Chart]:
     """Candidates for one cause, as fitted, and the line below which they are rivals."""
     if len(listed) < 2:
         return []
     rows = np.arange(1.0, len(listed) + 1.0)
-    behind = Curve("fitted", rows, np.array([worse(c, listed[0]) for c in listed]), style="points", group="fl")
-    rivals = Curve("rivals below", np.array([0.5, len(listed) + 0.5]), np.full(2, TIED), style="demand")
+    behind = Curve("fitted", rows, np.array([delta_chi2(c, listed[0]) for c in listed]), style="points", group="fl")
+    rivals = Curve("rivals below", np.array([0.5, len(listed) + 0.5]), np.full(2, INDISTINGUISHABLE), style="demand")
     names = tuple(c.term.candidate.name for c in listed)
     return [Chart(title, "candidate", "", "Δχ² to the best", "", (behind, rivals), names)]
 
@@ -280,7 +282,7 @@ def _gained(answer: Answer) -> Section:
             f"{_scaled(g.low, g.channel)[0]:.3g} to {_scaled(g.high, g.channel)[0]:.3g}",
             _scaled(g.after, g.channel)[1],
         )
-        for g in answer.gains
+        for g in answer.held_out
     )  # fmt: skip
     table = Table(
         "Free-running error on manoeuvres that no fit saw (root mean square)",
@@ -291,7 +293,7 @@ def _gained(answer: Answer) -> Section:
 
 def _gain_charts(answer: Answer) -> tuple[Chart, ...]:
     """Held-out error of each channel as a share of the error as handed in."""
-    gains = [g for g in answer.gains if g.before > 0.0]
+    gains = [g for g in answer.held_out if g.before > 0.0]
     if not gains:
         return ()
     x = np.arange(1.0, len(gains) + 1.0)

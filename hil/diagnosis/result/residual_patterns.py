@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import spearmanr
 
-from hil.diagnosis.data.dataset import Case
+from hil.diagnosis.data.dataset import Dataset
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.result import Diagnosis
-from hil.diagnosis.noise.model import Frame, Noise
+from hil.diagnosis.noise.model import Noise, SampleMasks
 from plant.vectors import INPUT
 
 WORDS = {
@@ -29,7 +29,7 @@ _STRONG = 0.25
 
 
 @dataclass(frozen=True)
-class Wrong:
+class ResidualPattern:
     """One channel: root mean square of the residual, what noise alone would leave, and what the rest goes with."""
 
     track: str
@@ -40,10 +40,10 @@ class Wrong:
     pattern: str
 
 
-def wrongs(found: Diagnosis) -> list[Wrong]:
+def residual_patterns(found: Diagnosis) -> list[ResidualPattern]:
     """Of every track, of the simulation as handed in."""
-    frame = found.fitter.frame
-    with_what = _variables(found.case)
+    frame = found.fitter.masks
+    with_what = _variables(found.dataset)
     quiet = _expected(found, frame, found.noise)
     listed = []
     for name in frame.names:
@@ -51,19 +51,19 @@ def wrongs(found: Diagnosis) -> list[Wrong]:
         known = frame.present[name] > 0.5
         rms, noise = float(np.sqrt(np.mean(values[known] ** 2))), quiet[name]
         pattern = "noise" if rms < _SEEN * noise else _pattern(name, values, known, with_what, frame)
-        listed.append(Wrong(name, WORDS[name], UNITS[name.split(".")[0]], rms, noise, pattern))
+        listed.append(ResidualPattern(name, WORDS[name], UNITS[name.split(".")[0]], rms, noise, pattern))
     return listed
 
 
-def _expected(found: Diagnosis, frame: Frame, noise: Noise) -> dict[str, float]:
+def _expected(found: Diagnosis, frame: SampleMasks, noise: Noise) -> dict[str, float]:
     """What noise and disturbance leave: of the final model where it is white, never above the residual's own."""
     final = found.final.residual
     return {name: float(np.sqrt(np.mean(final[name][frame.present[name] > 0.5, 0] ** 2))) for name in frame.names}
 
 
-def _variables(case: Case) -> dict[str, Floats]:
+def _variables(case: Dataset) -> dict[str, Floats]:
     parts: dict[str, list[Floats]] = {}
-    for drive in case.drives:
+    for drive in case.recordings:
         at = np.arange(drive.samples) * drive.stride
 
         def mean(name: str, at: Floats = at, inputs: Floats = drive.inputs) -> Floats:
@@ -83,12 +83,12 @@ def _variables(case: Case) -> dict[str, Floats]:
     return {name: np.concatenate(p) for name, p in parts.items()}
 
 
-def _pattern(name: str, values: Floats, known: Floats, variables: dict[str, Floats], frame: Frame) -> str:
+def _pattern(name: str, values: Floats, known: Floats, variables: dict[str, Floats], frame: SampleMasks) -> str:
     shown = values.copy()
     if name in ("wheel.mean", "gps"):  # the speed's error grows: its slope is what goes with things
         n = 25
         slope = np.convolve(values, np.concatenate((np.ones(n), -np.ones(n))) / (n * n * frame.sample_s), mode="same")
-        restarts = np.convolve((frame.restart + frame.fresh) > 0.5, np.ones(2 * n + 1), mode="same") > 0.5
+        restarts = np.convolve((frame.segment_start + frame.log_start) > 0.5, np.ones(2 * n + 1), mode="same") > 0.5
         shown = np.where(restarts, np.nan, slope)
     step = max(int(0.1 / frame.sample_s), 1)
     found = []

@@ -10,26 +10,26 @@ from scipy.signal import lfilter
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.sensor_consistency.kalman import Linear, innovations
 from hil.diagnosis.sensor_consistency.longitudinal import lag
-from hil.diagnosis.sensor_consistency.model import Model, Number
+from hil.diagnosis.sensor_consistency.model import Parameter, SensorModel
 from hil.diagnosis.sensor_consistency.motion import Motion
 
-_NOISE: Final[Mapping[str, Number]] = {
-    "speed_mps": Number(0.03, 1e-4, 1.0, 0.3, True, 2.0),
-    "force_mps2": Number(0.3, 1e-2, 10.0, 0.3, True, 1.5),
-    "force_s": Number(2.0, 0.1, 100.0, 0.3, True, 1.0),
+_NOISE: Final[Mapping[str, Parameter]] = {
+    "speed_mps": Parameter(0.03, 1e-4, 1.0, 0.3, True, 2.0),
+    "force_mps2": Parameter(0.3, 1e-2, 10.0, 0.3, True, 1.5),
+    "force_s": Parameter(2.0, 0.1, 100.0, 0.3, True, 1.0),
 }
-_NUMBERS: Final[Mapping[str, Number]] = {
-    "brake_mps2_pa": Number(0.0, -1e-4, 1e-4, 1e-6),
-    "delay_s": Number(0.0, -2.0, 2.0, 0.05),
-    "lag_s": Number(0.0, 0.0, 1.0, 0.05),
-    "drive_mps2": Number(0.0, -100.0, 100.0, 1.0),
-    "drive_delay_s": Number(0.0, -2.0, 2.0, 0.05),
-    "engine_mps2": Number(0.0, -10.0, 10.0, 0.2),
-    "drag_mps2": Number(0.0, -10.0, 10.0, 0.2),
-    "drag_1_m": Number(0.0, -0.02, 0.02, 2e-4),
-    "offset_pa": Number(0.0, -5e6, 5e6, 1e4),
-    "by_speed": Number(0.0, -3.0, 3.0, 0.1),
-    "by_pressure": Number(0.0, -3.0, 3.0, 0.1),
+_NUMBERS: Final[Mapping[str, Parameter]] = {
+    "brake_mps2_pa": Parameter(0.0, -1e-4, 1e-4, 1e-6),
+    "delay_s": Parameter(0.0, -2.0, 2.0, 0.05),
+    "lag_s": Parameter(0.0, 0.0, 1.0, 0.05),
+    "drive_mps2": Parameter(0.0, -100.0, 100.0, 1.0),
+    "drive_delay_s": Parameter(0.0, -2.0, 2.0, 0.05),
+    "engine_mps2": Parameter(0.0, -10.0, 10.0, 0.2),
+    "drag_mps2": Parameter(0.0, -10.0, 10.0, 0.2),
+    "drag_1_m": Parameter(0.0, -0.02, 0.02, 2e-4),
+    "offset_pa": Parameter(0.0, -5e6, 5e6, 1e4),
+    "by_speed": Parameter(0.0, -3.0, 3.0, 0.1),
+    "by_pressure": Parameter(0.0, -3.0, 3.0, 0.1),
 }
 _OFF, _GAINING_MPS2 = 0.01, 0.4
 _REFERENCE = (20.0, 5e5)
@@ -37,7 +37,7 @@ LEAST_PA = 2e5
 LEAST_STOPS = 3
 
 
-class Braking(Model):
+class BrakingModel(SensorModel):
     """v' = -g p(t - delay) - engine - drag - c v^2 + drive throttle + force; force is coloured: slope, gear, model.
 
     ``brake_mps2_pa`` is g; ``by_speed`` and ``by_pressure`` change it in proportion to (v - 20 m/s)/20 and
@@ -58,7 +58,7 @@ class Braking(Model):
         self.throttle = np.nan_to_num(motion.channels["throttle"]) if motion.has("throttle") else None
         self._known = (np.isfinite(self.speed) * motion.moving)[:, None]
         without = () if self.throttle is not None else ("drive_mps2", "drive_delay_s", "engine_mps2")
-        self.numbers = {n: v for n, v in _NUMBERS.items() if n not in without}
+        self.parameters = {n: v for n, v in _NUMBERS.items() if n not in without}
         self.stops = _stops(motion, self.pressure)
 
     def force(self, sensor: Mapping[str, float]) -> Floats:

@@ -17,17 +17,17 @@ from hil.diagnosis.data.log import (
     Floats,
     Log,
 )
-from hil.diagnosis.sensor_consistency.braking import LEAST_STOPS, Braking
+from hil.diagnosis.sensor_consistency.braking import LEAST_STOPS, BrakingModel
 from hil.diagnosis.sensor_consistency.coverage import missing, needs
-from hil.diagnosis.sensor_consistency.held_out import Miss, misses
+from hil.diagnosis.sensor_consistency.held_out import HeldOutError, held_out_errors
 from hil.diagnosis.sensor_consistency.labels import Cause, causes_of
-from hil.diagnosis.sensor_consistency.lateral import Turning
-from hil.diagnosis.sensor_consistency.longitudinal import SLIP, Along, known_slip
-from hil.diagnosis.sensor_consistency.memory import load_numbers, write_numbers
+from hil.diagnosis.sensor_consistency.lateral import LateralModel
+from hil.diagnosis.sensor_consistency.longitudinal import SLIP, LongitudinalModel, known_slip
+from hil.diagnosis.sensor_consistency.memory import load_channels, write_channels
 from hil.diagnosis.sensor_consistency.motion import Motion, motion_of
-from hil.diagnosis.sensor_consistency.selection import Found, Say, search
+from hil.diagnosis.sensor_consistency.selection import Progress, SelectionResult, select_parameters
 from hil.diagnosis.sensor_consistency.stops import estimates, nominal_braking, relative_sigma, stop_search
-from hil.diagnosis.sensor_consistency.wheel_radius import SPREAD, Wheels
+from hil.diagnosis.sensor_consistency.wheel_radius import SPREAD, WheelRadiusModel
 from hil.diagnosis.vehicle.spec import Vehicle
 from plant.effects.theta import THETA
 
@@ -47,12 +47,12 @@ class Consistency:
 
     json: dict[str, Any]
     motion: Motion
-    models: Mapping[str, Found]
+    models: Mapping[str, SelectionResult]
     causes: Sequence[Cause]
-    misses: Sequence[Miss]
+    misses: Sequence[HeldOutError]
 
 
-def unforced(logs: Sequence[Log], radius_m: float) -> str:
+def why_not_simulatable(logs: Sequence[Log], radius_m: float) -> str:
     """Why the logs cannot be replayed, empty where they can: no torque is measured, or none that pulls the car."""
     there = set.intersection(*(set(log.channels) for log in logs))
     if {*MOTOR_TORQUE} <= there or {*MOTOR_DEMAND} <= there:
@@ -72,25 +72,25 @@ def unforced(logs: Sequence[Log], radius_m: float) -> str:
 
 
 def check(
-    logs: Sequence[Log], vehicle: Vehicle, why: str, extend: Path | None, out: Path | None, say: Say
+    logs: Sequence[Log], vehicle: Vehicle, why: str, extend: Path | None, out: Path | None, say: Progress
 ) -> Consistency:
     """Compare all channels with the motion; see `hil.diagnosis.explain.explain`."""
     motion = motion_of(logs, float(vehicle.parameters.wheel.rolling_radius_m))
-    handed = {} if extend is None else load_numbers(Path(extend))
+    handed = {} if extend is None else load_channels(Path(extend))
     say("noise, and the accelerometer against the wheels")
     models = _models(motion, vehicle, handed, say)
     causes = [cause for name, found in models.items() for cause in causes_of(name, found, motion.has("speed_mps"))]
     causes.sort(key=lambda c: -c.gain)
     say("measuring the gain on held-out manoeuvres")
-    missed = misses(motion, models)
+    missed = held_out_errors(motion, models)
     written = None
     if out is not None:
         Path(out).mkdir(parents=True, exist_ok=True)
         written = str(Path(out) / "extension.toml")
-        write_numbers(Path(written), models, causes)
+        write_channels(Path(written), models, causes)
     listed = [c.as_json() for c in causes]
     rivals = _rivals(causes, listed)
-    tied = any(c.tied for c in causes)
+    tied = any(c.is_ambiguous for c in causes)
     told = needs(motion, {name for c in causes for name in c.alternatives})
     content = {
         "verdict": "cannot_tell_apart" if tied else "named" if causes else "none",
@@ -120,8 +120,10 @@ def check(
     return Consistency(content, motion, models, causes, missed)
 
 
-def _models(motion: Motion, vehicle: Vehicle, handed: Mapping[str, Mapping[str, float]], say: Say) -> dict[str, Found]:
-    found: dict[str, Found] = {}
+def _models(
+    motion: Motion, vehicle: Vehicle, handed: Mapping[str, Mapping[str, float]], say: Progress
+) -> dict[str, SelectionResult]:
+    found: dict[str, SelectionResult] = {}
     radius = relative_sigma(vehicle, "wheel_rolling_radius_m")
     wheels = motion.has(*(f"wheel_{w}" for w in ("fl", "fr", "rl", "rr")))
     tyre = vehicle.parameters.tyre
@@ -131,25 +133,25 @@ def _models(motion: Motion, vehicle: Vehicle, handed: Mapping[str, Mapping[str, 
             "gain": float(np.hypot(_DIVE, 0.0 if motion.has("speed_mps") else radius)),
             "filter_s": 1.0 / (2.0 * np.pi * vehicle.parameters.sensor.imu_cutoff_hz),
         }
-        along = Along(motion, slip if wheels else None)
+        along = LongitudinalModel(motion, slip if wheels else None)
         known = handed.get("along", {})
-        found["along"] = search(along, motion.block, known, tolerance, say, always=[SLIP] if wheels else ())
+        found["along"] = select_parameters(along, motion.block, known, tolerance, say, always=[SLIP] if wheels else ())
     track = dict(zip("fr", vehicle.parameters.vehicle.track_m, strict=True))
     turn: Floats | None = motion.channels.get("yaw_rate_rad_s")
     if wheels and (turn is not None or motion.has("ay_mps2")):
         say("yaw rate and lateral acceleration against the wheels")
-        model, known = Turning(motion, track), handed.get("turning", {})
+        model, known = LateralModel(motion, track), handed.get("turning", {})
         tolerance = {"yaw_gain": _TRACK, "ay_gain": _ROLL}
-        found["turning"] = search(model, motion.block, known, tolerance, say, always=model.unknown)
-        numbers = found["turning"].numbers
+        found["turning"] = select_parameters(model, motion.block, known, tolerance, say, always=model.unknown)
+        numbers = found["turning"].parameters
         if turn is not None:
             turn = (turn - numbers.get("yaw_bias_rad_s", 0.0)) / (1.0 + numbers.get("yaw_gain", 0.0))
     if wheels:
         say("wheel against wheel")
         found["wheels"] = _wheel_scales(motion, track, turn, handed.get("wheels", {}), say)
     if motion.has("pressure") or motion.has("pressure_demand"):
-        known = found["along"].numbers if "along" in found else {}
-        braking = Braking(motion, known.get(SLIP, slip.usual) if wheels else 0.0)
+        known = found["along"].parameters if "along" in found else {}
+        braking = BrakingModel(motion, known.get(SLIP, slip.usual) if wheels else 0.0)
         if len(braking.stops) >= LEAST_STOPS:
             say(f"{len(braking.stops)} stops: pressure against deceleration")
             nominal = nominal_braking(vehicle) | dict(handed.get("braking", {}))
@@ -158,11 +160,11 @@ def _models(motion: Motion, vehicle: Vehicle, handed: Mapping[str, Mapping[str, 
 
 
 def _wheel_scales(
-    motion: Motion, track: Mapping[str, float], turn: Floats | None, handed: Mapping[str, float], say: Say
-) -> Found:
+    motion: Motion, track: Mapping[str, float], turn: Floats | None, handed: Mapping[str, float], say: Progress
+) -> SelectionResult:
     """One wheel unlike the others: the mean of all is the vehicle's radius, which is known to its tolerance only."""
-    model = Wheels(motion, track, turn)
-    return search(model, motion.block, handed, dict.fromkeys(WHEELS, SPREAD), say, WHEELS, model.unknown)
+    model = WheelRadiusModel(motion, track, turn)
+    return select_parameters(model, motion.block, handed, dict.fromkeys(WHEELS, SPREAD), say, WHEELS, model.unknown)
 
 
 def _rivals(causes: Sequence[Cause], listed: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
@@ -171,24 +173,26 @@ def _rivals(causes: Sequence[Cause], listed: Sequence[Mapping[str, Any]]) -> lis
     return [rival for cause in causes for rival in cause.rivals() if (rival["effect"], rival["channels"]) not in told]
 
 
-def _remarks(models: Mapping[str, Found], causes: Sequence[Cause]) -> list[str]:
+def _remarks(models: Mapping[str, SelectionResult], causes: Sequence[Cause]) -> list[str]:
     said = []
     for c in causes:
         if c.exact is not None:
             said.append(f"{c.channels[0]} reads {1.0 + c.value:.2f} of the truth; {c.exact:.4g} lies in the interval")
-        limit = THETA.effect(c.names[0].effect).parameter(c.names[0].parameter)
-        if not limit.low <= c.names[0].factor * c.value <= limit.high:
-            said.append(f"{c.names[0].effect}: larger than any sensor's ({limit.low:g} to {limit.high:g} {limit.unit})")
+        limit = THETA.effect(c.labels[0].effect).parameter(c.labels[0].parameter)
+        if not limit.low <= c.labels[0].factor * c.value <= limit.high:
+            said.append(
+                f"{c.labels[0].effect}: larger than any sensor's ({limit.low:g} to {limit.high:g} {limit.unit})"
+            )
     along = models.get("along")
-    if along is not None and SLIP in along.numbers:
-        said.append(f"the wheels slip by {along.numbers[SLIP]:.4f} s2/m of the specific force: the tyres, no cause")
-    if along is not None and along.final.noise["slope_mps2"] < _NO_ROAD and along.numbers.get("gain", 0.0) > _DEAD:
+    if along is not None and SLIP in along.parameters:
+        said.append(f"the wheels slip by {along.parameters[SLIP]:.4f} s2/m of the specific force: the tyres, no cause")
+    if along is not None and along.final.noise["slope_mps2"] < _NO_ROAD and along.parameters.get("gain", 0.0) > _DEAD:
         said.append(
             f"ax_mps2 feels no road: a slope of {along.final.noise['slope_mps2']:.3f} m/s2 at most goes with it. "
             "An accelerometer feels gravity: unless the road was flat, this channel is computed from the speed"
         )
     turning = models.get("turning")
-    if turning is not None and isinstance(turning.model, Turning):
+    if turning is not None and isinstance(turning.model, LateralModel):
         for axle, follows in turning.model.follows.items():
             if abs(follows) < 0.3 and abs(turning.model.follows[turning.model.axle]) > 0.6:
                 name = {"f": "front", "r": "rear"}[axle]
@@ -199,7 +203,7 @@ def _remarks(models: Mapping[str, Found], causes: Sequence[Cause]) -> list[str]:
 def _decide_with(causes: Sequence[Cause]) -> list[dict[str, Any]]:
     """Standard manoeuvres that show the tied effects; no scenario drives a car whose forces nobody measures."""
     shown: dict[str, list[str]] = {}
-    for name in (name for c in causes if c.tied for name in c.as_likely):
+    for name in (name for c in causes if c.is_ambiguous for name in c.as_likely):
         shown.setdefault(THETA.effect(name).manoeuvre, []).append(name)
     return [
         {"scenario": manoeuvre, "why": f"shows {', '.join(dict.fromkeys(names))}", "separation": None}

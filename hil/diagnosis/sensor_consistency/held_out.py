@@ -7,13 +7,13 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from hil.diagnosis.data.log import WHEELS, Floats
-from hil.diagnosis.sensor_consistency.braking import Braking
-from hil.diagnosis.sensor_consistency.lateral import Turning
+from hil.diagnosis.sensor_consistency.braking import BrakingModel
+from hil.diagnosis.sensor_consistency.lateral import LateralModel
 from hil.diagnosis.sensor_consistency.likelihood import Values, fit
-from hil.diagnosis.sensor_consistency.longitudinal import Along
+from hil.diagnosis.sensor_consistency.longitudinal import LongitudinalModel
 from hil.diagnosis.sensor_consistency.motion import Motion
-from hil.diagnosis.sensor_consistency.selection import Found
-from hil.diagnosis.sensor_consistency.wheel_radius import Wheels
+from hil.diagnosis.sensor_consistency.selection import SelectionResult
+from hil.diagnosis.sensor_consistency.wheel_radius import WheelRadiusModel
 
 FOLDS = 4
 _DRAWS = 400
@@ -22,7 +22,7 @@ Predict = Callable[[Mapping[str, float]], Floats]
 
 
 @dataclass(frozen=True, eq=False)
-class Miss:
+class HeldOutError:
     """One channel: measured and foretold, and the root mean squares of what is missed.
 
     ``before`` as handed in, ``after`` with all that was learnt, ``tuned`` without any cause; ``held_out`` on manoeuvres
@@ -33,8 +33,8 @@ class Miss:
     channel: str
     unit: str
     measured: Floats
-    handed_in: Floats
-    learnt: Floats
+    nominal: Floats
+    fitted: Floats
     before: float
     after: float
     tuned: float
@@ -45,21 +45,21 @@ class Miss:
     pattern: str
 
 
-def misses(motion: Motion, models: Mapping[str, Found]) -> list[Miss]:
+def held_out_errors(motion: Motion, models: Mapping[str, SelectionResult]) -> list[HeldOutError]:
     """Of every channel that a model foretells."""
     found = []
     for name, of in models.items():
         model = of.model
-        if isinstance(model, Along):
+        if isinstance(model, LongitudinalModel):
             found.append(_miss(motion, of, "ax_mps2", "m/s2", motion.channels["ax_mps2"], model.predicted))
-        elif isinstance(model, Turning):
+        elif isinstance(model, LateralModel):
             for channel, unit in (("yaw_rate_rad_s", "rad/s"), ("ay_mps2", "m/s2")):
                 if motion.has(channel):
                     predict = _turned(model, channel)
                     found.append(_miss(motion, of, channel, unit, motion.channels[channel], predict))
-        elif isinstance(model, Braking):
+        elif isinstance(model, BrakingModel):
             found.append(_miss(motion, of, "speed_in_stops", "m/s", model.speed, model.free_run))
-        elif isinstance(model, Wheels):
+        elif isinstance(model, WheelRadiusModel):
             for wheel in WHEELS:
                 if wheel in of.final.sensor:
                     measured, predict = motion.channels[f"wheel_{wheel}"], _rolled(model, wheel)
@@ -69,46 +69,48 @@ def misses(motion: Motion, models: Mapping[str, Found]) -> list[Miss]:
     return found
 
 
-def _turned(model: Turning, channel: str) -> Predict:
+def _turned(model: LateralModel, channel: str) -> Predict:
     return lambda sensor: model.predicted(channel, sensor)
 
 
-def _rolled(model: Wheels, wheel: str) -> Predict:
+def _rolled(model: WheelRadiusModel, wheel: str) -> Predict:
     return lambda sensor: model.predicted(wheel, sensor)
 
 
-def _miss(motion: Motion, found: Found, channel: str, unit: str, measured: Floats, predict: Predict) -> Miss:
-    handed, learnt = predict(found.handed), predict(found.numbers)
-    tuned = predict({**found.handed, **found.base.sensor})
+def _miss(
+    motion: Motion, found: SelectionResult, channel: str, unit: str, measured: Floats, predict: Predict
+) -> HeldOutError:
+    handed, learnt = predict(found.given), predict(found.parameters)
+    tuned = predict({**found.given, **found.base.sensor})
     mask = (motion.moving > 0.5) & np.isfinite(measured) & np.isfinite(handed)
     own = _held_out(found, predict)
     wrong = _wrong(found)
     other = None if wrong is None else _rms(measured - _held_out(found, predict, wrong), mask)
     squares = _by_block(measured - own, mask, found.block)
     low, high = _interval(squares)
-    return Miss(
+    return HeldOutError(
         channel, unit, measured, handed, learnt, _rms(measured - handed, mask), _rms(measured - learnt, mask),
         _rms(measured - tuned, mask),
         _root(squares), low, high, other, _pattern(motion, measured - handed, mask, found),
     )  # fmt: skip
 
 
-def _held_out(found: Found, predict: Predict, sensor: Values | None = None) -> Floats:
+def _held_out(found: SelectionResult, predict: Predict, sensor: Values | None = None) -> Floats:
     """Foretold by fits that did not see the manoeuvre; noise stays as it was found."""
     begin = found.final.sensor if sensor is None else sensor
-    out = predict({**found.handed, **begin})
+    out = predict({**found.given, **begin})
     if not begin:
         return out
     for fold in range(min(FOLDS, int(found.block.max()) + 1)):
         test = found.block % FOLDS == fold
         trained = fit(
-            found.model, begin, found.final.noise, fixed=found.handed, weights=1.0 * ~test, rounds=15, only_sensor=True
+            found.model, begin, found.final.noise, fixed=found.given, weights=1.0 * ~test, rounds=15, only_sensor=True
         )
-        out[test] = predict({**found.handed, **trained.sensor})[test]
+        out[test] = predict({**found.given, **trained.sensor})[test]
     return out
 
 
-def _wrong(found: Found) -> Values | None:
+def _wrong(found: SelectionResult) -> Values | None:
     """The best single number in the place of the first cause."""
     if not found.steps or not found.steps[0].others:
         return None
@@ -139,7 +141,7 @@ def _interval(squares: Floats) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _pattern(motion: Motion, left: Floats, mask: Floats, found: Found) -> str:
+def _pattern(motion: Motion, left: Floats, mask: Floats, found: SelectionResult) -> str:
     """What the rest goes with, as rank correlations; it names no cause."""
     variables = {"acceleration of the wheels": motion.accel_mps2, "speed": motion.speed_mps, "time": motion.t_s}
     for name, what in (("yaw_rate_rad_s", "yaw rate"), ("ay_mps2", "lateral acceleration"), ("throttle", "throttle")):

@@ -7,30 +7,30 @@ import numpy as np
 
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.sensor_consistency.kalman import Linear, innovations
-from hil.diagnosis.sensor_consistency.model import Model, Number
+from hil.diagnosis.sensor_consistency.model import Parameter, SensorModel
 from hil.diagnosis.sensor_consistency.motion import Motion
 from hil.diagnosis.sensor_consistency.wheel_radius import SPREAD
 
-_NOISE: Final[Mapping[str, Number]] = {
-    "turn_rad_s": Number(0.05, 1e-3, 2.0, 0.3, True, 2.0),
-    "turn_s": Number(3.0, 0.1, 100.0, 0.3, True, 1.0),
-    "axle_rad_s": Number(0.01, 1e-4, 1.0, 0.3, True, 2.0),
-    "axle_s": Number(0.5, 0.05, 20.0, 0.3, True, 1.0),
-    "axle_white_rad_s": Number(0.01, 1e-4, 1.0, 0.3, True, 2.0),
-    "yaw_rad_s": Number(0.003, 1e-5, 1.0, 0.3, True, 2.0),
-    "bank_mps2": Number(0.2, 1e-3, 5.0, 0.3, True, 1.5),
-    "bank_s": Number(2.0, 0.1, 60.0, 0.3, True, 1.0),
-    "ay_mps2": Number(0.05, 1e-3, 5.0, 0.3, True, 2.0),
+_NOISE: Final[Mapping[str, Parameter]] = {
+    "turn_rad_s": Parameter(0.05, 1e-3, 2.0, 0.3, True, 2.0),
+    "turn_s": Parameter(3.0, 0.1, 100.0, 0.3, True, 1.0),
+    "axle_rad_s": Parameter(0.01, 1e-4, 1.0, 0.3, True, 2.0),
+    "axle_s": Parameter(0.5, 0.05, 20.0, 0.3, True, 1.0),
+    "axle_white_rad_s": Parameter(0.01, 1e-4, 1.0, 0.3, True, 2.0),
+    "yaw_rad_s": Parameter(0.003, 1e-5, 1.0, 0.3, True, 2.0),
+    "bank_mps2": Parameter(0.2, 1e-3, 5.0, 0.3, True, 1.5),
+    "bank_s": Parameter(2.0, 0.1, 60.0, 0.3, True, 1.0),
+    "ay_mps2": Parameter(0.05, 1e-3, 5.0, 0.3, True, 2.0),
 }
-_NUMBERS: Final[Mapping[str, Number]] = {
-    "yaw_gain": Number(0.0, -12.0, 300.0, 0.05),
-    "yaw_bias_rad_s": Number(0.0, -0.3, 0.3, 2e-3),
-    "ay_gain": Number(0.0, -12.0, 300.0, 0.05),
-    "ay_bias_mps2": Number(0.0, -3.0, 3.0, 0.05),
+_NUMBERS: Final[Mapping[str, Parameter]] = {
+    "yaw_gain": Parameter(0.0, -12.0, 300.0, 0.05),
+    "yaw_bias_rad_s": Parameter(0.0, -0.3, 0.3, 2e-3),
+    "ay_gain": Parameter(0.0, -12.0, 300.0, 0.05),
+    "ay_bias_mps2": Parameter(0.0, -3.0, 3.0, 0.05),
 }
 
 
-class Turning(Model):
+class LateralModel(SensorModel):
     """States: yaw rate, error of the axle's difference, bank and sliding (m/s2), unlike radii of the axle's wheels.
 
     An axle that is locked says nothing of turns, so the one that goes better with the sensors speaks: ``axle``.
@@ -52,7 +52,7 @@ class Turning(Model):
         there = [name for name in ("yaw", "ay") if self._known[:, 1 if name == "yaw" else 2].sum() > 50]
         self.unknown = ("ay_bias_mps2",) if "ay" in there else ()  # the road's crossfall is in it
         self._pair = 2.0**0.5 * SPREAD / track_m[self.axle]
-        self.numbers = {n: v for n, v in _NUMBERS.items() if n.split("_")[0] in there}
+        self.parameters = {n: v for n, v in _NUMBERS.items() if n.split("_")[0] in there}
 
     @staticmethod
     def _difference(motion: Motion, axle: str, track_m: Mapping[str, float]) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.sensor_consistency.model import Model, Number
+from hil.diagnosis.sensor_consistency.model import Parameter, SensorModel
 
 Values = dict[str, float]
 _STEP = 1e-3
@@ -33,13 +33,13 @@ class Fit:
     cost: float
 
 
-def usual(model: Model) -> Values:
+def typical_noise(model: SensorModel) -> Values:
     """Noise to begin with."""
     return {name: number.usual for name, number in model.noise.items()}
 
 
 def fit(
-    model: Model, sensor: Mapping[str, float], noise: Mapping[str, float], *, fixed: Mapping[str, float] = NOTHING,
+    model: SensorModel, sensor: Mapping[str, float], noise: Mapping[str, float], *, fixed: Mapping[str, float] = NOTHING,
     weights: Floats | None = None, rounds: int = 40, only_sensor: bool = False,
 ) -> Fit:  # fmt: skip
     """Move the numbers ``sensor`` and all noise to the largest likelihood.
@@ -53,7 +53,7 @@ def fit(
     only_sensor : leave the noise as it is.
     """
     names = [*sensor, *([] if only_sensor else noise)]
-    numbers = [model.numbers[n] if n in sensor else model.noise[n] for n in names]
+    numbers = [model.parameters[n] if n in sensor else model.noise[n] for n in names]
 
     def split(z: Floats) -> tuple[Values, Values]:
         values = {n: _value(number, v) for n, number, v in zip(names, numbers, z, strict=True)}
@@ -81,22 +81,22 @@ def fit(
     return Fit(moved, noisy, float(found.fun))
 
 
-def _scaled(number: Number, value: float) -> float:
+def _scaled(number: Parameter, value: float) -> float:
     return float(np.log(value)) / number.step if number.log else value / number.step
 
 
-def _value(number: Number, z: float) -> float:
+def _value(number: Parameter, z: float) -> float:
     return float(np.exp(z * number.step)) if number.log else float(z * number.step)
 
 
-def _prior(model: Model, sensor: Mapping[str, float], noise: Mapping[str, float]) -> float:
+def _prior(model: SensorModel, sensor: Mapping[str, float], noise: Mapping[str, float]) -> float:
     """Weak knowledge of noise keeps what the data do not show where roads and cars have it."""
     of_noise = sum((float(np.log(noise[n] / number.usual)) / number.prior) ** 2 for n, number in model.noise.items())
-    known = [(value, model.numbers[n]) for n, value in sensor.items() if model.numbers[n].prior > 0.0]
+    known = [(value, model.parameters[n]) for n, value in sensor.items() if model.parameters[n].prior > 0.0]
     return of_noise + sum(((value - number.usual) / number.prior) ** 2 for value, number in known)
 
 
-def deviations(model: Model, found: Fit, block: Floats, fixed: Mapping[str, float] = NOTHING) -> Values:
+def standard_deviations(model: SensorModel, found: Fit, block: Floats, fixed: Mapping[str, float] = NOTHING) -> Values:
     """Standard deviation of every sensor number: curvature, widened where manoeuvres disagree more than they should.
 
     The sandwich of White, Econometrica 50 (1982), with the scores of whole manoeuvres; noise moves along. Where the
@@ -104,7 +104,7 @@ def deviations(model: Model, found: Fit, block: Floats, fixed: Mapping[str, floa
     """
     inside = [n for n, v in found.noise.items() if 1.05 * model.noise[n].low < v < 0.95 * model.noise[n].high]
     names = [*found.sensor, *inside]  # noise at its bound stays there
-    numbers = [model.numbers[n] if n in found.sensor else model.noise[n] for n in names]
+    numbers = [model.parameters[n] if n in found.sensor else model.noise[n] for n in names]
     z = np.array(
         [_scaled(number, {**found.sensor, **found.noise}[n]) for n, number in zip(names, numbers, strict=True)]
     )

@@ -8,20 +8,20 @@ import numpy as np
 
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.sensor_consistency.kalman import Linear, innovations
-from hil.diagnosis.sensor_consistency.model import Model, Number
+from hil.diagnosis.sensor_consistency.model import Parameter, SensorModel
 from hil.diagnosis.sensor_consistency.motion import Motion, slope_of
 from plant.vehicle import GRAVITY_MPS2
 
-NOISE: Final[Mapping[str, Number]] = {
-    "speed_mps": Number(0.02, 1e-4, 1.0, 0.3, True, 2.0),
-    "motion_mps2": Number(1.0, 0.05, 20.0, 0.3, True, 2.0),
-    "motion_s": Number(5.0, 0.1, 100.0, 0.3, True, 1.0),
-    "motion_lag_s": Number(0.1, 0.005, 1.0, 0.3, True, 1.0),
-    "slope_mps2": Number(0.2, 1e-4, 5.0, 0.3, True, 1.5),
-    "slope_s": Number(10.0, 0.5, 100.0, 0.3, True, 0.7),
-    "body_mps2": Number(0.1, 1e-4, 20.0, 0.3, True, 2.0),
-    "body_s": Number(0.15, 0.02, 1.5, 0.3, True, 0.7),
-    "ax_mps2": Number(0.05, 1e-4, 5.0, 0.3, True, 2.0),
+NOISE: Final[Mapping[str, Parameter]] = {
+    "speed_mps": Parameter(0.02, 1e-4, 1.0, 0.3, True, 2.0),
+    "motion_mps2": Parameter(1.0, 0.05, 20.0, 0.3, True, 2.0),
+    "motion_s": Parameter(5.0, 0.1, 100.0, 0.3, True, 1.0),
+    "motion_lag_s": Parameter(0.1, 0.005, 1.0, 0.3, True, 1.0),
+    "slope_mps2": Parameter(0.2, 1e-4, 5.0, 0.3, True, 1.5),
+    "slope_s": Parameter(10.0, 0.5, 100.0, 0.3, True, 0.7),
+    "body_mps2": Parameter(0.1, 1e-4, 20.0, 0.3, True, 2.0),
+    "body_s": Parameter(0.15, 0.02, 1.5, 0.3, True, 0.7),
+    "ax_mps2": Parameter(0.05, 1e-4, 5.0, 0.3, True, 2.0),
 }
 """White noise of the speed; the motion itself and how fast it changes; the road's slope; pitch and vibration; white
 noise of the accelerometer.
@@ -29,15 +29,15 @@ noise of the accelerometer.
 Origins: roads of 1 to 3 % over some hundred metres (effects 1), pitch at 1 to 2 Hz (8), sensors (55 to 64).
 """
 
-SENSOR: Final[Mapping[str, Number]] = {
-    "gain": Number(0.0, -12.0, 300.0, 0.05),
-    "bias_mps2": Number(0.0, -3.0, 3.0, 0.05),
-    "filter_s": Number(0.0, 0.0, 6.0, 0.05),
-    "delay_s": Number(0.0, -0.5, 0.5, 0.02),
-    "drift_mps3": Number(0.0, -0.05, 0.05, 1e-3),
-    "cross": Number(0.0, -0.5, 0.5, 0.02),
-    "ahead_m": Number(0.0, -3.0, 3.0, 0.3),
-    "beside_m": Number(0.0, -2.0, 2.0, 0.2),
+SENSOR: Final[Mapping[str, Parameter]] = {
+    "gain": Parameter(0.0, -12.0, 300.0, 0.05),
+    "bias_mps2": Parameter(0.0, -3.0, 3.0, 0.05),
+    "filter_s": Parameter(0.0, 0.0, 6.0, 0.05),
+    "delay_s": Parameter(0.0, -0.5, 0.5, 0.02),
+    "drift_mps3": Parameter(0.0, -0.05, 0.05, 1e-3),
+    "cross": Parameter(0.0, -0.5, 0.5, 0.02),
+    "ahead_m": Parameter(0.0, -3.0, 3.0, 0.3),
+    "beside_m": Parameter(0.0, -2.0, 2.0, 0.2),
 }
 """What the accelerometer may do: ax' = (1 + gain) lowpass(a + g slope) + bias + ..., ``delay_s`` after its stamp."""
 
@@ -61,7 +61,7 @@ def lag(time_s: float, step_s: float) -> tuple[float, float, float]:
     return phi, share - phi, 1.0 - share
 
 
-class Along(Model):
+class LongitudinalModel(SensorModel):
     """The model along the car.
 
     States: speed, acceleration, slope (m/s2), filtered specific force and its last value, the body's shaking, and what
@@ -71,7 +71,7 @@ class Along(Model):
     noise = NOISE
     channel = "ax_mps2"
 
-    def __init__(self, motion: Motion, slip: Number | None = None) -> None:
+    def __init__(self, motion: Motion, slip: Parameter | None = None) -> None:
         """``slip`` is what is known of `SLIP` before; None where the speed is that over ground."""
         self.motion = motion
         rows = motion.moving > 0.5
@@ -84,8 +84,8 @@ class Along(Model):
             turn = np.nan_to_num(yaw)
             self._added["ahead_m"] = -(turn**2)
             self._added["beside_m"] = -np.gradient(turn, motion.cell_s) * (motion.fresh < 0.5)
-        self.numbers = {n: v for n, v in SENSOR.items() if n in {"gain", "filter_s", "delay_s", *self._added}}
-        self.numbers |= {SLIP: slip} if slip else {}
+        self.parameters = {n: v for n, v in SENSOR.items() if n in {"gain", "filter_s", "delay_s", *self._added}}
+        self.parameters |= {SLIP: slip} if slip else {}
         self.resolution = {"delay_s": 0.5 * motion.cell_s}
         edges = round(SENSOR["delay_s"].high / motion.cell_s) + 1  # the same cells whatever the delay
         inside = 1.0 - np.minimum(np.convolve(_ends(motion), np.ones(2 * edges + 1), "same"), 1.0)
@@ -163,13 +163,13 @@ class Along(Model):
         return found
 
 
-def known_slip(stiffness: float, share: float) -> Number:
+def known_slip(stiffness: float, share: float) -> Parameter:
     """What is known of `SLIP` of tyres that give ``stiffness`` times the load per slip, known to a ``share`` of it.
 
     Slip in proportion to the force (effects 16); all wheels pull or brake as they are loaded.
     """
     usual = 1.0 / (GRAVITY_MPS2 * stiffness)
-    return Number(usual, 0.0, _MOST_SLIP, 0.1 * usual, prior=max(share, _LEAST_SHARE) * usual)
+    return Parameter(usual, 0.0, _MOST_SLIP, 0.1 * usual, prior=max(share, _LEAST_SHARE) * usual)
 
 
 def _ends(motion: Motion) -> Floats:

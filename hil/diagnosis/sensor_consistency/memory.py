@@ -6,27 +6,27 @@ from pathlib import Path
 
 from hil.diagnosis.data.log import UnusableError
 from hil.diagnosis.sensor_consistency.labels import Cause
-from hil.diagnosis.sensor_consistency.selection import Found
+from hil.diagnosis.sensor_consistency.selection import SelectionResult
 from plant.effects.effect import Scope
 from plant.effects.theta import THETA
 
 MODELS = ("along", "turning", "wheels", "braking")
 
 
-def write_numbers(path: Path, models: Mapping[str, Found], causes: Sequence[Cause]) -> None:
+def write_channels(path: Path, models: Mapping[str, SelectionResult], causes: Sequence[Cause]) -> None:
     """Write ``[effects]`` as far as the simulation can have them, and ``[channels]`` as learnt."""
     lines = [
-        f"# Taught by a comparison of sensors: {', '.join(c.names[0].effect for c in causes) or 'no effect'}",
+        f"# Taught by a comparison of sensors: {', '.join(c.labels[0].effect for c in causes) or 'no effect'}",
         "# [effects] for `run --extend`; [channels] for `explain --extend`, which begins with these numbers.",
         "",
     ]
     tables: dict[str, dict[str, object]] = {}
     for cause in causes:
-        name = cause.names[0]
+        name = cause.labels[0]
         effect = THETA.effect(name.effect)
         parameter = effect.parameter(name.parameter)
         value = name.factor * cause.value
-        label = f"{name.effect}.{name.parameter} = {value:.6g} ({name.wheel}, {', '.join(cause.channels)})"
+        label = f"{name.effect}.{name.parameter} = {value:.6g} ({name.location}, {', '.join(cause.channels)})"
         if name.effect == "wrong_scale":
             lines.append(f"# not simulated: {label}: mend the channel map, not the car")
         elif cause.model == "braking" and name.effect != "timestamp_offset":
@@ -35,17 +35,17 @@ def write_numbers(path: Path, models: Mapping[str, Found], causes: Sequence[Caus
             lines.append(f"# not simulated: {label}: outside {parameter.low:g} to {parameter.high:g}")
         else:
             entry = tables.setdefault(name.effect, {})
-            if effect.scope in (Scope.WHEEL, Scope.NODE, Scope.AXLE) and name.wheel in effect.scope.members:
+            if effect.scope in (Scope.WHEEL, Scope.NODE, Scope.AXLE) and name.location in effect.scope.members:
                 members = entry.setdefault(name.parameter, {})
                 assert isinstance(members, dict)
-                members[name.wheel] = value
+                members[name.location] = value
             else:
                 entry[name.parameter] = value
     for effect_name, entry in tables.items():
         lines += ["", f"[effects.{effect_name}]", *(f"{key} = {_toml(value)}" for key, value in entry.items())]
     for model, found in models.items():
-        if found.numbers:
-            lines += ["", f"[channels.{model}]", *(f"{n} = {v!r}" for n, v in found.numbers.items())]
+        if found.parameters:
+            lines += ["", f"[channels.{model}]", *(f"{n} = {v!r}" for n, v in found.parameters.items())]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -55,7 +55,7 @@ def _toml(value: object) -> str:
     return repr(value)
 
 
-def load_numbers(path: Path) -> dict[str, dict[str, float]]:
+def load_channels(path: Path) -> dict[str, dict[str, float]]:
     """Numbers of ``[channels]``, by model.
 
     Raises

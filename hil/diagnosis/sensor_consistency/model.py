@@ -9,7 +9,7 @@ from hil.diagnosis.data.log import Floats
 
 
 @dataclass(frozen=True)
-class Number:
+class Parameter:
     """One number of the model: usual value, where it may lie, and the step on which it changes something.
 
     ``log`` numbers are positive and searched in their logarithm; ``prior`` is the standard deviation of that logarithm,
@@ -24,14 +24,14 @@ class Number:
     prior: float = 0.0
 
 
-class Model(ABC):
+class SensorModel(ABC):
     """What can be fitted: ``numbers`` are as usual, mostly 0, where nothing is wrong.
 
     ``resolution`` is what the cells leave of some.
     """
 
-    noise: Mapping[str, Number]
-    numbers: Mapping[str, Number]
+    noise: Mapping[str, Parameter]
+    parameters: Mapping[str, Parameter]
     resolution: Mapping[str, float] = MappingProxyType({})
 
     @abstractmethod

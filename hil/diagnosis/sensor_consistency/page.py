@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.sensor_consistency.braking import Braking
+from hil.diagnosis.sensor_consistency.braking import BrakingModel
 from hil.diagnosis.sensor_consistency.check import Consistency
-from hil.diagnosis.sensor_consistency.held_out import Miss
+from hil.diagnosis.sensor_consistency.held_out import HeldOutError
 from hil.diagnosis.sensor_consistency.motion import Motion
-from hil.diagnosis.sensor_consistency.selection import ASKED
+from hil.diagnosis.sensor_consistency.selection import THRESHOLD
 from hil.report.report import Cell, Chart, Curve, Number, Panel, Report, Section, Table, Trace, Verdict
 from hil.report.units import BAR, Display, Unit
 
@@ -72,7 +72,7 @@ def _headline(answer: Consistency) -> str:
     by_channel: dict[str, list[str]] = {}
     for cause in answer.causes:
         words = " or ".join(effect.replace("_", " ") for effect in cause.as_likely)
-        if cause.names[0].effect == "wrong_scale":
+        if cause.labels[0].effect == "wrong_scale":
             words = "wrong sign" if cause.exact == -1.0 else "wrong scale or sign"
         by_channel.setdefault(", ".join(cause.channels), []).append(words)
     said = "; ".join(f"{channel}: {', '.join(words)}" for channel, words in by_channel.items())
@@ -83,7 +83,7 @@ def _short(value: float) -> float:
     return float(f"{value:.3g}")
 
 
-def _title(miss: Miss) -> str:
+def _title(miss: HeldOutError) -> str:
     return _TITLE.get(miss.channel, miss.channel.replace("_", " "))
 
 
@@ -92,19 +92,19 @@ def _time(motion: Motion) -> Floats:
     return np.arange(len(motion.t_s)) * motion.cell_s
 
 
-def _panels(miss: Miss, t: Floats, rows: Floats) -> list[Panel]:
+def _panels(miss: HeldOutError, t: Floats, rows: Floats) -> list[Panel]:
     unit = _UNIT[miss.unit]
-    shown = [("measured", miss.measured, "line", ""), ("as handed in", miss.handed_in, "line", "rl")]
-    shown.append(("extended", miss.learnt, "line", "fl"))
+    shown = [("measured", miss.measured, "line", ""), ("as handed in", miss.nominal, "line", "rl")]
+    shown.append(("extended", miss.fitted, "line", "fl"))
     # mypy takes the style for any string
     traces = tuple(Trace(n, t[rows], y[rows], style, group) for n, y, style, group in shown)  # type: ignore[arg-type]
     return [Panel(_title(miss), unit, traces)]
 
 
-def _left(miss: Miss, t: Floats, rows: Floats) -> Panel:
+def _left(miss: HeldOutError, t: Floats, rows: Floats) -> Panel:
     traces = [
         Trace(name, t[rows], (miss.measured - y)[rows], group=group)
-        for name, y, group in (("as handed in", miss.handed_in, "rl"), ("extended", miss.learnt, "fl"))
+        for name, y, group in (("as handed in", miss.nominal, "rl"), ("extended", miss.fitted, "fl"))
     ]
     return Panel(f"{_title(miss)}: what is missed", _UNIT[miss.unit], tuple(traces))
 
@@ -137,15 +137,15 @@ def _windows(answer: Consistency) -> list[Section]:
         sections.append(Section("A close look", panels=(*_panels(miss, t, rows), _left(miss, t, rows))))
     braking = answer.models.get("braking")
     stops = next((m for m in answer.misses if m.channel == "speed_in_stops"), None)
-    if braking is not None and stops is not None and isinstance(braking.model, Braking):
+    if braking is not None and stops is not None and isinstance(braking.model, BrakingModel):
         charts, model = [], braking.model
         for first, last in sorted(model.stops, key=lambda s: -float(model.pressure[slice(*s)].max()))[:6]:
             rows = np.zeros(len(t), bool)
             rows[first:last] = True
             curves = [
                 Curve("measured", t[rows], stops.measured[rows]),
-                Curve("as handed in", t[rows], stops.handed_in[rows], group="rl"),
-                Curve("extended", t[rows], stops.learnt[rows], group="fl"),
+                Curve("as handed in", t[rows], stops.nominal[rows], group="rl"),
+                Curve("extended", t[rows], stops.fitted[rows], group="fl"),
             ]
             bar = float(model.pressure[first:last].max()) * 1e-5
             charts.append(
@@ -197,9 +197,9 @@ def _race(answer: Consistency) -> list[Table]:
     if found is None or not found.steps:
         return []
     step = found.steps[0]
-    gains = {step.number: step.gain} | {n: found.base.cost - f.cost for n, f in step.others.items()}
+    gains = {step.parameter: step.gain} | {n: found.base.cost - f.cost for n, f in step.others.items()}
     rows = tuple((n.replace("_", " "), round(g, 1)) for n, g in sorted(gains.items(), key=lambda item: -item[1]))
-    note = f"Twice the log-likelihood, each number alone in the first place; {ASKED:g} is asked of a cause."
+    note = f"Twice the log-likelihood, each number alone in the first place; {THRESHOLD:g} is asked of a cause."
     return [Table("Who else was in the race (accelerometer)", ("number", "gain"), rows, note)]
 
 
@@ -213,7 +213,7 @@ def _relations(answer: Consistency) -> Section:
         curves = [
             c for c in (
                 _binned(motion.accel_mps2[good], miss.measured[good], "measured", "fl"),
-                _binned(motion.accel_mps2[good], miss.learnt[good], "extended", "rl"),
+                _binned(motion.accel_mps2[good], miss.fitted[good], "extended", "rl"),
             ) if c is not None
         ]  # fmt: skip
         ends = np.array([motion.accel_mps2[good].min(), motion.accel_mps2[good].max()])
@@ -229,10 +229,10 @@ def _relations(answer: Consistency) -> Section:
             )
         )
     braking = answer.models.get("braking")
-    if braking is not None and isinstance(braking.model, Braking):
+    if braking is not None and isinstance(braking.model, BrakingModel):
         model = braking.model
         later = {
-            **braking.numbers,
+            **braking.parameters,
             "brake_mps2_pa": -1.0,
             "drag_mps2": 0.0,
             "drag_1_m": 0.0,

@@ -9,10 +9,10 @@ from scipy.stats import t as student
 
 from hil.diagnosis.compiled import WORKERS
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.sensor_consistency.likelihood import Fit, Values, deviations, fit, usual
-from hil.diagnosis.sensor_consistency.model import Model
+from hil.diagnosis.sensor_consistency.likelihood import Fit, Values, fit, standard_deviations, typical_noise
+from hil.diagnosis.sensor_consistency.model import SensorModel
 
-ASKED = 20.0
+THRESHOLD = 20.0
 """Gain in -2 log likelihood asked of a number: noise gives it once in 100,000 looks, were the model true."""
 _WORTH_A_FIT = 0.5
 """Share of that from which a number that was tried for a few rounds is fitted to the end: it may gain more then."""
@@ -23,38 +23,38 @@ _STARTS: Mapping[str, Sequence[float]] = {
     "gain": (0.0, -0.5, 0.5, -2.0), "filter_s": (0.02, 0.1, 0.5, 2.0),
     "yaw_gain": (0.0, -2.0), "ay_gain": (0.0, -2.0),
 }  # fmt: skip
-Say = Callable[[str], None]
+Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Step:
+class SelectionStep:
     """A number that was taken up, its gain, and what the others would have gained in its place (one fit each).
 
     ``instead`` are those that fit nearly as well: what was found with each, and how far behind in -2 log likelihood.
     """
 
-    number: str
+    parameter: str
     gain: float
     others: Mapping[str, Fit]
-    instead: Mapping[str, tuple["Found", float]] = field(default_factory=dict)
+    substitutes: Mapping[str, tuple["SelectionResult", float]] = field(default_factory=dict)
 
 
 @dataclass(eq=False)
-class Found:
+class SelectionResult:
     """What a model learnt.
 
     ``base`` has the numbers as handed in, ``final`` those taken up; ``deviation`` their standard deviations,
     ``tolerance`` what each may be off without being wrong, ``degrees`` the degrees of freedom of the intervals.
     """
 
-    model: Model
-    handed: Values
+    model: SensorModel
+    given: Values
     base: Fit
     final: Fit
     block: Floats
     deviation: Values
     tolerance: Mapping[str, float]
-    steps: list[Step] = field(default_factory=list)
+    steps: list[SelectionStep] = field(default_factory=list)
     evidence: int = 0
 
     @property
@@ -63,31 +63,31 @@ class Found:
         return max((self.evidence or int(self.block.max()) + 1) - 1, 1)
 
     @property
-    def numbers(self) -> Values:
+    def parameters(self) -> Values:
         """All numbers, as handed in and as learnt."""
-        return {**self.handed, **self.final.sensor}
+        return {**self.given, **self.final.sensor}
 
     def interval(self, number: str) -> tuple[float, float]:
         """95 % of a number, Student's t over the manoeuvres."""
         half = float(student.ppf(0.975, self.degrees)) * self.deviation[number]
-        value, of = self.final.sensor[number], self.model.numbers[number]
+        value, of = self.final.sensor[number], self.model.parameters[number]
         return max(value - half, of.low), min(value + half, of.high)
 
 
-def search(
-    model: Model, block: Floats, handed: Mapping[str, float], tolerance: Mapping[str, float], say: Say,
+def select_parameters(
+    model: SensorModel, block: Floats, handed: Mapping[str, float], tolerance: Mapping[str, float], say: Progress,
     candidates: Sequence[str] | None = None, always: Sequence[str] = (), most: int = 6,
-) -> Found:  # fmt: skip
+) -> SelectionResult:  # fmt: skip
     """Take up numbers one at a time, the one with the largest gain first; take out again what is not missed.
 
     Parameters
     ----------
-    handed : numbers as handed in; the others are 0.  tolerance : see `Found`.
+    handed : numbers as handed in; the others are 0.  tolerance : see `SelectionResult`.
     always : numbers that nobody knows and that are no cause.
     """
-    start = fit(model, {n: model.numbers[n].usual for n in always}, usual(model), fixed=handed)
-    found = Found(model, dict(handed), start, start, block, {}, tolerance)
-    names = [n for n in (candidates or model.numbers) if n not in always]
+    start = fit(model, {n: model.parameters[n].usual for n in always}, typical_noise(model), fixed=handed)
+    found = SelectionResult(model, dict(handed), start, start, block, {}, tolerance)
+    names = [n for n in (candidates or model.parameters) if n not in always]
     while len(found.steps) < most:
         left = [n for n in names if n not in found.final.sensor]
         with ThreadPoolExecutor(WORKERS) as pool:
@@ -97,96 +97,98 @@ def search(
             break
         step, found.final, found.deviation = taken
         found.steps.append(step)
-        say(f"{step.number} = {found.final.sensor[step.number]:.4g}, gains {step.gain:.0f}")
+        say(f"{step.parameter} = {found.final.sensor[step.parameter]:.4g}, gains {step.gain:.0f}")
     _prune(found)
     return found
 
 
-def _with(found: Found, number: str) -> Fit:
+def _with(found: SelectionResult, number: str) -> Fit:
     """The model with one more number free, from several starts: a few rounds, then more for those near the best."""
     noises = [found.final.noise]
     if not found.steps:  # what was taken for noise is none with the cause in place
-        noises.append(usual(found.model))
+        noises.append(typical_noise(found.model))
     firsts = []
     for start in _starts(found, number):
         sensor = {**found.final.sensor, number: start}
         firsts.append(min((_some_rounds(found, number, sensor, n, 3) for n in noises), key=lambda f: f.cost))
     firsts.sort(key=lambda f: f.cost)
-    near = [f for k, f in enumerate(firsts) if k < 2 or f.cost < firsts[0].cost + ASKED]
+    near = [f for k, f in enumerate(firsts) if k < 2 or f.cost < firsts[0].cost + THRESHOLD]
     return min((_some_rounds(found, number, f.sensor, f.noise, 12) for f in near), key=lambda f: f.cost)
 
 
-def _starts(found: Found, number: str) -> list[float]:
+def _starts(found: SelectionResult, number: str) -> list[float]:
     """Where a number begins: in the middle of every cell, of what cells resolve."""
-    of, cell = found.model.numbers[number], 2.0 * found.model.resolution.get(number, 0.0)
+    of, cell = found.model.parameters[number], 2.0 * found.model.resolution.get(number, 0.0)
     if cell:
         return [float(cell * (k + 0.5)) for k in range(math.ceil(of.low / cell), math.floor(of.high / cell))]
-    return [found.handed.get(number, 0.0) + start for start in _STARTS.get(number, (0.0,))]
+    return [found.given.get(number, 0.0) + start for start in _STARTS.get(number, (0.0,))]
 
 
-def _some_rounds(found: Found, number: str, sensor: Values, noise: Values, rounds: int) -> Fit:
+def _some_rounds(found: SelectionResult, number: str, sensor: Values, noise: Values, rounds: int) -> Fit:
     """A fit that is not ended. What cells resolve stays where it is: far from an end, no search passes their edges."""
     if number not in found.model.resolution:
-        return fit(found.model, sensor, noise, fixed=found.handed, rounds=rounds)
+        return fit(found.model, sensor, noise, fixed=found.given, rounds=rounds)
     others = {n: v for n, v in sensor.items() if n != number}
-    held = fit(found.model, others, noise, fixed={**found.handed, number: sensor[number]}, rounds=rounds)
+    held = fit(found.model, others, noise, fixed={**found.given, number: sensor[number]}, rounds=rounds)
     return replace(held, sensor=held.sensor | {number: sensor[number]})
 
 
-def _ended(found: Found, number: str, begun: Fit) -> Fit:
+def _ended(found: SelectionResult, number: str, begun: Fit) -> Fit:
     """A fit to its end. What cells resolve is fitted from the next cells as well, and on while that is better."""
-    best = fit(found.model, begun.sensor, begun.noise, fixed=found.handed)
-    of, cell = found.model.numbers[number], 2.0 * found.model.resolution.get(number, 0.0)
+    best = fit(found.model, begun.sensor, begun.noise, fixed=found.given)
+    of, cell = found.model.parameters[number], 2.0 * found.model.resolution.get(number, 0.0)
     for beside in (-cell, cell) if cell else ():
         at = cell * (math.floor(best.sensor[number] / cell) + 0.5) + beside
         while of.low < at < of.high:
             middle = _some_rounds(found, number, {**best.sensor, number: at}, best.noise, 12)
-            there = fit(found.model, middle.sensor, middle.noise, fixed=found.handed)
+            there = fit(found.model, middle.sensor, middle.noise, fixed=found.given)
             if there.cost >= best.cost:
                 break
             best, at = there, at + beside
     return best
 
 
-def _take(found: Found, tried: Mapping[str, Fit]) -> tuple[Step, Fit, Values] | None:
-    worth = [n for n in tried if found.final.cost - tried[n].cost >= _WORTH_A_FIT * ASKED]
+def _take(found: SelectionResult, tried: Mapping[str, Fit]) -> tuple[SelectionStep, Fit, Values] | None:
+    worth = [n for n in tried if found.final.cost - tried[n].cost >= _WORTH_A_FIT * THRESHOLD]
     most = min((tried[n].cost for n in worth), default=0.0)
-    near = [n for n in worth if tried[n].cost < most + ASKED]  # a few rounds more may change which is first
+    near = [n for n in worth if tried[n].cost < most + THRESHOLD]  # a few rounds more may change which is first
     with ThreadPoolExecutor(WORKERS) as pool:
         fitted = dict(zip(near, pool.map(lambda n: _ended(found, n, tried[n]), near), strict=True))
     for number in sorted(worth, key=lambda n: fitted[n].cost if n in fitted else tried[n].cost):
         better = fitted.get(number) or _ended(found, number, tried[number])
-        if found.final.cost - better.cost < ASKED:
+        if found.final.cost - better.cost < THRESHOLD:
             continue
-        deviation = deviations(found.model, better, found.block, found.handed)
+        deviation = standard_deviations(found.model, better, found.block, found.given)
         if _beyond(found, better, deviation, number):
             others = {n: f for n, f in {**tried, **fitted}.items() if n != number}
             instead = _instead(found, others, better.cost)
-            return Step(number, found.final.cost - better.cost, others, instead), better, deviation
+            return SelectionStep(number, found.final.cost - better.cost, others, instead), better, deviation
     return None
 
 
-def _instead(found: Found, others: Mapping[str, Fit], cost: float) -> dict[str, tuple[Found, float]]:
+def _instead(
+    found: SelectionResult, others: Mapping[str, Fit], cost: float
+) -> dict[str, tuple[SelectionResult, float]]:
     near = {}
     for number, fitted in others.items():
-        if fitted.cost < min(cost - 2.0 * math.log(RARE), found.final.cost - ASKED):
-            deviation = deviations(found.model, fitted, found.block, found.handed)
+        if fitted.cost < min(cost - 2.0 * math.log(RARE), found.final.cost - THRESHOLD):
+            deviation = standard_deviations(found.model, fitted, found.block, found.given)
             if _beyond(found, fitted, deviation, number):
                 near[number] = replace(found, final=fitted, deviation=deviation), fitted.cost - cost
     return near
 
 
-def _beyond(found: Found, fitted: Fit, deviation: Mapping[str, float], number: str) -> bool:
+def _beyond(found: SelectionResult, fitted: Fit, deviation: Mapping[str, float], number: str) -> bool:
     """Whether a number is off by more than chance and tolerance: every manoeuvre is one piece of evidence."""
-    off = abs(fitted.sensor[number] - found.handed.get(number, 0.0))
+    off = abs(fitted.sensor[number] - found.given.get(number, 0.0))
     spread = (deviation[number] ** 2 + found.tolerance.get(number, 0.0) ** 2) ** 0.5
     return bool(off > float(student.ppf(1.0 - 0.5 * ALPHA, found.degrees)) * spread)
 
 
-def _prune(found: Found) -> None:
+def _prune(found: SelectionResult) -> None:
     for step in list(found.steps):
-        if len(found.steps) > 1 and not _beyond(found, found.final, found.deviation, step.number):
-            rest = {n: v for n, v in found.final.sensor.items() if n != step.number}
-            found.final = fit(found.model, rest, found.final.noise, fixed=found.handed)
-            found.deviation = deviations(found.model, found.final, found.block, found.handed)
+        if len(found.steps) > 1 and not _beyond(found, found.final, found.deviation, step.parameter):
+            rest = {n: v for n, v in found.final.sensor.items() if n != step.parameter}
+            found.final = fit(found.model, rest, found.final.noise, fixed=found.given)
+            found.deviation = standard_deviations(found.model, found.final, found.block, found.given)
             found.steps.remove(step)

@@ -6,10 +6,10 @@ from typing import Any, Final
 import numpy as np
 from scipy.stats import t as student
 
-from hil.diagnosis.sensor_consistency.braking import Braking
-from hil.diagnosis.sensor_consistency.likelihood import Fit, Values, deviations, fit, usual
+from hil.diagnosis.sensor_consistency.braking import BrakingModel
+from hil.diagnosis.sensor_consistency.likelihood import Fit, Values, fit, standard_deviations, typical_noise
 from hil.diagnosis.sensor_consistency.motion import Motion
-from hil.diagnosis.sensor_consistency.selection import ALPHA, ASKED, Found, Say, Step
+from hil.diagnosis.sensor_consistency.selection import ALPHA, THRESHOLD, Progress, SelectionResult, SelectionStep
 from hil.diagnosis.vehicle.spec import Vehicle, rest_friction
 from plant.vectors import PARAMETER, P
 
@@ -35,7 +35,7 @@ def relative_sigma(vehicle: Vehicle, name: str, member: int = 0) -> float:
 
 
 def nominal_braking(vehicle: Vehicle) -> Values:
-    """The vehicle's own numbers in the model of `Braking`."""
+    """The vehicle's own numbers in the model of `BrakingModel`."""
     car, brake, p = vehicle.parameters.vehicle, vehicle.parameters.friction_brake, vehicle.p
     radius = vehicle.parameters.wheel.rolling_radius_m
     turning = 2.0 * sum(vehicle.parameters.wheel.inertia_kg_m2) / radius**2
@@ -54,18 +54,20 @@ def nominal_braking(vehicle: Vehicle) -> Values:
     }
 
 
-def stop_search(model: Braking, motion: Motion, vehicle: Vehicle, handed: Mapping[str, float], say: Say) -> Found:
+def stop_search(
+    model: BrakingModel, motion: Motion, vehicle: Vehicle, handed: Mapping[str, float], say: Progress
+) -> SelectionResult:
     """Fit all that the stops support together; a cause is what lies beyond the vehicle's tolerance."""
-    unknown = dict.fromkeys([n for n in _UNKNOWN if n in model.numbers], 0.0)
-    base = _settled(model, unknown, usual(model), handed)
+    unknown = dict.fromkeys([n for n in _UNKNOWN if n in model.parameters], 0.0)
+    base = _settled(model, unknown, typical_noise(model), handed)
     tried = []
     for start in _STARTS_S:
         sensor = {**base.sensor, **{n: handed.get(n, 0.0) for n in _FREE}}
         sensor["delay_s"] += start - 0.05
         tried.append(_settled(model, sensor, base.noise, handed))
     final = min(tried, key=lambda f: f.cost)
-    deviation = deviations(model, final, motion.block, handed)
-    found = Found(model, dict(handed), base, final, motion.block, deviation, _tolerance(vehicle, handed))
+    deviation = standard_deviations(model, final, motion.block, handed)
+    found = SelectionResult(model, dict(handed), base, final, motion.block, deviation, _tolerance(vehicle, handed))
     found.evidence = len(model.stops)
     _zero_off(model, found, say)
     for number in ("delay_s", "brake_mps2_pa"):
@@ -73,24 +75,24 @@ def stop_search(model: Braking, motion: Motion, vehicle: Vehicle, handed: Mappin
         off = abs(final.sensor[number] - handed[number])
         rest = {n: v for n, v in final.sensor.items() if n != number}
         gain = fit(model, rest, final.noise, fixed=handed).cost - final.cost
-        if off > student.ppf(1.0 - 0.5 * ALPHA, found.degrees) * spread and gain > ASKED:
-            found.steps.append(Step(number, gain, {}))
+        if off > student.ppf(1.0 - 0.5 * ALPHA, found.degrees) * spread and gain > THRESHOLD:
+            found.steps.append(SelectionStep(number, gain, {}))
             say(f"{number} = {final.sensor[number]:.4g}, gains {gain:.0f}")
     return found
 
 
-def _zero_off(model: Braking, found: Found, say: Say) -> None:
+def _zero_off(model: BrakingModel, found: SelectionResult, say: Progress) -> None:
     """The pressure's zero while the car gains speed; it was taken off before all else."""
-    off = abs(model.offset_pa - found.handed.get("offset_pa", 0.0))
+    off = abs(model.offset_pa - found.given.get("offset_pa", 0.0))
     if off > max(_LEAST_OFFSET_PA, _SURE * model.offset_sigma_pa):
         found.final.sensor["offset_pa"] = model.offset_pa
         found.deviation["offset_pa"] = max(model.offset_sigma_pa, _OFFSET_SIGMA_PA)
-        found.steps.append(Step("offset_pa", (off / found.deviation["offset_pa"]) ** 2, {}))
+        found.steps.append(SelectionStep("offset_pa", (off / found.deviation["offset_pa"]) ** 2, {}))
         say(f"the pressure reads {model.offset_pa:.0f} Pa while the car gains speed")
 
 
 def _settled(
-    model: Braking, sensor: Mapping[str, float], noise: Mapping[str, float], handed: Mapping[str, float]
+    model: BrakingModel, sensor: Mapping[str, float], noise: Mapping[str, float], handed: Mapping[str, float]
 ) -> Fit:
     found = fit(model, sensor, noise, fixed=handed)
     for _ in range(3):
@@ -111,7 +113,7 @@ def _tolerance(vehicle: Vehicle, handed: Mapping[str, float]) -> dict[str, float
     }
 
 
-def estimates(found: Found | None, motion: Motion, vehicle: Vehicle) -> dict[str, Any]:
+def estimates(found: SelectionResult | None, motion: Motion, vehicle: Vehicle) -> dict[str, Any]:
     """Numbers that the stops support, with intervals, and what the same stops say of further terms."""
     if found is None:
         return {}
@@ -121,7 +123,7 @@ def estimates(found: Found | None, motion: Motion, vehicle: Vehicle) -> dict[str
             low, high = found.interval(number)
             listed[name] = {
                 "value": found.final.sensor[number], "unit": unit, "ci95": [low, high],
-                "handed_in": found.handed.get(number),
+                "handed_in": found.given.get(number),
             }  # fmt: skip
     force = vehicle.parameters.vehicle.mass_kg * vehicle.parameters.wheel.rolling_radius_m
     share = relative_sigma(vehicle, "vehicle_mass_kg")
@@ -132,16 +134,16 @@ def estimates(found: Found | None, motion: Motion, vehicle: Vehicle) -> dict[str
     down, up = float(np.hypot(value - low, wide)), float(np.hypot(high - value, wide))
     listed["brake_torque_per_pressure"] = {
         "value": value, "unit": "N m/Pa", "ci95": [value - down, value + up],
-        "handed_in": found.handed["brake_mps2_pa"] * force,
+        "handed_in": found.given["brake_mps2_pa"] * force,
     }  # fmt: skip
     for number, effect in _HINTS.items():
-        more = {**found.final.sensor, number: found.handed.get(number, 0.0) + (0.03 if number == "lag_s" else 0.0)}
-        tried = fit(found.model, more, found.final.noise, fixed=found.handed)
-        spread = deviations(found.model, tried, found.block, found.handed)[number]
+        more = {**found.final.sensor, number: found.given.get(number, 0.0) + (0.03 if number == "lag_s" else 0.0)}
+        tried = fit(found.model, more, found.final.noise, fixed=found.given)
+        spread = standard_deviations(found.model, tried, found.block, found.given)[number]
         half = float(student.ppf(0.975, found.degrees)) * spread
         listed[f"hint_{effect}"] = {
             "value": tried.sensor[number], "unit": "s" if number == "lag_s" else "",
             "ci95": [tried.sensor[number] - half, tried.sensor[number] + half],
-            "handed_in": found.handed.get(number, 0.0), "gain": found.final.cost - tried.cost,
+            "handed_in": found.given.get(number, 0.0), "gain": found.final.cost - tried.cost,
         }  # fmt: skip
     return listed

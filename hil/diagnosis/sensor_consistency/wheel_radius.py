@@ -7,20 +7,20 @@ import numpy as np
 
 from hil.diagnosis.data.log import WHEELS, Floats
 from hil.diagnosis.sensor_consistency.kalman import Linear, innovations
-from hil.diagnosis.sensor_consistency.model import Model, Number
+from hil.diagnosis.sensor_consistency.model import Parameter, SensorModel
 from hil.diagnosis.sensor_consistency.motion import Motion
 
 SPREAD = 0.002
 """Wheel-to-wheel spread of rolling radii that no tolerance needs to state: 0.12 % on comma2k19 (effects, 13)."""
-_NOISE: Final[Mapping[str, Number]] = {
-    "slip": Number(0.002, 1e-5, 0.2, 0.3, True, 2.0),
-    "slip_s": Number(0.5, 0.05, 20.0, 0.3, True, 1.0),
-    "white": Number(0.002, 1e-5, 0.2, 0.3, True, 2.0),
+_NOISE: Final[Mapping[str, Parameter]] = {
+    "slip": Parameter(0.002, 1e-5, 0.2, 0.3, True, 2.0),
+    "slip_s": Parameter(0.5, 0.05, 20.0, 0.3, True, 1.0),
+    "white": Parameter(0.002, 1e-5, 0.2, 0.3, True, 2.0),
 }
 _FAST_MPS = 5.0
 
 
-class Wheels(Model):
+class WheelRadiusModel(SensorModel):
     """Each wheel's speed over the reference's, less 1 and less the turn: a scale, slip with the acceleration, noise.
 
     The reference is the ground speed where there is one, else the median wheel. Numbers ``fl``, ``fr``, ``rl``, ``rr``
@@ -43,8 +43,8 @@ class Wheels(Model):
         self._y = ratios
         self.unknown = ("slip_front", "slip_rear", *(("all",) if self.to_ground else ()))
         self._known = np.isfinite(ratios) * (motion.moving * (speed > _FAST_MPS))[:, None]
-        self.numbers = {w: Number(0.0, -0.5, 0.5, 0.002) for w in WHEELS} | {
-            n: Number(0.0, -0.1, 0.1, 0.001) for n in self.unknown
+        self.parameters = {w: Parameter(0.0, -0.5, 0.5, 0.002) for w in WHEELS} | {
+            n: Parameter(0.0, -0.1, 0.1, 0.001) for n in self.unknown
         }
 
     def score(self, sensor: Mapping[str, float], noise: Mapping[str, float]) -> tuple[Floats, Floats]:

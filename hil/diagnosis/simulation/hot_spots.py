@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from hil.diagnosis.data.dataset import ROW_S, Drive
+from hil.diagnosis.data.dataset import ROW_S, Recording
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.simulation.parameter_set import World
+from hil.diagnosis.simulation.parameter_set import ParameterSet
 from plant.effects.hot_spot import ORDER
 from plant.effects.theta import THETA
 from plant.vectors import INPUT
@@ -22,26 +22,26 @@ _ROWS = 5
 _ONE_ANGLE, _ANGLE = 1.0, 3.0
 
 
-def turns(world: World) -> bool:
+def has_hot_spots(world: ParameterSet) -> bool:
     """Whether angles of the wheels matter beyond a turn or two."""
     return bool(np.any(world.theta[_HOT]))
 
 
-def without_spots(world: World) -> World:
+def without_spots(world: ParameterSet) -> ParameterSet:
     """The world with even discs."""
     theta = world.theta.copy()
     theta[_HOT] = 0.0
     return replace(world, theta=theta)
 
 
-def with_spots(world: World) -> World:
+def with_spots(world: ParameterSet) -> ParameterSet:
     """The world with weak spots on all discs, of the sign of its own."""
     theta = world.theta.copy()
     theta[_HOT] = np.where(theta[_HOT] < 0.0, -_SHOWN, _SHOWN)
     return replace(world, theta=theta)
 
 
-def angles(drive: Drive) -> Floats:
+def wheel_angles(drive: Recording) -> Floats:
     """Angles by which the wheels have turned since the log began, (rows, 4), rad, from their measured speeds.
 
     A free replay drifts by radii and slips: a thousandth in 100 m is three radians of the tenth order.
@@ -50,13 +50,13 @@ def angles(drive: Drive) -> Floats:
     return np.concatenate([np.zeros((1, 4)), turned])[:-1]
 
 
-def parts(rows: slice) -> Iterator[slice]:
+def row_chunks(rows: slice) -> Iterator[slice]:
     """Rows in parts short enough for a simulated wheel to turn as the measured one."""
     for first in range(rows.start, rows.stop, _ROWS):
         yield slice(first, min(first + _ROWS, rows.stop))
 
 
-def standing(drive: Drive, left: Floats, shown: Sequence[Floats]) -> tuple[Floats, Floats]:
+def fit_phase(drive: Recording, left: Floats, shown: Sequence[Floats]) -> tuple[Floats, Floats]:
     """Angle between spots and the begin of each segment, (rows, 4), rad: where they explain the wheels' speeds best;
     and how much they would show there, (segments, 4).
 
@@ -79,8 +79,8 @@ def standing(drive: Drive, left: Floats, shown: Sequence[Floats]) -> tuple[Float
     return found, much
 
 
-def price_of_angles(much: Floats, wheels: Sequence[int]) -> float:
-    """What angles chosen by the data take off the gain of spots on these wheels, (segments, 4) as of `standing`.
+def phase_penalty(much: Floats, wheels: Sequence[int]) -> float:
+    """What angles chosen by the data take off the gain of spots on these wheels, (segments, 4) as of `fit_phase`.
 
     Spots show in N segments and wheels alike much, and noise turns each to where it looks like spots: (sum of N
     Rayleigh variables)^2 / N exceeds this and 20 as seldom as chi-squared with one degree of freedom exceeds 20 (by

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from hil.diagnosis.data.dataset import ROW_S, Drive, Segment
+from hil.diagnosis.data.dataset import ROW_S, Recording, Segment
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.simulation.parameter_set import World
+from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.sensors import ground_speed_before, wheel_speed_before
 from hil.diagnosis.vehicle.spec import Vehicle
 from plant.effects.theta import THETA
@@ -18,7 +18,7 @@ _STEADY = int(0.1 / ROW_S)
 """Rows that tell what a pressure was at the first one."""
 
 
-def start(vehicle: Vehicle, drive: Drive, world: World, given: Floats) -> Floats:
+def initial_state_of(vehicle: Vehicle, drive: Recording, world: ParameterSet, given: Floats) -> Floats:
     """State at the first row of the inputs ``given``, (rows, INPUT.size), what the sensors add taken off.
 
     What is asked at first has been asked before: a log may begin on the brakes.
@@ -48,7 +48,7 @@ def _first_pressures(given: Floats) -> Floats:
     return np.asarray(told.mean(axis=0) + rows[0] * (rows @ told) / float(rows @ rows))
 
 
-def start_speed(drive: Drive, segment: Segment, world: World) -> float:
+def start_speed(drive: Recording, segment: Segment, world: ParameterSet) -> float:
     """Speed a segment starts with: what the sensors told, less what the world's sensors add."""
     if segment.start_speed_mps is not None:
         return _moving(ground_speed_before(segment.start_speed_mps, world.theta_in(drive)))
@@ -57,7 +57,7 @@ def start_speed(drive: Drive, segment: Segment, world: World) -> float:
     return _moving(told * 0.5 * (radii[1] + radii[2]))
 
 
-def restart(x: Floats, speed_mps: float) -> None:
+def restart_segment(x: Floats, speed_mps: float) -> None:
     """The measured speed with the slips as they are; temperatures, friction, energy and pitch go on."""
     now = x[X.speed_mps]
     wheels = STATE.slice("wheel_speed_rad_s")
@@ -75,7 +75,7 @@ def restart(x: Floats, speed_mps: float) -> None:
         x[STATE.slice(name)] *= ratio if rolls else 0.0
 
 
-def _radius_m(world: World) -> Floats:
+def _radius_m(world: ParameterSet) -> Floats:
     """Rolling radius of each wheel, (4,), effects that change it included: no slip at the start that nobody drove."""
     worn = 1.0 + world.theta[THETA.slice("tyre_radius", "gain")]
     flat = 1.0 - 0.01 * world.theta[THETA.slice("tyre_pressure_loss", "share")]

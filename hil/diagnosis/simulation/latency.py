@@ -3,7 +3,7 @@
 import numpy as np
 
 from hil.diagnosis.data.dataset import ROW_S
-from hil.diagnosis.data.interpolation import between, straight_at
+from hil.diagnosis.data.interpolation import shifted, shifted_linear
 from hil.diagnosis.data.log import Floats
 from plant.vectors import INPUT
 
@@ -11,16 +11,16 @@ _MEASURED = (("pressure_pa", 1), ("motor_torque_nm", 2), ("motor_torque_bend_nm"
 _STEERING = INPUT.slice("steering_wheel_rad")
 
 
-def later(values: Floats, rows: float, straight: bool = False) -> Floats:
+def delayed(values: Floats, rows: float, straight: bool = False) -> Floats:
     """Channels as seen some rows later.
 
     ``straight`` lines between rows for what has corners, as a motor at its rate limit; else `hil.diagnosis.data.interpolation`.
     """
     out = np.empty(values.shape)
     if straight:
-        straight_at(values, 1, rows, out)
+        shifted_linear(values, 1, rows, out)
     else:
-        between(values, rows, out)
+        shifted(values, rows, out)
     return out
 
 
@@ -35,16 +35,16 @@ def _held_later(values: Floats, rows: float) -> Floats:
     return moved
 
 
-def in_time(inputs: Floats, late_s: tuple[float, ...]) -> Floats:
+def without_latency(inputs: Floats, late_s: tuple[float, ...]) -> Floats:
     """Measured inputs with their nodes' latency taken back, demands when they are acted on."""
     if not any(late_s[1:5]):
         return inputs
     moved = inputs.copy()
-    moved[:, _STEERING] = later(inputs[:, _STEERING], late_s[4] / ROW_S)
+    moved[:, _STEERING] = delayed(inputs[:, _STEERING], late_s[4] / ROW_S)
     for part in ("pressure_demand_pa", "motor_demand_nm"):
         where = INPUT.slice(part)
         moved[:, where] = _held_later(inputs[:, where], late_s[3] / ROW_S)
     for part, late in _MEASURED:
         where = INPUT.slice(part)
-        moved[:, where] = later(inputs[:, where], -late_s[late] / ROW_S, straight=True)
+        moved[:, where] = delayed(inputs[:, where], -late_s[late] / ROW_S, straight=True)
     return moved

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.diagnosis.compiled import compiled
-from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Drive
-from hil.diagnosis.data.interpolation import cubic, finer, straight_at
+from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Recording
+from hil.diagnosis.data.interpolation import cubic, shifted_linear, upsampled
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.data.prepare import averaged
-from hil.diagnosis.simulation.latency import later
-from hil.diagnosis.simulation.parameter_set import World
-from hil.diagnosis.simulation.sensors import sensed
+from hil.diagnosis.simulation.latency import delayed
+from hil.diagnosis.simulation.parameter_set import ParameterSet
+from hil.diagnosis.simulation.sensors import after_sensors
 from plant.effects.sensing.chain import Chain
 from plant.parameters.plant import PlantParameters
 from plant.vectors import INPUT
@@ -41,7 +41,7 @@ would come 1.3 ms late."""
 
 
 @dataclass(frozen=True)
-class Telling:
+class MeasurementModel:
     """Channels of a case: which ``groups`` there are, the car's teeth and radius, the speed its turning goes with."""
 
     groups: Sequence[str]
@@ -58,35 +58,35 @@ class Telling:
             at += width
         return stack
 
-    def told(self, drive: Drive, world: World, table: Floats) -> Stack:
+    def measure(self, drive: Recording, world: ParameterSet, table: Floats) -> Stack:
         """Channels as sensors, frames and the tables of logs give what was noted."""
-        stack = self.at_rows(self.split(table), drive, world)
+        stack = self.measure_rows(self.split(table), drive, world)
         found = {group: averaged(values, drive.stride) for group, values in stack.items()}
         if "wheel" in found:
             self._at_measured_speed(found, drive)
         return found
 
-    def at_rows(self, happened: Stack, drive: Drive, world: World) -> Stack:
+    def measure_rows(self, happened: Stack, drive: Recording, world: ParameterSet) -> Stack:
         """Channels as sensors and frames give what happened, row by row."""
         chain = Chain(world.theta_in(drive))
         others = {group: values for group, values in happened.items() if group != "motor"}
-        stack = sensed(others, chain, ROW_S) if others else {}
+        stack = after_sensors(others, chain, ROW_S) if others else {}
         for group, values in stack.items():
-            late = sum(world.late_s[k] for k in _LATE.get(group, ()))
+            late = sum(world.latency_s[k] for k in _LATE.get(group, ()))
             if late:
-                stack[group] = later(values, late / ROW_S, straight=group == "pressure")
+                stack[group] = delayed(values, late / ROW_S, straight=group == "pressure")
             elif group == "wheel":
                 half_turned = np.pi / self.parameters.sensor.teeth / ROW_S
                 stack[group] = np.empty_like(values)
                 toothed(values, world.window_rows2, half_turned, world.tooth_share, stack[group])
         if "motor" in happened:
             fine = _finer(happened["motor"], drive.inputs[:, INPUT.slice("motor_torque_bend_nm")])
-            fine = sensed({"motor": fine}, chain, ROW_S / _FINER)["motor"]
+            fine = after_sensors({"motor": fine}, chain, ROW_S / _FINER)["motor"]
             stack["motor"] = np.empty_like(happened["motor"])
-            straight_at(fine, _FINER, _FINER * world.late_s[_MOTOR] / ROW_S, stack["motor"])
+            shifted_linear(fine, _FINER, _FINER * world.latency_s[_MOTOR] / ROW_S, stack["motor"])
         return stack
 
-    def _at_measured_speed(self, found: Stack, drive: Drive) -> None:
+    def _at_measured_speed(self, found: Stack, drive: Recording) -> None:
         """The turning of the car as it is at the measured speed."""
         factors = np.empty((2, len(found["wheel"])))
         radius_m = self.parameters.wheel.rolling_radius_m
@@ -128,7 +128,7 @@ def faster_turning(measured: Floats, omega: Floats, radius_m: float, characteris
 def _finer(torque_nm: Floats, bend_nm: Floats) -> Floats:
     """Torque on rows and between them: a parabola that is off the straight line by ``bend_nm`` in the middle."""
     out = np.empty((len(torque_nm) * _FINER, torque_nm.shape[1]))
-    finer(torque_nm, bend_nm, out)
+    upsampled(torque_nm, bend_nm, out)
     return out
 
 

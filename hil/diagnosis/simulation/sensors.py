@@ -15,7 +15,7 @@ Stack = Mapping[str, Floats]
 _IMU = ("ax", "ay", "yaw")
 _NODE = {"wheel": "wheel", "pressure": "pressure", "motor": "motor", "gps": GROUND}
 _INPUT = {"pressure": "pressure_pa", "motor": "motor_torque_nm"}
-WATCHING = np.concatenate(
+OUTPUT_SENSORS = np.concatenate(
     [
         np.arange(THETA.size)[THETA.slice(effect.name, parameter.name)]
         for effect in SENSING
@@ -36,7 +36,7 @@ _GROUND_SCALE = THETA.slice("speed_scale", "gain").start
 _WHEEL_SCALE = THETA.slice("wrong_scale", "factor").start + NODES.index("wheel")
 
 
-def inverted(inputs: Floats, theta: Floats, row_s: float) -> Floats:
+def before_sensors(inputs: Floats, theta: Floats, row_s: float) -> Floats:
     """Inputs as they were before the sensors; what loses information (a filter, a step) is left as it is."""
     chain = Chain(theta)
     if not any(chain.touches(node) for node in _INPUT):
@@ -53,7 +53,7 @@ def inverted(inputs: Floats, theta: Floats, row_s: float) -> Floats:
     return true
 
 
-def sensed(stack: Stack, chain: Chain, row_s: float) -> dict[str, Floats]:
+def after_sensors(stack: Stack, chain: Chain, row_s: float) -> dict[str, Floats]:
     """Channels as the sensors give them."""
     found = dict(stack)
     time_s: Floats = np.arange(len(next(iter(stack.values())))) * row_s

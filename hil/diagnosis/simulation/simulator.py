@@ -11,18 +11,26 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import savgol_filter
 
 from hil.diagnosis.compiled import WORKERS
-from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Case, Drive, Segment
+from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Dataset, Recording, Segment
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.data.prepare import averaged
-from hil.diagnosis.parallel import side_by_side
+from hil.diagnosis.parallel import parallel_map
 from hil.diagnosis.simulation import excitation as acting
-from hil.diagnosis.simulation.hot_spots import QUARTER_RAD, angles, parts, standing, turns, with_spots, without_spots
-from hil.diagnosis.simulation.initial_state import restart, start, start_speed
-from hil.diagnosis.simulation.latency import in_time
-from hil.diagnosis.simulation.measurement_model import SOURCE, Stack, Telling, powers
-from hil.diagnosis.simulation.parameter_set import World, apart, told_alike
-from hil.diagnosis.simulation.sensors import inverted
-from hil.diagnosis.simulation.substeps import STEPS, at_once
+from hil.diagnosis.simulation.hot_spots import (
+    QUARTER_RAD,
+    fit_phase,
+    has_hot_spots,
+    row_chunks,
+    wheel_angles,
+    with_spots,
+    without_spots,
+)
+from hil.diagnosis.simulation.initial_state import initial_state_of, restart_segment, start_speed
+from hil.diagnosis.simulation.latency import without_latency
+from hil.diagnosis.simulation.measurement_model import SOURCE, MeasurementModel, Stack, powers
+from hil.diagnosis.simulation.parameter_set import ParameterSet, excitation_that_separates, same_sensors
+from hil.diagnosis.simulation.sensors import before_sensors
+from hil.diagnosis.simulation.substeps import STEPS, rows_per_step
 from hil.diagnosis.vehicle.spec import Vehicle
 from plant.effects.plugin import NO_PLUGINS
 from plant.effects.states import EXTRA_STATES
@@ -62,7 +70,7 @@ class _Replay:
 class _Kept:
     """A world, its replay of each drive, and what its sensors told of them."""
 
-    world: World
+    world: ParameterSet
     replays: Sequence[_Replay]
     told: Sequence[Stack]
 
@@ -72,25 +80,25 @@ class _Made:
     """The world that made what drives the car; for each drive its inputs as that world tells them, and these taken back
     again. The latter differ from the inputs by what reading between rows costs, twice."""
 
-    world: World
+    world: ParameterSet
     told: list[tuple[Floats, Floats]]
 
 
-def _taken_back(inputs: Floats, drive: Drive, world: World) -> Floats:
+def _taken_back(inputs: Floats, drive: Recording, world: ParameterSet) -> Floats:
     """Measured inputs of a drive without what sensors and nodes of a world added; demands when they are acted on."""
-    return in_time(inverted(inputs, world.theta_in(drive), ROW_S), world.late_s)
+    return without_latency(before_sensors(inputs, world.theta_in(drive), ROW_S), world.latency_s)
 
 
-def _samples(drive: Drive, segment: Segment) -> slice:
+def _samples(drive: Recording, segment: Segment) -> slice:
     """Samples of a segment."""
     return slice(segment.first // drive.stride, segment.last // drive.stride)
 
 
-def _going_on(drive: Drive, segment: Segment) -> acting.Acting:
+def _going_on(drive: Recording, segment: Segment) -> acting.Excitation:
     """What is going on in a segment."""
     rows, samples = drive.inputs[segment.first : segment.last], _samples(drive, segment)
     ay = drive.measured.get("ay")
-    return acting.in_segment(rows, drive.speed_mps[samples], None if ay is None else ay[samples])
+    return acting.excitation_of(rows, drive.speed_mps[samples], None if ay is None else ay[samples])
 
 
 def _with_theta(parts: Iterable[slice], thetas: Sequence[tuple[int, Floats]]) -> Iterator[tuple[slice, Floats]]:
@@ -103,39 +111,39 @@ def _with_theta(parts: Iterable[slice], thetas: Sequence[tuple[int, Floats]]) ->
                 yield slice(first, last), theta
 
 
-class Rig:
+class Simulator:
     """Replays worlds over the drives of a case.
 
     Limits of motors and turning are those at the measured wheel speed: a motor at its limits and a car in a bend answer
     every error of the speed, whatever made it.
     """
 
-    def __init__(self, case: Case, vehicle: Vehicle, characteristic_mps: float = np.inf) -> None:
-        self.case, self.vehicle = case, vehicle
-        self.telling = Telling(case.groups, vehicle.parameters, characteristic_mps)
+    def __init__(self, case: Dataset, vehicle: Vehicle, characteristic_mps: float = np.inf) -> None:
+        self.dataset, self.vehicle = case, vehicle
+        self.measurement_model = MeasurementModel(case.groups, vehicle.parameters, characteristic_mps)
         self._groups = case.groups
         names = [name for group in case.groups for name in SOURCE[group]]
         self._columns = column_indices(names)
         self._road = road_table(DRY)
-        self._going_on = [[_going_on(drive, segment) for segment in drive.segments] for drive in case.drives]
-        self._given = [drive.inputs for drive in case.drives]
-        self._pace = [at_once(drive) for drive in case.drives]
+        self._going_on = [[_going_on(drive, segment) for segment in drive.segments] for drive in case.recordings]
+        self._given = [drive.inputs for drive in case.recordings]
+        self._pace = [rows_per_step(drive) for drive in case.recordings]
         self._kept: _Kept | None = None
         self._made: _Made | None = None
         self._turned: list[Floats] = []
-        self.shown: Floats = np.zeros((0, 4))
+        self.hot_spot_visibility: Floats = np.zeros((0, 4))
         """How much hot spots would show, by segment and wheel, where `align` chose angles."""
         self.runs = 0
 
-    def quieted(self, world: World) -> "Rig":
+    def denoised(self, world: ParameterSet) -> "Simulator":
         """A rig whose measured pressures and motor torques are rid of noise, those of fading motors left out."""
-        drives = [replace(drive, measured=self._without_fading(drive, world)) for drive in self.case.drives]
-        rig = Rig(replace(self.case, drives=tuple(drives)), self.vehicle, self._characteristic(world))
-        rig.quieten(world)
-        rig._pace = [at_once(drive) for drive in rig.case.drives]
+        drives = [replace(drive, measured=self._without_fading(drive, world)) for drive in self.dataset.recordings]
+        rig = Simulator(replace(self.dataset, recordings=tuple(drives)), self.vehicle, self._characteristic(world))
+        rig.denoise_inputs(world)
+        rig._pace = [rows_per_step(drive) for drive in rig.dataset.recordings]
         return rig
 
-    def align(self, world: World) -> bool:
+    def fit_hot_spot_phase(self, world: ParameterSet) -> bool:
         """Turn the discs' hot spots to where they explain most of the wheels' speeds; whether this world has any.
 
         Neither a log nor a drawing tells how a wheel stood when the log began.
@@ -143,32 +151,32 @@ class Rig:
         if "wheel" not in self._groups:
             return False
         bare = self.run(without_spots(world))["wheel"]
-        turned, shown = [angles(drive) for drive in self.case.drives], []
+        turned, shown = [wheel_angles(drive) for drive in self.dataset.recordings], []
         for offset in (0.0, QUARTER_RAD):
             self._turned = [angle + offset for angle in turned]
             shown.append(self.run(with_spots(world))["wheel"] - bare)
-        ends = np.cumsum([drive.samples for drive in self.case.drives])[:-1]
+        ends = np.cumsum([drive.samples for drive in self.dataset.recordings])[:-1]
         each = zip(*(np.split(values, ends) for values in (self.measured()["wheel"] - bare, *shown)), strict=True)
-        stood = [standing(drive, left, of) for drive, (left, *of) in zip(self.case.drives, each, strict=True)]
+        stood = [fit_phase(drive, left, of) for drive, (left, *of) in zip(self.dataset.recordings, each, strict=True)]
         stand, much = zip(*stood, strict=True)
-        self.shown = np.vstack(much)
+        self.hot_spot_visibility = np.vstack(much)
         self._turned = [angle + offset for angle, offset in zip(turned, stand, strict=True)]
-        return turns(world)
+        return has_hot_spots(world)
 
-    def quieten(self, world: World) -> None:
+    def denoise_inputs(self, world: ParameterSet) -> None:
         """What drives the car becomes the simulated value plus the smoothed difference of the measured one.
 
         So steps stay sharp, between two samples too, if this world has what makes them. The measured one is taken back
         first: what its node, in this world, scaled or sampled late.
         """
         self._kept = self._made = None
-        made = side_by_side(lambda drive: self._made_by(drive, world), self.case.drives)
-        self.case = replace(self.case, drives=tuple(drive for drive, _ in made))
+        made = parallel_map(lambda drive: self._made_by(drive, world), self.dataset.recordings)
+        self.dataset = replace(self.dataset, recordings=tuple(drive for drive, _ in made))
         self._made = _Made(world, [told for _, told in made])
 
-    def _made_by(self, drive: Drive, world: World) -> tuple[Drive, tuple[Floats, Floats]]:
+    def _made_by(self, drive: Recording, world: ParameterSet) -> tuple[Recording, tuple[Floats, Floats]]:
         """A drive with the inputs of `quieten`; and these as told, and taken back again, as in `_Made`."""
-        wanted = [one for one in _INPUTS if one[0] in self._groups and one[0] in self.case.followed]
+        wanted = [one for one in _INPUTS if one[0] in self._groups and one[0] in self.dataset.tracked_actuators]
         given = self._given[drive.number]
         drive = replace(drive, inputs=given)
         raw = self._raw(drive, world)
@@ -182,37 +190,39 @@ class Rig:
             inputs[:, INPUT.slice("motor_torque_bend_nm")] = self._bend(drive, world)
         again = given.copy()
         drive = replace(drive, inputs=inputs)
-        seen = self.telling.at_rows({group: inputs[:, INPUT.slice(part)] for group, part in wanted}, drive, world)
+        seen = self.measurement_model.measure_rows(
+            {group: inputs[:, INPUT.slice(part)] for group, part in wanted}, drive, world
+        )
         for group, part in wanted:
             again[:, INPUT.slice(part)] = seen[group]
         return drive, (again, _taken_back(again, drive, world))
 
-    def _driving(self, drive: Drive, world: World) -> Floats:
+    def _driving(self, drive: Recording, world: ParameterSet) -> Floats:
         """What drives the car in a world whose sensors and nodes told it as it is in the logs."""
         if self._made is None:
             return _taken_back(drive.inputs, drive, world)
-        if told_alike(world, self._made.world):
+        if same_sensors(world, self._made.world):
             return drive.inputs
         told, back = self._made.told[drive.number]
         return np.asarray(drive.inputs + (_taken_back(told, drive, world) - back))
 
-    def _bend(self, drive: Drive, world: World) -> Floats:
+    def _bend(self, drive: Recording, world: ParameterSet) -> Floats:
         """Torque of the simulated motors in the middle of each row, beyond the straight line to the next, (rows, 4)."""
         halves = np.repeat(drive.inputs, 2, axis=0)
         halves[1:-1:2, U.steering_wheel_rad :] += 0.5 * np.diff(drive.inputs[:, U.steering_wheel_rad :], axis=0)
         columns = column_indices(SOURCE["motor"])
         table = np.empty((len(halves), len(columns)))
         simulate(
-            start(self.vehicle, drive, world, drive.inputs), halves, self.case.cut, healthy(), world.p, self._road,
+            initial_state_of(self.vehicle, drive, world, drive.inputs), halves, self.dataset.measured_input_mask, healthy(), world.p, self._road,
             ROW_S / 2, 1, np.ones(len(halves), np.int64), EXPONENTIAL, columns, table, OUTPUT.zeros(),
-            world.theta_in(drive), world.terms, NO_PLUGINS,
+            world.theta_in(drive), world.nonparametric_rows, NO_PLUGINS,
         )  # fmt: skip
         torque, middle = table[::2], table[1::2]
         following = np.concatenate((torque[1:], torque[-1:]))
         return middle - 0.5 * (torque + following)
 
     @staticmethod
-    def _without_fading(drive: Drive, world: World) -> Stack:
+    def _without_fading(drive: Recording, world: ParameterSet) -> Stack:
         """Measured channels without motors whose braking fades: there it answers errors of speed no sensor resolves.
 
         Which way a wheel at rest creeps is such an error, too: there any torque may be taken for one that brakes.
@@ -225,7 +235,7 @@ class Rig:
         fades = brakes | ((np.abs(speed) < _FADING_MPS) & (np.abs(asked) > _LEAST_NM))
         return {**drive.measured, "motor": np.where(fades, np.nan, drive.measured["motor"])}
 
-    def _characteristic(self, world: World) -> float:
+    def _characteristic(self, world: ParameterSet) -> float:
         """Characteristic speed of the simulated car, m/s: how its turning answers a small difference of the speed."""
         if not {"wheel", "ay"} <= set(self._groups):
             return np.inf
@@ -244,66 +254,66 @@ class Rig:
 
         return float(np.exp(minimize_scalar(off, bounds=np.log(_CHARACTERISTIC_MPS), method="bounded").x))
 
-    def _stacked(self, world: World) -> Stack:
-        parts = [self._raw(drive, world) for drive in self.case.drives]
+    def _stacked(self, world: ParameterSet) -> Stack:
+        parts = [self._raw(drive, world) for drive in self.dataset.recordings]
         return {group: np.concatenate([part[group] for part in parts]) for group in self._groups}
 
-    def run(self, world: World) -> Stack:
+    def run(self, world: ParameterSet) -> Stack:
         """Simulated channels of all drives."""
         self.runs += 1
-        parts = side_by_side(lambda drive: self._drive(drive, world), self.case.drives)
+        parts = parallel_map(lambda drive: self._drive(drive, world), self.dataset.recordings)
         return {group: np.concatenate([part[group] for part in parts]) for group in self._groups}
 
-    def keep(self, world: World) -> None:
+    def cache_baseline(self, world: ParameterSet) -> None:
         """Keep the motion of this world: others are simulated only where they can differ from it."""
         self._kept = None
 
-        def kept(drive: Drive) -> tuple[_Replay, Stack]:
+        def kept(drive: Recording) -> tuple[_Replay, Stack]:
             replay = self._replayed(drive, world, self._columns)
-            return replay, self.telling.told(drive, world, replay.table)
+            return replay, self.measurement_model.measure(drive, world, replay.table)
 
-        replays, told = zip(*side_by_side(kept, self.case.drives), strict=True)
+        replays, told = zip(*parallel_map(kept, self.dataset.recordings), strict=True)
         self._kept = _Kept(world, replays, told)
 
-    def run_all(self, worlds: Sequence[World]) -> Iterator[Stack]:
+    def run_all(self, worlds: Sequence[ParameterSet]) -> Iterator[Stack]:
         """Of many worlds, in order, over threads."""
         with ThreadPoolExecutor(WORKERS) as pool:
             yield from pool.map(self.run, worlds)
 
-    def residual(self, world: World) -> Stack:
+    def residual(self, world: ParameterSet) -> Stack:
         """Measured less simulated, (samples, channels); NaN where nothing is measured."""
         simulated = self.run(world)
         return {group: measured - simulated[group] for group, measured in self.measured().items()}
 
     def measured(self) -> Stack:
         """Measured channels of all drives."""
-        return {g: np.concatenate([drive.measured[g] for drive in self.case.drives]) for g in self._groups}
+        return {g: np.concatenate([drive.measured[g] for drive in self.dataset.recordings]) for g in self._groups}
 
-    def _drive(self, drive: Drive, world: World) -> Stack:
+    def _drive(self, drive: Recording, world: ParameterSet) -> Stack:
         """Simulated channels of one drive; from what was kept where the worlds cannot differ."""
         kept = self._kept
         if kept is None:
-            return self.telling.told(drive, world, self._replayed(drive, world, self._columns).table)
-        needed, alike = apart(world, kept.world, drive), told_alike(world, kept.world)
+            return self.measurement_model.measure(drive, world, self._replayed(drive, world, self._columns).table)
+        needed, alike = excitation_that_separates(world, kept.world, drive), same_sensors(world, kept.world)
         differs = [bool(needed & going_on) for going_on in self._going_on[drive.number]]
         if alike and not any(differs):
             return kept.told[drive.number]
         replay = kept.replays[drive.number]
         if any(differs):
             replay = self._replayed(drive, world, self._columns, replay, differs, alike)
-        return self.telling.told(drive, world, replay.table)
+        return self.measurement_model.measure(drive, world, replay.table)
 
-    def states(self, world: World, names: Sequence[str]) -> Floats:
+    def states(self, world: ParameterSet, names: Sequence[str]) -> Floats:
         """States and outputs by name (`plant.model.column_indices`) over all drives, (rows, names)."""
         columns = column_indices(list(names))
-        return np.concatenate([self._replayed(drive, world, columns).table for drive in self.case.drives])
+        return np.concatenate([self._replayed(drive, world, columns).table for drive in self.dataset.recordings])
 
-    def _raw(self, drive: Drive, world: World) -> Stack:
+    def _raw(self, drive: Recording, world: ParameterSet) -> Stack:
         """What a world does in one drive, before any sensor."""
-        return self.telling.split(self._replayed(drive, world, self._columns).table)
+        return self.measurement_model.split(self._replayed(drive, world, self._columns).table)
 
     def _replayed(
-        self, drive: Drive, world: World, columns: NDArray[np.int64], kept: _Replay | None = None,
+        self, drive: Recording, world: ParameterSet, columns: NDArray[np.int64], kept: _Replay | None = None,
         differs: Sequence[bool] = (), alike: bool = False,
     ) -> _Replay:  # fmt: skip
         """One drive, noting what ``columns`` ask for at every row.
@@ -313,11 +323,11 @@ class Rig:
         """
         thetas = world.thetas_in(drive)
         inputs = kept.inputs if kept is not None and alike else self._driving(drive, world)
-        x = start(self.vehicle, drive, world, inputs)
+        x = initial_state_of(self.vehicle, drive, world, inputs)
         table = np.empty((len(inputs), len(columns)))
-        cut, switch, y, pace = self.case.cut, healthy(), OUTPUT.zeros(), self._pace[drive.number]
+        cut, switch, y, pace = self.dataset.measured_input_mask, healthy(), OUTPUT.zeros(), self._pace[drive.number]
         states = [x.copy()]
-        turned = self._turned[drive.number] if self._turned and turns(world) else None
+        turned = self._turned[drive.number] if self._turned and has_hot_spots(world) else None
         for number, segment in enumerate(drive.segments):
             rows = slice(segment.first, segment.last)
             if kept is not None and not differs[number]:
@@ -327,14 +337,14 @@ class Rig:
                 x[_SLOW] += ahead
                 continue
             if number:
-                restart(x, start_speed(drive, segment, world))
-            for part, theta in _with_theta([rows] if turned is None else parts(rows), thetas):
+                restart_segment(x, start_speed(drive, segment, world))
+            for part, theta in _with_theta([rows] if turned is None else row_chunks(rows), thetas):
                 if turned is not None:
                     x[_ANGLES] = turned[part.start]
                 given = inputs[part.start : min(part.stop + 1, rows.stop)]
                 simulate(
                     x, given, cut, switch, world.p, self._road, ROW_S / STEPS, STEPS, pace[part], EXPONENTIAL,
-                    columns, table[part], y, theta, world.terms, NO_PLUGINS,
+                    columns, table[part], y, theta, world.nonparametric_rows, NO_PLUGINS,
                 )  # fmt: skip
             states.append(x.copy())
         return _Replay(inputs, table, tuple(states))

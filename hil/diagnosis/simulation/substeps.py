@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.diagnosis.data.dataset import ROW_S, Drive
+from hil.diagnosis.data.dataset import ROW_S, Recording
 from plant.rolling import ROLLING_MPS
 from plant.vectors import INPUT
 
@@ -17,7 +17,7 @@ _STANDS_MPS, _SETTLED_S = 0.05, 3.0
 """Speed below which a measured car stands, and how long after that it no longer swings."""
 
 
-def at_once(drive: Drive) -> NDArray[np.int64]:
+def rows_per_step(drive: Recording) -> NDArray[np.int64]:
     """How many steps each row of a drive makes as one.
 
     A motor follows a step of its demand within some 0.1 s, the pressure in 0.2 s; the tyres' limit is stiff, and so is
@@ -40,7 +40,7 @@ def at_once(drive: Drive) -> NDArray[np.int64]:
     return np.where(quick, 1, np.where(hard | creeps, STEPS // 2, STEPS))
 
 
-def _stood(drive: Drive) -> NDArray[np.bool_]:
+def _stood(drive: Recording) -> NDArray[np.bool_]:
     """Whether the measured car has stood for long, or since the log began, (samples,)."""
     samples = max(round(_SETTLED_S / (drive.stride * ROW_S)), 1)
     moves = np.concatenate((np.zeros(samples), np.where(np.abs(drive.speed_mps) > _STANDS_MPS, 1.0, 0.0)))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from hil.diagnosis.data.log import Floats, UnusableError
-from hil.diagnosis.simulation.parameter_set import World
+from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.effects import EffectError, read_laws, written_laws
 from plant.effects.bank import NO_TERMS
 from plant.effects.theta import THETA
@@ -22,9 +22,9 @@ class Extension:
 
     theta: Floats
     parameters: Mapping[str, list[float]]
-    terms: Floats = field(default_factory=NO_TERMS.copy)
+    nonparametric_rows: Floats = field(default_factory=NO_TERMS.copy)
 
-    def applied(self, world: World) -> World:
+    def applied(self, world: ParameterSet) -> ParameterSet:
         """A world with the extension."""
         p = world.p.copy()
         for name, values in self.parameters.items():
@@ -33,10 +33,12 @@ class Extension:
         moved = self.theta != neutral
         theta = world.theta.copy()
         theta[moved] = self.theta[moved]
-        return replace(world, p=p, theta=theta, terms=np.vstack([world.terms, self.terms]))
+        return replace(
+            world, p=p, theta=theta, nonparametric_rows=np.vstack([world.nonparametric_rows, self.nonparametric_rows])
+        )
 
 
-def write_extension(path: Path, handed_in: World, extended: World, note: str) -> None:
+def write_extension(path: Path, handed_in: ParameterSet, extended: ParameterSet, note: str) -> None:
     """Write what the extended world has and the one handed in has not."""
     lines = [
         f"# {note}",
@@ -62,7 +64,7 @@ def write_extension(path: Path, handed_in: World, extended: World, note: str) ->
                 entries.append(f"{time} = {value!r}")
         if entries:
             lines += [f"[effects.{effect.name}]", *entries, ""]
-    for law in written_laws(extended.terms):
+    for law in written_laws(extended.nonparametric_rows):
         lines += ["[[laws]]", *(f"{name} = {json.dumps(value)}" for name, value in law.items()), ""]
     moved = extended.p != handed_in.p
     if moved.any():

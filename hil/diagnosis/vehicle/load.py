@@ -22,8 +22,8 @@ from hil.diagnosis.vehicle.keys import (
     UNLIMITED,
     WIDE,
 )
-from hil.diagnosis.vehicle.priors import Nuisance, guessed, listed
-from hil.diagnosis.vehicle.side_to_side import lagging, scattered
+from hil.diagnosis.vehicle.priors import Nuisance, nuisance_parameters, with_wide_prior
+from hil.diagnosis.vehicle.side_to_side import line_lag, side_to_side_variation
 from hil.diagnosis.vehicle.spec import Vehicle, with_constant_friction, with_gains
 from hil.parameters import ParameterError, is_number, load_set, override
 from plant.model import pack
@@ -129,7 +129,7 @@ def _from_flat(table: Mapping[str, Any], where: str) -> Vehicle:
     vehicle = _vehicle(parameters, tolerance, friction or not gains, remarks, stated.names)
     told = stated.names | {_of_both(name) for name in stated.tolerances}
     nuisances = tuple(
-        guessed(one, vehicle.p)
+        with_wide_prior(one, vehicle.p)
         if _of_both(one.name) in missing or (one.name.startswith(_FORMS) and _of_both(one.name) not in told)
         else one
         for one in vehicle.nuisances
@@ -137,11 +137,11 @@ def _from_flat(table: Mapping[str, Any], where: str) -> Vehicle:
     if is_number(stated.numbers.get(_THRESHOLD)):
         nuisances = _as_one(nuisances, _THRESHOLD)
     if unlimited:  # who states every limit has measured the rest as well
-        nuisances = (*nuisances, *scattered(vehicle.p, motors="motor" not in unstated))
-    nuisances = (*nuisances, *lagging(stated.tolerances.get(LINE, LINE_S)))
+        nuisances = (*nuisances, *side_to_side_variation(vehicle.p, motors="motor" not in unstated))
+    nuisances = (*nuisances, *line_lag(stated.tolerances.get(LINE, LINE_S)))
     sprung = {name for name in PARAMETER.sizes if name.startswith("suspension_")} <= stated.names
     return replace(
-        vehicle, nuisances=nuisances, unstated=unstated, unlimited=unlimited, sprung=sprung,
+        vehicle, nuisances=nuisances, unstated=unstated, unlimited=unlimited, suspension_stated=sprung,
         node_latency_s=stated.tolerances.get(LATENCY, LATENCY_S),
     )  # fmt: skip
 
@@ -306,4 +306,4 @@ def _vehicle(
     stated: Collection[str],
 ) -> Vehicle:  # fmt: skip
     p = pack(parameters)
-    return Vehicle(parameters, p, tuple(listed(p, tolerance, PARAMETER, stated)), thermal, remarks)
+    return Vehicle(parameters, p, tuple(nuisance_parameters(p, tolerance, PARAMETER, stated)), thermal, remarks)

@@ -57,22 +57,22 @@ class Nuisance:
     at: tuple[int, ...]
     step: tuple[float, ...]
     kind: str = "vehicle"
-    farthest: float = 3.0
-    most: float = np.inf
+    bound: float = 3.0
+    upper_bound: float = np.inf
 
     @property
-    def highest(self) -> float:
+    def upper(self) -> float:
         """How many standard deviations it may be more at most."""
-        return min(self.farthest, self.most)
+        return min(self.bound, self.upper_bound)
 
 
-def guessed(nuisance: Nuisance, p: Floats) -> Nuisance:
+def with_wide_prior(nuisance: Nuisance, p: Floats) -> Nuisance:
     """A number that no set states may go far, but a positive one to no more than five times or a fifth."""
     if nuisance.kind == "signed":
-        return replace(nuisance, farthest=_GUESSED)
+        return replace(nuisance, bound=_GUESSED)
     factor = max(factor_of(p[at], step) for at, step in zip(nuisance.at, nuisance.step, strict=True))
     limit = np.log(_MOST_TIMES) / np.log(factor) if factor > 1.0 else _GUESSED
-    return replace(nuisance, farthest=min(_GUESSED, float(limit)))
+    return replace(nuisance, bound=min(_GUESSED, float(limit)))
 
 
 def factor_of(now: float, step: float) -> float:
@@ -87,7 +87,9 @@ def _amount(now: float, step: float, then: float) -> float:
     return float(np.log(then / now) / np.log(factor)) if factor > 1.0 else (then - now) / step
 
 
-def listed(p: Floats, tolerance: Mapping[str, float], layout: Layout, stated: Collection[str]) -> list[Nuisance]:
+def nuisance_parameters(
+    p: Floats, tolerance: Mapping[str, float], layout: Layout, stated: Collection[str]
+) -> list[Nuisance]:
     """One a parameter; what acts alike is one (radius and area, pad numbers), axles are moved together or apart.
 
     Parameters
@@ -145,7 +147,7 @@ def listed(p: Floats, tolerance: Mapping[str, float], layout: Layout, stated: Co
     add("tyre_curve", [curve], [1.5])
     of_one = float(p[layout.slice("tyre_pex1").start])
     if of_one > 0.0:  # E is 1 at most (Pacejka 2012, eq. 4.E14)
-        found[-1] = replace(found[-1], most=_amount(float(p[curve]), found[-1].step[0], 1.0 / of_one))
+        found[-1] = replace(found[-1], upper_bound=_amount(float(p[curve]), found[-1].step[0], 1.0 / of_one))
     add("tyre_shape", [layout.slice("tyre_lcx").start], [0.25])
     add("tyre_stiffness_load", [layout.slice("tyre_pkx3").start], [0.3])
     side = layout.slice("tyre_pky2").start

@@ -21,13 +21,13 @@ _STRAIGHT_AHEAD_RAD = 0.01
 be set within 3 to 5 degrees of that (Hyundai Motor, Grandeur 2006: within 5, nonlinear by 2.5); here half a degree."""
 
 
-def scattered(p: Floats, motors: bool) -> tuple[Nuisance, ...]:
+def side_to_side_variation(p: Floats, motors: bool) -> tuple[Nuisance, ...]:
     """Nuisances of a car ``p`` whose maker states no more than usual; of its motors only if they are compared."""
     parts = [one for one in _PARTS if motors or one[:2] != ("iwm_gain", "gain")]
     return (*_by_wheel(parts), *_clocks(), _straight_ahead(p))
 
 
-def lagging(half_s: float) -> list[Nuisance]:
+def line_lag(half_s: float) -> list[Nuisance]:
     """How much pads lag behind the sensors of their pressures, up to ``half_s`` usually; never ahead of them."""
     at = THETA.slice("pressure_location", "lag_s").start
     return [Nuisance("line_lag", (at,), (HALF_WIDTH_TO_SIGMA * half_s,), "line")] if half_s else []

@@ -46,17 +46,17 @@ class Vehicle:
     remarks: tuple[str, ...] = ()
     unstated: tuple[str, ...] = ()
     unlimited: tuple[str, ...] = ()
-    straight: bool = False
-    sprung: bool = True
+    straight_line: bool = False
+    suspension_stated: bool = True
     node_latency_s: float = LATENCY_S
 
     @property
-    def untold(self) -> tuple[str, ...]:
+    def undiagnosable_effects(self) -> tuple[str, ...]:
         """Effects on sections that are not stated, or on a steering that holds against them: none can be told."""
         unstated = tuple(effect for section in self.unstated for effect in OF_SECTION[section])
-        return (*unstated, *_OF_STEERING) if self.straight else unstated
+        return (*unstated, *_OF_STEERING) if self.straight_line else unstated
 
-    def asked(self, logs: Sequence[Log]) -> "Vehicle":
+    def with_motor_limits_from(self, logs: Sequence[Log]) -> "Vehicle":
         """The same car, its motors no stronger than what is asked of them in the logs, if the set does not say.
 
         Fading takes a share of what a motor can, which is of nothing known where that is not.
@@ -71,13 +71,13 @@ class Vehicle:
         p[P.motor_peak_torque_nm] = most
         return replace(self, parameters=parameters, p=p)
 
-    def held_straight(self) -> "Vehicle":
+    def without_lateral_dynamics(self) -> "Vehicle":
         """The same car kept on its line by a driver who is not seen: without lateral motion, whatever pulls."""
         p = self.p.copy()
         p[P.vehicle_yaw_inertia_kg_m2] = _HELD_KG_M2
         nuisances = tuple(one for one in self.nuisances if one.name not in _TURNING)
         said = "no log tells how it was steered, nor that it turned: the car is held straight against whatever pulls"
-        return replace(self, p=p, nuisances=nuisances, straight=True, remarks=(*self.remarks, said))
+        return replace(self, p=p, nuisances=nuisances, straight_line=True, remarks=(*self.remarks, said))
 
 
 def rest_friction(parameters: PlantParameters, temperature_k: float) -> float:

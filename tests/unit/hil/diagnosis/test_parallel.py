@@ -2,7 +2,7 @@
 
 import pytest
 
-from hil.diagnosis.parallel import side_by_side
+from hil.diagnosis.parallel import parallel_map
 
 
 def _fails(item):
@@ -12,11 +12,11 @@ def _fails(item):
 
 
 def test_comes_back_in_order():
-    assert side_by_side(lambda item: item * item, range(50)) == [item * item for item in range(50)]
+    assert parallel_map(lambda item: item * item, range(50)) == [item * item for item in range(50)]
 
 
 def test_threads_are_free_again_after_an_error():
     for _ in range(20):
         with pytest.raises(ValueError, match="no 3"):
-            side_by_side(_fails, range(5))
-    assert side_by_side(_fails, [1, 2]) == [1, 2]
+            parallel_map(_fails, range(5))
+    assert parallel_map(_fails, [1, 2]) == [1, 2]

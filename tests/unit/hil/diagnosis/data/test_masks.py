@@ -5,7 +5,7 @@ import pytest
 
 from hil.diagnosis.data.dataset import Segment
 from hil.diagnosis.data.log import Floats, make_log
-from hil.diagnosis.data.masks import since_sliding
+from hil.diagnosis.data.masks import after_wheel_lock
 from hil.diagnosis.data.prepare import prepare
 from plant.effects.signals import WHEELS
 
@@ -27,7 +27,7 @@ def _wheels(locks: tuple[int, ...] = (1,), within_s: float = 0.3) -> Floats:
 def _since(wheels: Floats, ground: Floats | None = None, acting: bool = True) -> float | None:
     ground = np.full(len(T), np.nan) if ground is None else ground
     segments = (Segment(0, len(T), 90.0, None),)
-    found = since_sliding(wheels, ground, np.full(len(T), acting), segments, RADIUS_M)
+    found = after_wheel_lock(wheels, ground, np.full(len(T), acting), segments, RADIUS_M)
     return float(T[np.argmax(found)]) if found.any() else None
 
 
@@ -63,7 +63,7 @@ def test_a_segment_that_begins_anew_is_compared_again() -> None:
     wheels = _wheels()
     wheels[T > 7.0, 1] = wheels[T > 7.0, 0]
     segments = (Segment(0, 800, 90.0, None), Segment(800, len(T), 40.0, None))
-    found = since_sliding(wheels, np.full(len(T), np.nan), np.ones(len(T), bool), segments, RADIUS_M)
+    found = after_wheel_lock(wheels, np.full(len(T), np.nan), np.ones(len(T), bool), segments, RADIUS_M)
     assert found[799]
     assert not found[800:].any()
 

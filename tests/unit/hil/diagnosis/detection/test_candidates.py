@@ -6,12 +6,12 @@ from outsider import VEHICLE
 
 from hil.diagnosis.data.log import make_log
 from hil.diagnosis.data.prepare import prepare
-from hil.diagnosis.detection.candidates import Field, quiet_nodes
-from hil.diagnosis.estimation.information import track_columns
+from hil.diagnosis.detection.candidates import CandidateSet, unexcited_sensors
+from hil.diagnosis.estimation.information import finite_difference_jacobian
 from hil.diagnosis.estimation.terms import candidates, columns
-from hil.diagnosis.noise.model import MODE_NAMES, Frame, Noise, Track
+from hil.diagnosis.noise.model import MODE_NAMES, ChannelNoise, Noise, SampleMasks
 from hil.diagnosis.simulation.parameter_set import nominal
-from hil.diagnosis.simulation.simulator import Rig
+from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import load_vehicle
 
 WHEELS = ("fl", "fr", "rl", "rr")
@@ -21,13 +21,13 @@ def _alike(log, one: str, other: str) -> float:
     """Cosine of two signatures in the acceleration, where that is compared."""
     vehicle = load_vehicle(VEHICLE)
     case = prepare([log], 0.318)
-    rig, frame, base = Rig(case, vehicle).quieted(nominal(vehicle)), Frame.of(case), nominal(vehicle)
-    listed = {candidate.name: candidate for candidate in Field(rig, frame, ()).candidates}
+    rig, frame, base = Simulator(case, vehicle).quieted(nominal(vehicle)), SampleMasks.of(case), nominal(vehicle)
+    listed = {candidate.name: candidate for candidate in CandidateSet(rig, frame, ()).candidates}
     shown = []
     for name in (one, other):
         candidate = listed[name]
         step = 0.05 * candidate.parameter.typical
-        shows = track_columns(rig, frame, rig.run(base), [candidate.applied(base, step)], [step])
+        shows = finite_difference_jacobian(rig, frame, rig.run(base), [candidate.applied(base, step)], [step])
         shown.append(np.where(frame.present["ax"].ravel() > 0.5, shows["ax"][:, 0], 0.0))
     a, b = shown
     return float(a @ b / np.sqrt((a @ a) * (b @ b)))
@@ -52,8 +52,8 @@ def test_of_a_sensor_that_tells_nothing_but_noise_no_scale_is_asked(torque_nm, t
     """Motors that stood still were told at 4.7 times what they give: less of their noise then drove the car."""
     shown = {f"motor.{mode}": np.full((100, 1), 0.1) for mode in MODE_NAMES}
     shown["motor.mean"][20:40] = torque_nm
-    noise = Noise({name: Track(0.5, 0.0, 0.0, 1.0) for name in shown}, ())
-    quiet = quiet_nodes(shown, noise)
+    noise = Noise({name: ChannelNoise(0.5, 0.0, 0.0, 1.0) for name in shown}, ())
+    quiet = unexcited_sensors(shown, noise)
     assert quiet == (["pressure"] if tells else ["pressure", "motor"])
     places = {(one.effect.name, one.place) for one in candidates(columns(), quiet=quiet)}
     for name in ("wrong_scale", "timestamp_offset", "clock_drift"):

@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil.diagnosis.detection.nonparametric import LAWS, PIECES, Curve, curve_of, places, shown
+from hil.diagnosis.detection.nonparametric import (
+    BASIS_SIZE,
+    NONPARAMETRIC_TERMS,
+    BasisExpansion,
+    at_each_location,
+    basis_expansion,
+    estimate_curve,
+)
 from hil.diagnosis.result.extended_scenario import extended_scenario
 from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.vehicle.load import paper_car
@@ -27,18 +34,21 @@ at = ["rl"]
 """
 
 
-def _any_curve(k: int = 0) -> Curve:
-    return curve_of(LAWS[k], 2.0, 34.0)
+def _any_curve(k: int = 0) -> BasisExpansion:
+    return basis_expansion(NONPARAMETRIC_TERMS[k], 2.0, 34.0)
 
 
 def test_hats_of_equal_size_are_a_constant():
-    points = shown(_any_curve().pieces, [0.2] * PIECES, np.zeros((PIECES, PIECES)))
+    points = estimate_curve(_any_curve().pieces, [0.2] * BASIS_SIZE, np.zeros((BASIS_SIZE, BASIS_SIZE)))
     assert [point["y"] for point in points] == pytest.approx([0.2] * len(points))
 
 
-@given(values=st.lists(st.floats(-0.5, 0.5), min_size=PIECES, max_size=PIECES), law=st.integers(0, len(LAWS) - 1))
+@given(
+    values=st.lists(st.floats(-0.5, 0.5), min_size=BASIS_SIZE, max_size=BASIS_SIZE),
+    law=st.integers(0, len(NONPARAMETRIC_TERMS) - 1),
+)
 def test_what_is_written_is_read_again(values, law):
-    for placed in places(_any_curve(law)):
+    for placed in at_each_location(_any_curve(law)):
         rows = np.array([piece.row(value or 0.1) for piece, value in zip(placed.pieces, values, strict=True)])
         assert np.array_equal(read_laws(written_laws(rows), "laws"), rows)
 

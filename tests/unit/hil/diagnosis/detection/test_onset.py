@@ -9,13 +9,20 @@ from pulses import log_as_driven
 
 from hil.diagnosis.data.dataset import Segment
 from hil.diagnosis.data.prepare import prepare
-from hil.diagnosis.detection.onset import begin_of, begins, moments_of, nearest, price, with_onsets
+from hil.diagnosis.detection.onset import (
+    detect_change_point,
+    estimate_onsets,
+    moments_of,
+    nearest,
+    onset_penalty,
+    segment_starts,
+)
 from hil.diagnosis.estimation.gauss_newton import Fitter, Term
-from hil.diagnosis.estimation.nuisance_fit import Numbers
+from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.estimation.terms import candidates, columns
-from hil.diagnosis.noise.model import Frame
+from hil.diagnosis.noise.model import SampleMasks
 from hil.diagnosis.simulation.parameter_set import nominal
-from hil.diagnosis.simulation.simulator import Rig
+from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import load_vehicle
 
 DEVIATIONS = {"wheel": 0.02, "ax": 0.02, "gps": 0.03, "pressure": 1e4, "motor": 0.5}
@@ -32,23 +39,23 @@ def _products(value: float, begin: int, strength: list[float], seed: int) -> tup
 @given(begin=st.integers(2, 8), seed=st.integers(0, 200), value=st.sampled_from([-3.0, 0.02, 40.0]))
 def test_a_clear_beginning_is_found(begin, seed, value):
     b, q = _products(value, begin, [8.0] * 10, seed)
-    assert begin_of(b, q) == begin
+    assert detect_change_point(b, q) == begin
 
 
 def test_what_was_always_there_has_none():
-    found = [begin_of(*_products(1.0, 0, [5.0] * 10, seed)) for seed in range(300)]
+    found = [detect_change_point(*_products(1.0, 0, [5.0] * 10, seed)) for seed in range(300)]
     assert sum(one is not None for one in found) <= 5
 
 
 def test_manoeuvres_that_do_not_show_it_prove_no_beginning():
-    assert begin_of(*_products(1.0, 0, [0.1, 0.1, 0.1, 9.0, 9.0], 1)) is None
-    assert begin_of(*_products(1.0, 3, [0.1, 0.1, 0.1, 9.0, 9.0], 1)) is None
+    assert detect_change_point(*_products(1.0, 0, [0.1, 0.1, 0.1, 9.0, 9.0], 1)) is None
+    assert detect_change_point(*_products(1.0, 3, [0.1, 0.1, 0.1, 9.0, 9.0], 1)) is None
 
 
 def test_a_time_costs_what_its_choice_among_many_is_worth():
     samples = np.zeros(9000)
-    frame = Frame(samples, samples, samples, samples, samples, 0.02, {}, ())
-    assert price(frame) == pytest.approx(2.0 * np.log(720.0))
+    frame = SampleMasks(samples, samples, samples, samples, samples, 0.02, {}, ())
+    assert onset_penalty(frame) == pytest.approx(2.0 * np.log(720.0))
 
 
 def test_a_beginning_is_looked_for_in_both_manoeuvres_it_may_lie_in():
@@ -75,12 +82,12 @@ def test_what_was_taken_to_begin_and_was_always_there_has_no_beginning(always):
     vehicle = load_vehicle(VEHICLE)
     log = log_as_driven(vehicle, 0.318)
     case = prepare([log, log], 0.318)
-    rig, base = Rig(case, vehicle), nominal(vehicle)
+    rig, base = Simulator(case, vehicle), nominal(vehicle)
     (pads,) = [one for one in candidates(columns()) if one.name == "pad_mu_gain@car"]
-    second = next(moment for moment in begins(case) if moment[0] == 1)
+    second = next(moment for moment in segment_starts(case) if moment[0] == 1)
 
     def fitter() -> Fitter:
-        numbers = Numbers(rig, Frame.of(case), vehicle, base, relinearise=True)
+        numbers = NuisanceFit(rig, SampleMasks.of(case), vehicle, base, relinearise=True)
         numbers.anew(np.zeros(len(numbers.nuisances)))
         return numbers.fitter
 
@@ -96,6 +103,6 @@ def test_what_was_taken_to_begin_and_was_always_there_has_no_beginning(always):
     fresh = fitter()
     noise = fresh.settle(fresh.at(as_handed_in, (there,), fresh.start()[1]), fresh.start()[1], 2)[1]
     taken = fresh.at(as_handed_in, (Term(pads, -0.2, onset=second),), noise)
-    (term,) = with_onsets(fresh, taken, noise).terms
+    (term,) = estimate_onsets(fresh, taken, noise).terms
     assert (term.onset is None) is always
     assert term.value == pytest.approx(-0.2, abs=0.02)

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hil.diagnosis.detection.onset import Moment
-from hil.diagnosis.detection.onset_scan import with_beginnings
-from hil.diagnosis.detection.score_test import Score, scores
-from hil.diagnosis.estimation.information import Sums, project
+from hil.diagnosis.detection.onset import OnsetTime
+from hil.diagnosis.detection.onset_scan import scan_onset_by_segment
+from hil.diagnosis.detection.score_test import ScoreTest, scores
+from hil.diagnosis.estimation.information import InformationBlocks, marginalise
 from hil.diagnosis.estimation.terms import candidates, columns
 
 PRICE = 13.0
@@ -19,8 +19,8 @@ ONE_LOG = [(0, 10.0 * k) for k in range(MANOEUVRES)]
 
 
 def _screened(
-    begin: int | None, strength: float, seed: int = 1, price: float = PRICE, begins: Sequence[Moment] = BEGINS
-) -> tuple[Score, Score]:
+    begin: int | None, strength: float, seed: int = 1, price: float = PRICE, begins: Sequence[OnsetTime] = BEGINS
+) -> tuple[ScoreTest, ScoreTest]:
     """A drag that begins with a manoeuvre, ``strength`` standard deviations in all, as told, and as screened."""
     (drag,) = [replace(one, columns=(0,)) for one in candidates(columns()) if one.name == "residual_drag@car"]
     rng = np.random.default_rng(seed)
@@ -31,10 +31,10 @@ def _screened(
         left = (MANOEUVRES - begin) * SAMPLES
         residual[begin:] += strength / left**0.5
     rows = np.stack((residual, nuisance, signature), axis=2)
-    sums = Sums(np.einsum("msi,msj->mij", rows, rows), 1, SAMPLES * MANOEUVRES, 0.0)
+    sums = InformationBlocks(np.einsum("msi,msj->mij", rows, rows), 1, SAMPLES * MANOEUVRES, 0.0)
     z = np.zeros(1)
-    listed = scores([drag], project(sums.total(), 1, (), z), 0, [0.0])
-    return listed[0], with_beginnings(listed, sums, 0, z, [], begins, price)[0]
+    listed = scores([drag], marginalise(sums.total(), 1, (), z), 0, [0.0])
+    return listed[0], scan_onset_by_segment(listed, sums, 0, z, [], begins, price)[0]
 
 
 @pytest.mark.parametrize("begin", [2, 3, 5])

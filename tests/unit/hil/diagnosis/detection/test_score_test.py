@@ -7,11 +7,18 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from hil.diagnosis.detection.nonparametric import LAWS
-from hil.diagnosis.detection.score_test import beside_best, inflation, leaders, score, scores, threshold
-from hil.diagnosis.estimation.information import Sums, project, solve
-from hil.diagnosis.estimation.model_discrepancy import UNLISTED, variance_of
-from hil.diagnosis.estimation.terms import PLACES, candidates, columns, kind_of
+from hil.diagnosis.detection.nonparametric import NONPARAMETRIC_TERMS
+from hil.diagnosis.detection.score_test import (
+    detection_threshold,
+    inflation_factor,
+    score,
+    scores,
+    scores_given_best,
+    shortlist,
+)
+from hil.diagnosis.estimation.information import InformationBlocks, marginalise, solve
+from hil.diagnosis.estimation.model_discrepancy import UNLISTED, variance_inflation
+from hil.diagnosis.estimation.terms import LOCATIONS, candidates, columns, location_kind
 
 CANDIDATES = {c.name: c for c in candidates(columns())}
 
@@ -35,16 +42,16 @@ def test_what_leaves_no_trace_cannot_score() -> None:
 
 
 def test_more_looks_ask_for_more() -> None:
-    assert threshold(1, 0.05) == pytest.approx(3.841, abs=1e-3)
-    assert threshold(100, 0.003) > threshold(10, 0.003) > threshold(1, 0.003)
+    assert detection_threshold(1, 0.05) == pytest.approx(3.841, abs=1e-3)
+    assert detection_threshold(100, 0.003) > detection_threshold(10, 0.003) > detection_threshold(1, 0.003)
 
 
 def test_the_models_own_error_raises_what_is_asked() -> None:
     quiet = [score(c, 0.3, 1e4) for c in CANDIDATES.values()]
     loud = [score(c, 0.05 * c.parameter.typical * 1e6, 1e6) for c in CANDIDATES.values()]
-    assert inflation(quiet) == 1.0
-    assert inflation([]) == 1.0
-    assert inflation(loud) > 1.0
+    assert inflation_factor(quiet) == 1.0
+    assert inflation_factor([]) == 1.0
+    assert inflation_factor(loud) > 1.0
 
 
 def test_a_cause_that_shows_through_others_is_no_error_of_the_model() -> None:
@@ -64,29 +71,31 @@ def test_a_cause_that_shows_through_others_is_no_error_of_the_model() -> None:
         signatures = (0.8 * shared[:, None] + 0.6 * rng.standard_normal((3000, count))) / tau
         hidden = 0.3 * cause.spread * signatures[:, cause.columns[0]]
         joined = np.column_stack((rng.standard_normal(3000) + hidden, signatures))
-        total = Sums((joined.T @ joined)[None], 0, 3000, 0.0)
-        found = scores(listed, project(total.total(), 0), 0, [0.0] * len(listed))
-        assert inflation(found) > 3.0
-        beside.append(inflation(beside_best(found, total, np.zeros(0), ())))
+        total = InformationBlocks((joined.T @ joined)[None], 0, 3000, 0.0)
+        found = scores(listed, marginalise(total.total(), 0), 0, [0.0] * len(listed))
+        assert inflation_factor(found) > 3.0
+        beside.append(inflation_factor(scores_given_best(found, total, np.zeros(0), ())))
     assert np.median(beside) == pytest.approx(1.0, abs=0.3)
 
 
 def test_a_gain_is_shared_out_over_the_models_own_error() -> None:
     candidate = CANDIDATES["tyre_relaxation@car"]
     found = score(candidate, 0.1 * 1e4, 1e4)
-    assert variance_of(candidate) > 1.0
-    assert found.gain == pytest.approx(found.raw / variance_of(candidate))
+    assert variance_inflation(candidate) > 1.0
+    assert found.gain == pytest.approx(found.raw / variance_inflation(candidate))
 
 
 def test_dive_errs_more_where_nobody_states_the_springs() -> None:
     candidate = CANDIDATES["pitch_dive@car"]
-    assert variance_of(replace(candidate, sprung=False)) > variance_of(candidate)
-    assert variance_of(candidate) == variance_of(replace(candidate, sprung=True))
+    assert variance_inflation(replace(candidate, sprung=False)) > variance_inflation(candidate)
+    assert variance_inflation(candidate) == variance_inflation(replace(candidate, sprung=True))
 
 
 def test_every_entry_of_the_models_own_error_is_a_candidates_number_or_a_law_at_a_kind_of_place() -> None:
-    kinds = {(c.effect.name, c.parameter.name, kind_of(c.place)) for c in CANDIDATES.values()}
-    kinds |= {(UNLISTED, law.name, kind_of(place)) for law in LAWS for place in PLACES[law.scope]}
+    kinds = {(c.effect.name, c.parameter.name, location_kind(c.place)) for c in CANDIDATES.values()}
+    kinds |= {
+        (UNLISTED, law.name, location_kind(place)) for law in NONPARAMETRIC_TERMS for place in LOCATIONS[law.scope]
+    }
     source = resources.files("hil.diagnosis.estimation") / "model_discrepancy.toml"
     tables = tomllib.loads(source.read_text(encoding="utf-8"))
     entries = [
@@ -101,17 +110,17 @@ def test_every_entry_of_the_models_own_error_is_a_candidates_number_or_a_law_at_
 
 def test_both_the_best_explanation_and_the_clearest_are_fitted() -> None:
     """A number in which the model errs much explains most; one in which it errs little is still among the leaders."""
-    erring = [s for s in (score(c, 40.0, 100.0) for c in CANDIDATES.values()) if variance_of(s.candidate) > 4.0]
-    clear = min(CANDIDATES.values(), key=variance_of)
+    erring = [s for s in (score(c, 40.0, 100.0) for c in CANDIDATES.values()) if variance_inflation(s.candidate) > 4.0]
+    clear = min(CANDIDATES.values(), key=variance_inflation)
     listed = [*erring, score(clear, 30.0 / abs(clear.parameter.typical), 100.0 / clear.parameter.typical**2)]
-    assert clear in [s.candidate for s in leaders(listed, 2)]
+    assert clear in [s.candidate for s in shortlist(listed, 2)]
 
 
 def test_a_nuisance_takes_only_what_its_tolerance_allows() -> None:
     """Column equal to the nuisance's: the share beyond the tolerance is left to the effect."""
     n, size = 1.0e4, 5.0  # five standard deviations off
     total = np.array([[n * size**2, n * size, n * size], [n * size, n, n], [n * size, n, n]])
-    left = project(total, 1, (), np.zeros(1))
+    left = marginalise(total, 1, (), np.zeros(1))
     assert left.b[0] ** 2 / left.q[0, 0] == pytest.approx(size**2, rel=1e-3)
 
 

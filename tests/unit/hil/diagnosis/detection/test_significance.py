@@ -8,15 +8,15 @@ from outsider import VEHICLE
 from pulses import log_as_driven
 
 from hil.diagnosis.data.prepare import prepare
-from hil.diagnosis.detection.profile_fit import Contender, odds, refitted
+from hil.diagnosis.detection.profile_fit import FittedHypothesis, criterion, refitted
 from hil.diagnosis.detection.result import Diagnosis
-from hil.diagnosis.detection.significance import backward, beyond_doubt, erring, with_gain
+from hil.diagnosis.detection.significance import eliminate_backward, is_significant, local_inflation, with_gain
 from hil.diagnosis.estimation.gauss_newton import Term
-from hil.diagnosis.estimation.nuisance_fit import Numbers
+from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.estimation.terms import candidates, columns
-from hil.diagnosis.noise.model import Frame
+from hil.diagnosis.noise.model import SampleMasks
 from hil.diagnosis.simulation.parameter_set import nominal
-from hil.diagnosis.simulation.simulator import Rig
+from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import load_vehicle
 
 DEVIATIONS = {"wheel": 0.02, "ax": 0.02, "gps": 0.03, "pressure": 1e4, "motor": 0.5}
@@ -26,8 +26,8 @@ def _accepted(hidden: float) -> Diagnosis:
     """A diagnosis that has accepted a headwind, of which there is as much as hidden."""
     vehicle = load_vehicle(VEHICLE)
     case = prepare([log_as_driven(vehicle, 0.318)], 0.318)
-    rig, base = Rig(case, vehicle), nominal(vehicle)
-    numbers = Numbers(rig, Frame.of(case), vehicle, base, relinearise=True)
+    rig, base = Simulator(case, vehicle), nominal(vehicle)
+    numbers = NuisanceFit(rig, SampleMasks.of(case), vehicle, base, relinearise=True)
     (wind,) = [one for one in candidates(columns()) if one.name == "headwind.wind_mps@car"]
     rng = np.random.default_rng(2)
     (drive,) = case.drives
@@ -38,7 +38,7 @@ def _accepted(hidden: float) -> Diagnosis:
     bare, noise = numbers.fitted(*fitter.start())
     begun = fitter.at(bare.z, (Term(wind, 0.5 * hidden),), noise)
     final = fitter.fit(begun, noise, 5)
-    one = refitted(Contender(final.terms[0], final, final.cost, 0.0, 1.0, noise), final, noise)
+    one = refitted(FittedHypothesis(final.terms[0], final, final.cost, 0.0, 1.0, noise), final, noise)
     return Diagnosis(
         case, vehicle, fitter, noise, noise, bare, bare, final, contenders=[[one]], looks=126, least_gain=20.0
     )
@@ -47,7 +47,7 @@ def _accepted(hidden: float) -> Diagnosis:
 def test_a_cause_that_is_there_stays():
     found = _accepted(12.0)
     final = found.final
-    backward(found, found.fitter, 20.0, lambda _: None)
+    eliminate_backward(found, found.fitter, 20.0, lambda _: None)
     assert found.final is final
     assert found.remarks == []
 
@@ -55,7 +55,7 @@ def test_a_cause_that_is_there_stays():
 @pytest.mark.parametrize("hidden", [0.0, 0.5])
 def test_a_cause_that_may_be_nothing_goes_and_the_remarks_name_it(hidden):
     found, said = _accepted(hidden), []
-    backward(found, found.fitter, 20.0, said.append)
+    eliminate_backward(found, found.fitter, 20.0, said.append)
     assert found.final is found.base
     assert found.contenders == []
     assert found.remarks == said
@@ -68,13 +68,13 @@ def test_what_is_left_beside_a_cause_says_how_much_the_model_errs(most_left, inf
     """The largest of 85 looks at noise alone reaches 7.5 every second time."""
     found = _accepted(12.0)
     found.looks, found.inflation = 85, inflation
-    assert erring(most_left, found) == pytest.approx(error, rel=0.02)
+    assert local_inflation(most_left, found) == pytest.approx(error, rel=0.02)
 
 
 def test_a_chosen_beginning_is_paid_in_the_odds_and_in_the_gain():
     ((one,),) = _accepted(12.0).contenders
     begun = replace(one, price=13.0)
-    assert odds(begun) - odds(one) == pytest.approx(13.0)
+    assert criterion(begun) - criterion(one) == pytest.approx(13.0)
     always, later = (with_gain(c, one.cost + 100.0, 2.0) for c in (one, begun))
     assert always.gained - later.gained == pytest.approx(13.0)
     assert always.error == 2.0
@@ -87,7 +87,7 @@ def test_a_cause_at_its_end_is_none_in_a_car_of_another_form():
     one = replace(one, gained=100.0)
     ended = replace(one, term=replace(one.term, value=one.term.candidate.parameter.high))
     bent = replace(one.model, z=np.full_like(one.model.z, 5.0))
-    assert beyond_doubt(ended, 20.0, found.fitter, 20.0)
-    assert beyond_doubt(replace(one, model=bent), 20.0, found.fitter, 20.0)
-    assert not beyond_doubt(replace(ended, model=bent), 20.0, found.fitter, 20.0)
-    assert not beyond_doubt(replace(one, gained=19.0), 20.0, found.fitter, 20.0)
+    assert is_significant(ended, 20.0, found.fitter, 20.0)
+    assert is_significant(replace(one, model=bent), 20.0, found.fitter, 20.0)
+    assert not is_significant(replace(ended, model=bent), 20.0, found.fitter, 20.0)
+    assert not is_significant(replace(one, gained=19.0), 20.0, found.fitter, 20.0)

@@ -8,16 +8,16 @@ import pytest
 from pulses import log_as_driven
 
 from hil.diagnosis.data.prepare import prepare
-from hil.diagnosis.detection.candidates import Field
-from hil.diagnosis.detection.profile_fit import Contender, from_the_best, odds, refitted
+from hil.diagnosis.detection.candidates import CandidateSet
+from hil.diagnosis.detection.profile_fit import FittedHypothesis, criterion, refit_from_best, refitted
 from hil.diagnosis.detection.result import Diagnosis
-from hil.diagnosis.detection.single_cause import one_for_all
+from hil.diagnosis.detection.single_cause import try_single_cause
 from hil.diagnosis.estimation.gauss_newton import Model, Term
-from hil.diagnosis.estimation.nuisance_fit import Numbers
+from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.estimation.terms import Candidate
-from hil.diagnosis.noise.model import Frame, Noise
+from hil.diagnosis.noise.model import Noise, SampleMasks
 from hil.diagnosis.simulation.parameter_set import nominal
-from hil.diagnosis.simulation.simulator import Rig
+from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import paper_car
 
 DEVIATIONS = {"wheel": 0.02, "ax": 0.02, "gps": 0.03, "pressure": 1e4, "motor": 0.5}
@@ -29,15 +29,15 @@ class _Driven:
     def __init__(self, hidden: dict[str, float]) -> None:
         vehicle = paper_car()
         case = prepare([log_as_driven(vehicle, 0.308)], 0.308)
-        rig, base, rng = Rig(case, vehicle), nominal(vehicle), np.random.default_rng(3)
-        self.field = Field(rig, Frame.of(case), ())
+        rig, base, rng = Simulator(case, vehicle), nominal(vehicle), np.random.default_rng(3)
+        self.field = CandidateSet(rig, SampleMasks.of(case), ())
         world = base
         for name, value in hidden.items():
             world = self.candidate(name).applied(world, value)
         (drive,) = case.drives
         for group, told in rig.run(world).items():
             drive.measured[group][:] = told + DEVIATIONS.get(group, 0.02) * rng.standard_normal(told.shape)
-        self.numbers = Numbers(rig, Frame.of(case), vehicle, base, relinearise=True)
+        self.numbers = NuisanceFit(rig, SampleMasks.of(case), vehicle, base, relinearise=True)
         self.numbers.anew(np.zeros(len(self.numbers.nuisances)))
         self.fitter = self.numbers.fitter
         self.bare, self.noise = self.numbers.fitted(*self.fitter.start())
@@ -47,8 +47,8 @@ class _Driven:
         (found,) = [one for one in self.field.candidates if one.name == name]
         return found
 
-    def contender(self, model: Model, noise: Noise) -> Contender:
-        return refitted(Contender(model.terms[-1], model, model.cost, 0.0, 1.0, noise), model, noise)
+    def contender(self, model: Model, noise: Noise) -> FittedHypothesis:
+        return refitted(FittedHypothesis(model.terms[-1], model, model.cost, 0.0, 1.0, noise), model, noise)
 
     def fitted(self, names: Sequence[str], values: Sequence[float], steps: int) -> Model:
         terms = [Term(self.candidate(name), value) for name, value in zip(names, values, strict=True)]
@@ -63,10 +63,10 @@ def driven() -> _Driven:
 def test_a_fit_that_stopped_on_its_way_goes_on_from_where_the_best_ended(driven):
     best = driven.contender(driven.fitted(["residual_drag@fl"], [20.0], 8), driven.noise)
     stopped = driven.contender(driven.fitted(["rolling_resistance@fl"], [0.01], 0), driven.noise)
-    assert odds(stopped) - odds(best) > 50.0
-    same, further = from_the_best(driven.fitter, [best, stopped])
+    assert criterion(stopped) - criterion(best) > 50.0
+    same, further = refit_from_best(driven.fitter, [best, stopped])
     assert same is best
-    assert odds(further) < odds(stopped) - 50.0
+    assert criterion(further) < criterion(stopped) - 50.0
     assert further.term.value > 0.5
 
 
@@ -78,7 +78,7 @@ def test_what_acts_alike_needs_no_fit_once_its_value_is_found(driven):
     assert sized.cost - best.cost < 0.2 * (begun.cost - best.cost)
 
 
-def _singles(driven: _Driven, names: Sequence[str], values: Sequence[float]) -> list[Contender]:
+def _singles(driven: _Driven, names: Sequence[str], values: Sequence[float]) -> list[FittedHypothesis]:
     """Single causes that would take the place of these."""
     model = driven.fitted(names, values, 8)
     driven.field.taken_at(driven.fitter, driven.bare)
@@ -87,7 +87,7 @@ def _singles(driven: _Driven, names: Sequence[str], values: Sequence[float]) -> 
         driven.case, driven.vehicle, driven.fitter, driven.noise, driven.noise, driven.bare, driven.bare, model,
         contenders=accepted,
     )  # fmt: skip
-    return one_for_all(driven.fitter, driven.field, found, model, driven.noise)
+    return try_single_cause(driven.fitter, driven.field, found, model, driven.noise)
 
 
 @pytest.mark.slow

@@ -6,7 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from hil.diagnosis.estimation.information import Sums, project, project_later, solve, solve_within
+from hil.diagnosis.estimation.information import (
+    InformationBlocks,
+    marginalise,
+    marginalise_from_onset,
+    solve,
+    solve_bounded,
+)
 
 NUISANCES, COLUMNS = 3, 2
 
@@ -22,7 +28,7 @@ def test_a_nuisance_that_is_held_explains_nothing_more(seed, side):
     total = _products(seed)
     z = np.array([0.4, side * 3.0, -0.2])
     without = np.delete(np.delete(total, 2, axis=0), 2, axis=1)
-    held, removed = project(total, NUISANCES, z=z, held=[1]), project(without, NUISANCES - 1, z=np.delete(z, 1))
+    held, removed = marginalise(total, NUISANCES, z=z, held=[1]), marginalise(without, NUISANCES - 1, z=np.delete(z, 1))
     assert held.b == pytest.approx(removed.b, rel=1e-6, abs=1e-6)
     assert held.q == pytest.approx(removed.q, rel=1e-6, abs=1e-6)
 
@@ -30,7 +36,7 @@ def test_a_nuisance_that_is_held_explains_nothing_more(seed, side):
 @given(seed=st.integers(0, 10_000))
 def test_nuisances_take_their_part_by_least_squares_with_their_prior(seed):
     total, z = _products(seed), np.array([0.4, 1.0, -0.2])
-    found = project(total, NUISANCES, z=z)
+    found = marginalise(total, NUISANCES, z=z)
     own = slice(1, 1 + NUISANCES)
     a = total[own, own] + np.eye(NUISANCES)
     moved = np.linalg.solve(a, total[own, 0] - z)
@@ -43,15 +49,15 @@ def test_a_signature_from_a_manoeuvre_on_is_one_that_is_nothing_before(seed, beg
     rng, z = np.random.default_rng(seed), np.array([0.4, 3.0, -0.2])
     manoeuvres = rng.standard_normal((4, 50, 1 + NUISANCES + COLUMNS))
     matrix = np.stack([rows.T @ rows for rows in manoeuvres])
-    summed = Sums(matrix, NUISANCES, 200, 0.0)
-    b, q = project_later(summed, [[0], [1], [0, 1]], (), z, [1])
+    summed = InformationBlocks(matrix, NUISANCES, 200, 0.0)
+    b, q = marginalise_from_onset(summed, [[0], [1], [0, 1]], (), z, [1])
     cut = manoeuvres.copy()
     cut[:begin, :, 1 + NUISANCES :] = 0.0
     joined = cut.reshape(200, -1)
-    expected = project(joined.T @ joined, NUISANCES, z=z, held=[1])
+    expected = marginalise(joined.T @ joined, NUISANCES, z=z, held=[1])
     assert b[begin] == pytest.approx([*expected.b, expected.b.sum()], rel=1e-6, abs=1e-6)
     assert q[begin] == pytest.approx([*np.diag(expected.q), expected.q.sum()], rel=1e-6, abs=1e-6)
-    together = project(summed.since(begin), NUISANCES, z=z, held=[1])
+    together = marginalise(summed.since(begin), NUISANCES, z=z, held=[1])
     assert together.q == pytest.approx(expected.q, rel=1e-6, abs=1e-6)
     assert together.b == pytest.approx(expected.b, rel=1e-6, abs=1e-6)
 
@@ -64,7 +70,7 @@ def test_a_step_within_its_ends_is_the_best_there_is(seed):
     joined = np.column_stack((rng.standard_normal(40) * 5.0, columns))
     z = rng.uniform(-1.0, 1.0, NUISANCES)
     low, high = -rng.uniform(0.0, 2.0, NUISANCES + 2), rng.uniform(1e-3, 2.0, NUISANCES + 2)
-    change, _, foretold = solve_within(joined.T @ joined, NUISANCES, range(2), z, low, high)
+    change, _, foretold = solve_bounded(joined.T @ joined, NUISANCES, range(2), z, low, high)
     prior = np.eye(NUISANCES, NUISANCES + 2)
     rows, right = np.vstack((columns, prior)), np.concatenate((joined[:, 0], -z))
     best = lsq_linear(rows, right, (low, high), tol=1e-12, method="bvls")
@@ -78,7 +84,7 @@ def test_a_step_without_ends_is_the_step_of_solve():
     rng = np.random.default_rng(5)
     joined = rng.standard_normal((50, 1 + NUISANCES + 1))
     total, z, far = joined.T @ joined, rng.standard_normal(NUISANCES), np.full(NUISANCES + 1, 1e3)
-    change, covariance, _ = solve_within(total, NUISANCES, [0], z, -far, far)
+    change, covariance, _ = solve_bounded(total, NUISANCES, [0], z, -far, far)
     plain, other = solve(total, NUISANCES, [0], z)
     assert change == pytest.approx(plain, rel=1e-9)
     assert covariance == pytest.approx(other, rel=1e-9)

@@ -7,12 +7,12 @@ import pytest
 from pulses import log_of_pulses
 
 from hil.diagnosis.data.prepare import prepare
-from hil.diagnosis.estimation.gauss_newton import Fitter, Term, strain
-from hil.diagnosis.estimation.nuisance_fit import Numbers
+from hil.diagnosis.estimation.gauss_newton import Fitter, Term, birge_ratio
+from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.estimation.terms import candidates, columns
-from hil.diagnosis.noise.model import Frame
-from hil.diagnosis.simulation.parameter_set import DISC_GUESSED_K, DISC_TOLD_K, nominal
-from hil.diagnosis.simulation.simulator import Rig
+from hil.diagnosis.noise.model import SampleMasks
+from hil.diagnosis.simulation.parameter_set import DISC_ASSUMED_SD_K, DISC_MEASURED_SD_K, nominal
+from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import load_vehicle, paper_car
 
 NOISE_PA = 2e3
@@ -22,15 +22,15 @@ GAINS = {"brake_gain_front_nm_pa": 2e-4, "brake_gain_rear_nm_pa": 1e-4}
 
 def test_numbers_within_their_tolerance_strain_nothing():
     rng = np.random.default_rng(3)
-    assert strain(np.zeros(50)) == 1.0
-    assert strain(0.5 * rng.standard_normal(50)) == 1.0
-    assert strain(np.full(50, 2.0)) == pytest.approx(4.0)
+    assert birge_ratio(np.zeros(50)) == 1.0
+    assert birge_ratio(0.5 * rng.standard_normal(50)) == 1.0
+    assert birge_ratio(np.full(50, 2.0)) == pytest.approx(4.0)
 
 
 def test_numbers_that_data_say_nothing_of_do_not_hide_a_strain():
     z = np.concatenate((np.full(10, 2.0), np.zeros(40)))
-    assert strain(z) == 1.0
-    assert strain(z, told=10.0) == pytest.approx(4.0)
+    assert birge_ratio(z) == 1.0
+    assert birge_ratio(z, told=10.0) == pytest.approx(4.0)
 
 
 @pytest.mark.slow
@@ -39,8 +39,8 @@ def test_squares_of_right_numbers_add_up_to_what_the_data_tell_of_them():
     vehicle = paper_car()
     log = log_of_pulses()
     case = prepare([log], 0.308)
-    frame = Frame.of(case)
-    numbers = Numbers(Rig(case, vehicle), frame, vehicle, nominal(vehicle), False)
+    frame = SampleMasks.of(case)
+    numbers = NuisanceFit(Simulator(case, vehicle), frame, vehicle, nominal(vehicle), False)
     numbers.anew(np.zeros(len(numbers.nuisances)))
     noise = numbers.fitter.start()[1]
     told, rng = numbers.fitter.told(noise), np.random.default_rng(11)
@@ -60,9 +60,9 @@ def test_squares_of_right_numbers_add_up_to_what_the_data_tell_of_them():
 
 def test_a_strained_number_at_its_end_wants_to_go_on():
     z = np.array([3.0, 1.0, 1.0, 1.0])
-    assert strain(z) == pytest.approx(3.0)
-    assert strain(z, np.full(4, 3.0)) == pytest.approx((4 * 9.0 + 3.0) / 4)
-    assert strain(z / 3.0, np.full(4, 1.0)) == 1.0  # little strained
+    assert birge_ratio(z) == pytest.approx(3.0)
+    assert birge_ratio(z, np.full(4, 3.0)) == pytest.approx((4 * 9.0 + 3.0) / 4)
+    assert birge_ratio(z / 3.0, np.full(4, 1.0)) == 1.0  # little strained
 
 
 def test_what_single_wheels_are_off_makes_light_of_no_strain():
@@ -70,7 +70,7 @@ def test_what_single_wheels_are_off_makes_light_of_no_strain():
     stated = {"mass_kg": 1500.0, "wheelbase_m": 2.5, "rolling_radius_m": 0.3, "brake_gain_front_nm_pa": 2e-4}
     vehicle = load_vehicle(stated)
     case = prepare([log_of_pulses()], 0.3)
-    fitter = Fitter(Rig(case, vehicle), Frame.of(case), nominal(vehicle), vehicle.nuisances, {})
+    fitter = Fitter(Simulator(case, vehicle), SampleMasks.of(case), nominal(vehicle), vehicle.nuisances, {})
     of_wheels = np.array([one.kind == "scatter" for one in vehicle.nuisances])
     assert of_wheels.sum() >= 16
     assert fitter.strain(np.where(of_wheels, 0.0, 2.0)) == pytest.approx(4.0)
@@ -81,7 +81,7 @@ def test_the_discs_heat_matters_once_a_cause_reads_their_temperature():
     """Temperatures were as sure as if every car had the discs of the shipped one, and where a fade begins with them."""
     vehicle = load_vehicle({"mass_kg": 1500.0, "wheelbase_m": 2.5, "rolling_radius_m": 0.3} | GAINS)
     case = prepare([replace(log_of_pulses(), disc_temperature_k=650.0)], 0.3)
-    numbers = Numbers(Rig(case, vehicle), Frame.of(case), vehicle, nominal(vehicle), False)
+    numbers = NuisanceFit(Simulator(case, vehicle), SampleMasks.of(case), vehicle, nominal(vehicle), False)
     numbers.anew(np.zeros(len(numbers.nuisances)))
     bare, noise = numbers.fitter.start()
     (fade,) = (one for one in candidates(columns()) if one.name == "pad_temp_fade@front")
@@ -98,8 +98,8 @@ def test_the_discs_heat_matters_once_a_cause_reads_their_temperature():
 def test_sensitivities_taken_lately_serve_again_where_cars_are_alike():
     vehicle = paper_car()
     case = prepare([log_of_pulses()], 0.308)
-    rig = Rig(case, vehicle)
-    numbers = Numbers(rig, Frame.of(case), vehicle, nominal(vehicle), True)
+    rig = Simulator(case, vehicle)
+    numbers = NuisanceFit(rig, SampleMasks.of(case), vehicle, nominal(vehicle), True)
     z, heavy = np.zeros(len(numbers.nuisances)), _MASS
 
     def replays(z: np.ndarray, *terms: Term) -> int:
@@ -122,11 +122,11 @@ def test_sensitivities_taken_lately_serve_again_where_cars_are_alike():
     assert replays(z + 1.0) > len(z)
 
 
-@pytest.mark.parametrize(("told_k", "deviation_k"), [(350.0, DISC_TOLD_K), (None, DISC_GUESSED_K)])
+@pytest.mark.parametrize(("told_k", "deviation_k"), [(350.0, DISC_MEASURED_SD_K), (None, DISC_ASSUMED_SD_K)])
 def test_discs_whose_temperature_is_told_are_known_better(told_k, deviation_k):
     vehicle = paper_car()
     case = prepare([replace(log_of_pulses(), disc_temperature_k=told_k)], 0.308)
-    numbers = Numbers(Rig(case, vehicle), Frame.of(case), vehicle, nominal(vehicle), True)
+    numbers = NuisanceFit(Simulator(case, vehicle), SampleMasks.of(case), vehicle, nominal(vehicle), True)
     (disc,) = (one for one in numbers.nuisances if one.name == "disc_temperature_k")
     assert disc.step == (deviation_k,)
 
@@ -138,10 +138,10 @@ def test_a_dead_time_is_found_on_either_side(side):
     vehicle = paper_car()
     case = prepare([log_of_pulses()], 0.308)
     base = nominal(vehicle)
-    rig = Rig(case, vehicle)
-    names = [nuisance.name for nuisance in Numbers(rig, Frame.of(case), vehicle, base, True).nuisances]
+    rig = Simulator(case, vehicle)
+    names = [nuisance.name for nuisance in NuisanceFit(rig, SampleMasks.of(case), vehicle, base, True).nuisances]
     at = names.index("ehb_dead_time_s")
-    numbers = Numbers(rig, Frame.of(case), vehicle, base, relinearise=True)
+    numbers = NuisanceFit(rig, SampleMasks.of(case), vehicle, base, relinearise=True)
     off = np.where(np.arange(len(names)) == at, side * 0.6, 0.0)
     told = rig.run(base.shifted(numbers.nuisances, off))["pressure"]
     (drive,) = case.drives

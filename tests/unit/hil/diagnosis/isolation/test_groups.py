@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hil.diagnosis.estimation.terms import candidates, columns
-from hil.diagnosis.isolation.groups import APART, imitation, remaining, summed, tied_set
+from hil.diagnosis.isolation.groups import ISOLABILITY_SIGMA, imitation, isolability_group, remaining, summed
 
 COLUMNS = columns()
 CANDIDATES = candidates(COLUMNS)
@@ -47,10 +47,10 @@ def straight_stops():
 
 def test_mass_pads_and_drag_are_tied_together_though_no_pair_is():
     q = information(straight_stops())
-    found = tied_set(q, CANDIDATES, INDEX[MASS], 200.0)
+    found = isolability_group(q, CANDIDATES, INDEX[MASS], 200.0)
     assert found.pairs == ()
     assert found.alone > 50.0
-    assert found.apart < APART
+    assert found.apart < ISOLABILITY_SIGMA
     assert sorted({CANDIDATES[k].effect.name for k in found.members}) == ["headwind", "pad_mu_gain"]
     assert len(found.members) == 3  # front and rear pads, or one axle and both
     pads = [v for k, v in zip(found.members, found.values, strict=True) if k != INDEX[DRAG]]
@@ -59,7 +59,7 @@ def test_mass_pads_and_drag_are_tied_together_though_no_pair_is():
 
 def test_the_null_vector_leaves_no_signature():
     q = information(straight_stops())
-    found = tied_set(q, CANDIDATES, INDEX[MASS], 200.0)
+    found = isolability_group(q, CANDIDATES, INDEX[MASS], 200.0)
     products = summed(q, CANDIDATES)
     at = [INDEX[MASS], *found.members]
     null = np.array([200.0, *(-value for value in found.values)])
@@ -73,15 +73,15 @@ def test_a_known_force_unties_them():
     pulse = 2.0 * (np.arange(SAMPLES) % 100 < 30)
     tied = information(signatures)
     alone = information({MASS: -0.09 * pulse / 0.05})
-    found = tied_set(tied + alone, CANDIDATES, INDEX[MASS], 200.0)
+    found = isolability_group(tied + alone, CANDIDATES, INDEX[MASS], 200.0)
     assert found.members == ()
-    assert found.apart > APART
+    assert found.apart > ISOLABILITY_SIGMA
 
 
 def test_one_rival_is_enough_where_it_imitates_alone():
     signature = np.sin(np.linspace(0.0, 20.0, SAMPLES))
     q = information({"road_grade@car": signature, "imu_bias.ax_mps2@car": 0.98 * signature})
-    found = tied_set(q, CANDIDATES, INDEX["road_grade@car"], 0.02)
+    found = isolability_group(q, CANDIDATES, INDEX["road_grade@car"], 0.02)
     assert found.members == (INDEX["imu_bias.ax_mps2@car"],)
     assert found.pairs[0][0] == found.members[0]
     assert found.pairs[0][1] == pytest.approx(found.apart)
@@ -91,7 +91,7 @@ def test_separable_causes_are_not_tied():
     t = np.linspace(0.0, 1.0, SAMPLES)
     q = information({"road_grade@car": 2.0 + 0.0 * t, MASS: 2.0 * np.sin(60.0 * t), "tyre_radius@car": 2.0 * t})
     for name, value in (("road_grade@car", 0.02), (MASS, 150.0), ("tyre_radius@car", -0.01)):
-        found = tied_set(q, CANDIDATES, INDEX[name], value)
+        found = isolability_group(q, CANDIDATES, INDEX[name], value)
         assert found.indices == ()
         assert found.apart > 3.0
 
@@ -99,29 +99,29 @@ def test_separable_causes_are_not_tied():
 def test_a_rival_beyond_its_bounds_imitates_nothing():
     signature = np.ones(SAMPLES)
     q = information({"road_grade@car": signature, "pad_mu_gain@car": 0.02 * signature})  # would need 50 times its size
-    found = tied_set(q, CANDIDATES, INDEX["road_grade@car"], 0.02)
+    found = isolability_group(q, CANDIDATES, INDEX["road_grade@car"], 0.02)
     assert found.indices == ()
     assert found.apart > 10.0
 
 
 def test_what_stands_out_by_less_than_the_noise_is_tied_with_nothing_in_particular():
     q = information({"road_grade@car": np.full(SAMPLES, 1e-3)})
-    found = tied_set(q, CANDIDATES, INDEX["road_grade@car"], 0.02)
+    found = isolability_group(q, CANDIDATES, INDEX["road_grade@car"], 0.02)
     assert found.indices == ()
-    assert found.apart == found.alone < APART
+    assert found.apart == found.alone < ISOLABILITY_SIGMA
 
 
 def test_the_same_effect_elsewhere_is_no_rival():
     signature = np.sin(np.linspace(0.0, 20.0, SAMPLES))
     q = information({FRONT: signature, REAR: signature})
-    assert tied_set(q, CANDIDATES, INDEX[FRONT], -0.12).indices == ()
+    assert isolability_group(q, CANDIDATES, INDEX[FRONT], -0.12).indices == ()
 
 
 def test_columns_of_accepted_causes_may_come_first():
     q = information(straight_stops())
     wider = np.zeros((len(q) + 2, len(q) + 2))
     wider[2:, 2:] = q
-    plain, later = (tied_set(m, CANDIDATES, INDEX[MASS], 200.0, k) for m, k in ((q, 0), (wider, 2)))
+    plain, later = (isolability_group(m, CANDIDATES, INDEX[MASS], 200.0, k) for m, k in ((q, 0), (wider, 2)))
     assert plain.members == later.members
     assert plain.apart == pytest.approx(later.apart)
 
@@ -146,7 +146,7 @@ def test_what_is_left_is_least_squares_with_priors(seed, count, value):
     assert found.apart >= left - 1e-4
     for k, apart in found.pairs:
         assert apart == pytest.approx(remaining(products, precision, 0, value, [k]), abs=1e-4)
-    assert bool(found.members) == (found.apart < APART <= found.alone)
+    assert bool(found.members) == (found.apart < ISOLABILITY_SIGMA <= found.alone)
 
 
 def test_the_prior_is_one_and_a_half_of_what_is_usual():

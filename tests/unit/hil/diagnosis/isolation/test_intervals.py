@@ -2,7 +2,7 @@
 
 import pytest
 
-from hil.diagnosis.estimation.model_discrepancy import variance_of
+from hil.diagnosis.estimation.model_discrepancy import variance_inflation
 from hil.diagnosis.estimation.terms import candidates, columns
 from hil.diagnosis.isolation.intervals import DEVIATION_BY_FORM, half_width
 
@@ -12,7 +12,7 @@ ALL = candidates(columns())
 @pytest.mark.parametrize("candidate", ALL[::15], ids=lambda c: c.name)
 def test_the_models_own_error_widens_what_noise_leaves(candidate):
     half = half_width(candidate, 0.0, 2.0)
-    assert half == pytest.approx(1.96 * 2.0 * variance_of(candidate) ** 0.5)
+    assert half == pytest.approx(1.96 * 2.0 * variance_inflation(candidate) ** 0.5)
     assert half >= 1.96 * 2.0
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hil.diagnosis.noise.innovations import coloured, moving
+from hil.diagnosis.noise.innovations import channel_innovations, longitudinal_innovations
 
 STEP_S = 0.02
 
@@ -19,7 +19,7 @@ def test_coloured_noise_becomes_white() -> None:
     y = (_ar1(n, 0.5, 0.4, rng) + 0.2 * rng.standard_normal(n))[:, None]
     fresh, white, out = np.zeros(n), np.full(n, 0.04), np.empty((n, 1))
     fresh[0] = 1.0
-    coloured(y, np.ones(n), fresh, white, np.exp(-STEP_S / 0.4), 0.25, out)
+    channel_innovations(y, np.ones(n), fresh, white, np.exp(-STEP_S / 0.4), 0.25, out)
     assert out.std() == pytest.approx(1.0, abs=0.03)
     assert abs(np.corrcoef(out[1:, 0], out[:-1, 0])[0, 1]) < 0.03
 
@@ -36,7 +36,9 @@ def _moved(y, fresh, rolling, white, share, colours, out) -> None:
     """The filter over (samples, 3 tracks, 1), without a restart."""
     tracks = tuple(np.ascontiguousarray(y[:, m]) for m in range(3))
     found = tuple(np.empty_like(track) for track in tracks)
-    moving(tracks, np.ones(len(y)), fresh, np.zeros(len(y)), rolling, white, share, STEP_S, colours, found)
+    longitudinal_innovations(
+        tracks, np.ones(len(y)), fresh, np.zeros(len(y)), rolling, white, share, STEP_S, colours, found
+    )
     out[:] = np.stack(found, axis=1)
 
 
@@ -78,7 +80,7 @@ def test_what_all_wheels_tell_wrong_is_no_motion() -> None:
 
 def test_what_is_not_measured_leaves_nothing() -> None:
     y, out = np.ones((50, 1)), np.ones((50, 1))
-    coloured(y, np.ones(50), np.zeros(50), np.zeros(50), 0.9, 1.0, out)
+    channel_innovations(y, np.ones(50), np.zeros(50), np.zeros(50), 0.9, 1.0, out)
     assert not out.any()
 
 

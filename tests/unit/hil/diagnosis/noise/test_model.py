@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from hil.diagnosis.data.log import Log, make_log
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.noise.estimate import estimate, first_guess
-from hil.diagnosis.noise.model import Frame, Noise, Track, whiten
+from hil.diagnosis.noise.model import ChannelNoise, Noise, SampleMasks, whiten
 
 WHEELS = ("fl", "fr", "rl", "rr")
 WAIT_S, NOISE_PA, RAMP_PA_S = 3e-4, 2e3, 2.5e7
@@ -34,11 +34,11 @@ def _log(rng: np.random.Generator, wait_s: float) -> tuple[Log, np.ndarray]:
 def test_frames_that_wait_are_noise_where_the_pressure_is_steep() -> None:
     log, true = _log(np.random.default_rng(1), WAIT_S)
     case = prepare([log], 0.3)
-    frame = Frame.of(case)
+    frame = SampleMasks.of(case)
     rows = len(case.drives[0].measured["pressure"])
     exact = np.interp(log.t_s[0] + 0.01 * np.arange(2 * rows), log.t_s, true).reshape(-1, 2).mean(axis=1)
     off = {"pressure.mean": (case.drives[0].measured["pressure"].mean(axis=1) - exact)[:, None]}
-    noise = Noise({"pressure.mean": Track(NOISE_PA / 8**0.5, 0.0, 0.0, 1.0)}, ())
+    noise = Noise({"pressure.mean": ChannelNoise(NOISE_PA / 8**0.5, 0.0, 0.0, 1.0)}, ())
     white = whiten(off, frame, noise)[0]["pressure.mean"]
     unaware = whiten(off, replace(frame, waited={}), noise)[0]["pressure.mean"]
     assert white[5:-5].std() == pytest.approx(1.0, abs=0.15)
@@ -47,16 +47,16 @@ def test_frames_that_wait_are_noise_where_the_pressure_is_steep() -> None:
 
 def test_wheels_carry_the_stamps_and_regular_stamps_wait_for_nothing() -> None:
     log, _ = _log(np.random.default_rng(1), WAIT_S)
-    assert not any(name.startswith("wheel") for name in Frame.of(prepare([log], 0.3)).waited)
+    assert not any(name.startswith("wheel") for name in SampleMasks.of(prepare([log], 0.3)).waited)
     regular, _ = _log(np.random.default_rng(1), 0.0)
-    assert max(values.max() for values in Frame.of(prepare([regular], 0.3)).waited.values()) < 1.0
+    assert max(values.max() for values in SampleMasks.of(prepare([regular], 0.3)).waited.values()) < 1.0
 
 
 def test_what_is_far_off_for_a_moment_does_not_make_all_noisier() -> None:
     """Noise is estimated by the likelihood that numbers are fitted by, or the one spoils what the other gains."""
     rng = np.random.default_rng(4)
     log, _ = _log(rng, 0.0)
-    frame = Frame.of(prepare([log], 0.3))
+    frame = SampleMasks.of(prepare([log], 0.3))
     samples = len(frame.fresh)
     quiet = NOISE_PA * rng.standard_normal((samples, 1))
     off = quiet.copy()
@@ -95,7 +95,7 @@ def test_the_noise_that_made_the_residual_is_found() -> None:
     fresh = np.zeros(n)
     fresh[0] = 1.0
     present = {"wheel.mean": rolling * (1.0 - restart), "ax": np.ones(n)}
-    frame = Frame(fresh, restart, rolling, 20.0 * rolling, np.zeros(n), step, present, ("wheel.mean", "ax"))
+    frame = SampleMasks(fresh, restart, rolling, 20.0 * rolling, np.zeros(n), step, present, ("wheel.mean", "ax"))
     found = estimate(tracks, frame, first_guess(tracks, frame))
     for (size, tau_s), known in zip(found.disturbances, true.values(), strict=False):
         assert size == pytest.approx(known[0], rel=0.25)
@@ -121,7 +121,7 @@ def test_a_coloured_error_of_the_ground_speed_is_none_of_the_wheels() -> None:
     tracks = {name: values[:, None] for name, values in tracks.items()}
     fresh = (np.arange(n) == 0) * 1.0
     ones, zeros = np.ones(n), np.zeros(n)
-    frame = Frame(fresh, zeros, ones, 20.0 * ones, zeros, step, dict.fromkeys(tracks, ones), tuple(tracks))
+    frame = SampleMasks(fresh, zeros, ones, 20.0 * ones, zeros, step, dict.fromkeys(tracks, ones), tuple(tracks))
     *_, wheels, ground = estimate(tracks, frame, first_guess(tracks, frame)).disturbances
     assert ground[0] == pytest.approx(0.04, rel=0.25)
     assert ground[1] == pytest.approx(2.0, rel=0.4)
@@ -138,7 +138,7 @@ def test_a_little_colour_is_not_lost_in_much_white_noise(seed: int) -> None:
     name = "pressure.left-right front"
     tracks = {name: (colour + white * rng.standard_normal(n))[:, None]}
     fresh, zeros = (np.arange(n) % 500 == 0) * 1.0, np.zeros(n)
-    frame = Frame(fresh, zeros, np.ones(n), np.full(n, 20.0), zeros, step, {name: np.ones(n)}, (name,))
+    frame = SampleMasks(fresh, zeros, np.ones(n), np.full(n, 20.0), zeros, step, {name: np.ones(n)}, (name,))
     track = estimate(tracks, frame, first_guess(tracks, frame)).tracks[name]
     assert track.a == pytest.approx(white, rel=0.05)
     assert track.c == pytest.approx(size, rel=0.4)
@@ -153,7 +153,7 @@ def test_no_noise_nearby_is_likelier_than_the_one_found() -> None:
     tracks = {"wheel.mean": speed[:, None], "ax": (force + 0.02 * rng.standard_normal(n))[:, None]}
     fresh = (np.arange(n) == 0) * 1.0
     ones, zeros = np.ones(n), np.zeros(n)
-    frame = Frame(fresh, zeros, ones, 20.0 * ones, zeros, step, dict.fromkeys(tracks, ones), tuple(tracks))
+    frame = SampleMasks(fresh, zeros, ones, 20.0 * ones, zeros, step, dict.fromkeys(tracks, ones), tuple(tracks))
     found = estimate(tracks, frame, first_guess(tracks, frame))
     best = whiten(tracks, frame, found)[1]
     for change in (0.9, 1.1):
@@ -175,5 +175,5 @@ def test_motors_of_one_axle_tell_a_torque_and_a_difference_once(act, tracks):
     channels = {f"wheel_speed_{w}_rad_s": np.full(len(t), 60.0) for w in WHEELS}
     for name in ("motor_torque", "motor_torque_demand"):
         channels |= {f"{name}_{w}_nm": -200.0 * np.sin(t) ** 2 * (w in act) for w in WHEELS}
-    names = Frame.of(prepare([make_log("log", t, channels)], 0.3)).names
+    names = SampleMasks.of(prepare([make_log("log", t, channels)], 0.3)).names
     assert {name.removeprefix("motor.") for name in names if name.startswith("motor.")} == tracks

@@ -5,11 +5,11 @@ from pulses import log_of_pulses
 
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.estimation.gauss_newton import Fitter
-from hil.diagnosis.estimation.nuisance_fit import Numbers
-from hil.diagnosis.noise.model import Frame
-from hil.diagnosis.result.cross_validation import folds, held_out
+from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
+from hil.diagnosis.noise.model import SampleMasks
+from hil.diagnosis.result.cross_validation import folds, held_out_residual
 from hil.diagnosis.simulation.parameter_set import nominal
-from hil.diagnosis.simulation.simulator import Rig
+from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import paper_car
 
 
@@ -26,8 +26,8 @@ def _replayed(name: str, deviations: float) -> tuple[Watched, int]:
     vehicle, base = paper_car(), nominal(paper_car())
     first = log_of_pulses()
     logs = [first, first]  # several manoeuvres, to hold some out
-    rig = Rig(prepare(logs, 0.308), vehicle)
-    numbers = Numbers(rig, Frame.of(rig.case), vehicle, base, relinearise=True)
+    rig = Simulator(prepare(logs, 0.308), vehicle)
+    numbers = NuisanceFit(rig, SampleMasks.of(rig.case), vehicle, base, relinearise=True)
     names = [nuisance.name for nuisance in numbers.nuisances]
     number = names.index(name)
     off = np.where(np.arange(len(names)) == number, deviations, 0.0)
@@ -42,7 +42,7 @@ def _replayed(name: str, deviations: float) -> tuple[Watched, int]:
     fitter.replayed = []
     model, noise = fitter.start()
     fitter.replayed.clear()
-    held_out(fitter, noise, model)
+    held_out_residual(fitter, noise, model)
     assert len(fitter.replayed) == len(folds(of.frame)) >= 2
     return fitter, number
 

@@ -6,27 +6,27 @@ from motion_logs import RADIUS_M, STEP_S, coloured, motion_log
 
 from hil.diagnosis.data.log import WHEEL_SPEED, Log, UnusableError, make_log
 from hil.diagnosis.explain import explain
-from hil.diagnosis.sensor_consistency.check import Consistency, _rivals, unforced
-from hil.diagnosis.sensor_consistency.labels import Cause, Name
+from hil.diagnosis.sensor_consistency.check import Consistency, _rivals, why_not_simulatable
+from hil.diagnosis.sensor_consistency.labels import Cause, Label
 from hil.diagnosis.sensor_consistency.likelihood import fit
-from hil.diagnosis.sensor_consistency.longitudinal import SLIP, Along, known_slip
-from hil.diagnosis.sensor_consistency.model import Model, Number
+from hil.diagnosis.sensor_consistency.longitudinal import SLIP, LongitudinalModel, known_slip
+from hil.diagnosis.sensor_consistency.model import Parameter, SensorModel
 from hil.diagnosis.sensor_consistency.motion import motion_of
 from hil.diagnosis.sensor_consistency.page import _headline
-from hil.diagnosis.sensor_consistency.selection import search
+from hil.diagnosis.sensor_consistency.selection import select_parameters
 
 
 def _found(log: Log):
     motion = motion_of([log], RADIUS_M)
-    return search(Along(motion), motion.block, {}, {}, lambda _: None)
+    return select_parameters(LongitudinalModel(motion), motion.block, {}, {}, lambda _: None)
 
 
-class _Cells(Model):
+class _Cells(SensorModel):
     """A delay that gets likelier up to the edge of a cell, and is unlikely beyond; a scale whose best value is 0.5."""
 
     def __init__(self):
         self.noise = {}
-        self.numbers = {"delay_s": Number(0.0, -0.5, 0.5, 0.02), "gain": Number(0.0, -1.0, 1.0, 0.05)}
+        self.parameters = {"delay_s": Parameter(0.0, -0.5, 0.5, 0.02), "gain": Parameter(0.0, -1.0, 1.0, 0.05)}
         self.resolution = {"delay_s": 0.02}
 
     def score(self, sensor, noise):
@@ -40,13 +40,13 @@ def test_a_delay_at_the_edge_of_a_cell_holds_no_other_number_back():
     assert found.sensor["delay_s"] == pytest.approx(0.12, abs=1e-4)
 
 
-class _Stairs(Model):
+class _Stairs(SensorModel):
     """A delay whose likelihood has an edge at every cell: 0.16 to 0.20 is likeliest, by noise that takes long to find
     (Rosenbrock, The Computer Journal 3 (1960)), and 0.08 to 0.16 are found in no time."""
 
     def __init__(self):
-        self.noise = {"a": Number(1.8, 0.1, 9.0, 1.0, False, 1e6), "b": Number(4.0, 0.1, 9.0, 1.0, False, 1e6)}
-        self.numbers = {"delay_s": Number(0.0, -0.5, 0.5, 0.02)}
+        self.noise = {"a": Parameter(1.8, 0.1, 9.0, 1.0, False, 1e6), "b": Parameter(4.0, 0.1, 9.0, 1.0, False, 1e6)}
+        self.parameters = {"delay_s": Parameter(0.0, -0.5, 0.5, 0.02)}
         self.resolution = {"delay_s": 0.02}
 
     def score(self, sensor, noise):
@@ -60,7 +60,7 @@ class _Stairs(Model):
 
 def test_what_cells_resolve_is_fitted_from_the_next_cells_too():
     """A delay of 0.2 s was told as 0.14 s, and lost to a filter."""
-    found = search(_Stairs(), np.arange(8), {}, {}, lambda _: None)
+    found = select_parameters(_Stairs(), np.arange(8), {}, {}, lambda _: None)
     assert found.final.sensor["delay_s"] == pytest.approx(0.18, abs=0.005)
 
 
@@ -89,9 +89,9 @@ def test_a_delay_is_found_with_its_interval():
 
 def test_the_way_is_chosen_by_the_channels():
     log = motion_log(6)
-    assert "forces cannot be replayed" in unforced([log], RADIUS_M)
+    assert "forces cannot be replayed" in why_not_simulatable([log], RADIUS_M)
     torque = {f"motor_torque_{w}_nm": np.zeros(6000) for w in ("fl", "fr", "rl", "rr")}
-    assert unforced([make_log("made", log.t_s, {**log.channels, **torque})], RADIUS_M) == ""
+    assert why_not_simulatable([make_log("made", log.t_s, {**log.channels, **torque})], RADIUS_M) == ""
 
 
 def test_a_car_that_stands_is_unusable():
@@ -128,10 +128,10 @@ def test_slip_of_the_tyres_is_no_filter_of_the_accelerometer():
     slip = 0.01
     channels = {n: v * (1.0 + slip * smooth) if n in WHEEL_SPEED else v for n, v in made.channels.items()}
     motion = motion_of([make_log("made", made.t_s, channels)], RADIUS_M)
-    blind = search(Along(motion), motion.block, {}, {}, lambda _: None)
+    blind = select_parameters(LongitudinalModel(motion), motion.block, {}, {}, lambda _: None)
     assert {step.number for step in blind.steps} & {"filter_s", "delay_s"}
-    model = Along(motion, known_slip(10.0, 0.2))
-    found = search(model, motion.block, {}, {}, lambda _: None, always=[SLIP])
+    model = LongitudinalModel(motion, known_slip(10.0, 0.2))
+    found = select_parameters(model, motion.block, {}, {}, lambda _: None, always=[SLIP])
     assert found.steps == []
     assert found.numbers[SLIP] == pytest.approx(slip, rel=0.3)
 
@@ -142,9 +142,9 @@ def _late_or_filtered() -> tuple[Cause, Cause]:
     def cause(number, name, channel, instead=()):
         return Cause("along", number, (name,), (1.0,), 0.1, 0.08, 0.12, 50.0, (channel,), instead=instead, behind=1.0)
 
-    late = cause("delay_s", Name("timestamp_offset", "delay_s", "imu", 1.0, 0.02), "ax_mps2")
-    filtered = cause("filter_s", Name("imu_filter", "time_s", "imu", 1.0, 0.02), "ax_mps2", (late,))
-    return filtered, cause("delay_s", Name("timestamp_offset", "delay_s", "pressure", -1.0, 0.02), "pressure")
+    late = cause("delay_s", Label("timestamp_offset", "delay_s", "imu", 1.0, 0.02), "ax_mps2")
+    filtered = cause("filter_s", Label("imu_filter", "time_s", "imu", 1.0, 0.02), "ax_mps2", (late,))
+    return filtered, cause("delay_s", Label("timestamp_offset", "delay_s", "pressure", -1.0, 0.02), "pressure")
 
 
 def test_a_rival_stays_where_its_effect_is_told_of_another_channel():

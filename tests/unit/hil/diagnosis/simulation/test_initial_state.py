@@ -8,7 +8,7 @@ import pytest
 from hil.diagnosis.data.log import make_log
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.simulation.parameter_set import nominal
-from hil.diagnosis.simulation.simulator import Rig
+from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import paper_car
 from plant.vectors import P
 
@@ -17,7 +17,7 @@ HELD_PA, NOISE_PA = 10e5, 3e4
 
 
 @pytest.fixture(scope="module")
-def rig() -> Rig:
+def rig() -> Simulator:
     """A car that stands on its brakes from before the log on, and drives off at 6 s."""
     t, rng = np.arange(1500) * 0.01, np.random.default_rng(5)
     held, speed = t < 6.0, np.clip(1.5 * (t - 6.5), 0.0, None)
@@ -25,7 +25,7 @@ def rig() -> Rig:
     channels |= {f"pressure_demand_{w}_pa": HELD_PA * held for w in WHEELS}
     channels |= {f"pressure_{w}_pa": HELD_PA * held + NOISE_PA * rng.standard_normal(len(t)) for w in WHEELS}
     channels |= {f"motor_torque_{w}_nm": 150.0 * ~held for w in WHEELS}
-    return Rig(prepare([make_log("log", t, channels)], 0.308), paper_car())
+    return Simulator(prepare([make_log("log", t, channels)], 0.308), paper_car())
 
 
 def test_what_is_asked_at_first_was_asked_before_the_log(rig):

@@ -8,8 +8,8 @@ import pytest
 from hil.diagnosis.data.dataset import ROW_S
 from hil.diagnosis.data.log import Log, make_log
 from hil.diagnosis.data.prepare import prepare
-from hil.diagnosis.simulation.parameter_set import LATE, World, nominal
-from hil.diagnosis.simulation.simulator import Rig
+from hil.diagnosis.simulation.parameter_set import LATENCY_NODES, ParameterSet, nominal
+from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.simulation.substeps import STEPS
 from hil.diagnosis.vehicle.load import load_vehicle, paper_car
 from plant.effects.effect import NODES
@@ -37,16 +37,16 @@ def _log() -> Log:
 
 
 @pytest.fixture(scope="module")
-def rig() -> Rig:
-    return Rig(prepare([_log()], 0.308), paper_car())
+def rig() -> Simulator:
+    return Simulator(prepare([_log()], 0.308), paper_car())
 
 
 def late(node: str, by_s: float) -> tuple[float, ...]:
     """Latencies of a world in which one node is late."""
-    return tuple(by_s if name == node else 0.0 for name in LATE)
+    return tuple(by_s if name == node else 0.0 for name in LATENCY_NODES)
 
 
-def _with(world: World, effect: str, number: str, value: float | np.ndarray) -> World:
+def _with(world: ParameterSet, effect: str, number: str, value: float | np.ndarray) -> ParameterSet:
     theta = world.theta.copy()
     theta[THETA.slice(effect, number)] = value
     return replace(world, theta=theta)
@@ -72,7 +72,7 @@ def test_a_motor_that_pulls_away_is_not_compared_before_the_wheels_turn():
     pressed = {f"pressure_{w}_pa": 5e5 * ~pulls for w in WHEELS}
     case = prepare([make_log("log", t, turning | asked | told | pressed)], 0.308)
     car = paper_car()
-    (drive,) = Rig(case, car).quieted(nominal(car)).case.drives
+    (drive,) = Simulator(case, car).quieted(nominal(car)).case.drives
     at = np.arange(len(drive.measured["motor"])) * 0.01 * drive.stride
     rests = (at > 5.1) & (at < 5.4)
     assert rests.any()
@@ -89,7 +89,7 @@ def test_motors_of_which_nobody_says_how_hot_they_get_are_not_derated():
     channels |= {f"pressure_{w}_pa": np.zeros(len(t)) for w in WHEELS}
     stated = {"mass_kg": 3900.0, "wheelbase_m": 2.9, "rolling_radius_m": 0.33, "motor_peak_torque_nm": 1200.0}
     car = load_vehicle({**stated, "brake_gain_front_nm_pa": 3e-4, "brake_gain_rear_nm_pa": 2e-4})
-    simulated = Rig(prepare([make_log("log", t, channels)], 0.33), car).run(nominal(car))["motor"]
+    simulated = Simulator(prepare([make_log("log", t, channels)], 0.33), car).run(nominal(car))["motor"]
     assert simulated[-500:] == pytest.approx(900.0, rel=1e-3)
 
 
@@ -100,7 +100,7 @@ def test_motors_of_which_nobody_says_how_hot_they_get_are_not_derated():
 def test_a_kept_world_changes_no_result(rig, effect, number, value):
     level = nominal(rig.vehicle)
     changed = _with(level, effect, number, value)
-    fresh = Rig(rig.case, rig.vehicle).run(changed)
+    fresh = Simulator(rig.case, rig.vehicle).run(changed)
     rig.keep(level)
     kept = rig.run(changed)
     for group, values in fresh.items():
@@ -119,7 +119,7 @@ def test_a_standing_car_is_replayed_for_what_acts_on_it(effect, number, value, a
     channels = {f"wheel_speed_{w}_rad_s": np.zeros(len(t)) for w in WHEELS} | {"ax_mps2": np.zeros(len(t))}
     for name in ("pressure_{}_pa", "pressure_demand_{}_pa"):
         channels |= {name.format(w): 15e5 * (t > 2.0) for w in WHEELS}
-    stands = Rig(prepare([make_log("stands", t, channels), _log()], 0.308), paper_car())
+    stands = Simulator(prepare([make_log("stands", t, channels), _log()], 0.308), paper_car())
     samples, level = stands.case.drives[0].samples, nominal(stands.vehicle)
     before, fresh = stands.run(level), stands.run(_with(level, effect, number, value))
     stands.keep(level)
@@ -137,7 +137,7 @@ def test_a_standing_car_is_replayed_for_what_acts_on_it(effect, number, value, a
 def test_what_a_kept_world_was_told_is_not_told_of_other_frames_or_teeth(rig, change):
     level = nominal(rig.vehicle)
     changed = replace(level, **change)
-    fresh = Rig(rig.case, rig.vehicle).run(changed)
+    fresh = Simulator(rig.case, rig.vehicle).run(changed)
     rig.keep(level)
     kept = rig.run(changed)
     assert any(np.abs(values - rig.run(level)[group]).max() > 1e-6 for group, values in fresh.items())
@@ -161,7 +161,7 @@ def test_a_sensor_that_tells_too_much_does_not_press_the_pads_at_the_start():
     """The offset is in the first sample as in all others: no pressure that was never there has to be let off."""
     log, offset = _log(), 1e5
     told = {f"pressure_{w}_pa": log.channels[f"pressure_{w}_pa"] + offset for w in WHEELS}
-    rig = Rig(prepare([make_log("log", log.t_s, {**log.channels, **told})], 0.308), paper_car())
+    rig = Simulator(prepare([make_log("log", log.t_s, {**log.channels, **told})], 0.308), paper_car())
     pressure = rig.run(_with(nominal(rig.vehicle), "pressure_offset", "offset_pa", offset))["pressure"]
     assert pressure[:100] == pytest.approx(offset, abs=1.0)
 
@@ -171,7 +171,7 @@ def test_a_ground_speed_that_tells_too_much_starts_a_car_as_slow_as_it_was():
     log = _log()
     ground = log.channels["wheel_speed_fl_rad_s"] * 0.308
     channels = {name: values for name, values in log.channels.items() if not name.startswith("wheel_speed")}
-    rig = Rig(prepare([make_log("log", log.t_s, {**channels, "speed_mps": ground})], 0.308), paper_car())
+    rig = Simulator(prepare([make_log("log", log.t_s, {**channels, "speed_mps": ground})], 0.308), paper_car())
     level = nominal(rig.vehicle)
     rig.keep(level)
     right, wrong = (rig.run(world)["gps"] for world in (level, _with(level, "speed_scale", "gain", 0.05)))
@@ -222,7 +222,7 @@ def _driven(time_constant_s: float) -> tuple[Log, np.ndarray]:
     return make_log("log", np.arange(1600) * 0.01, channels | {"ax_mps2": table[::2, 8]}), table[1::2, 4]
 
 
-def _middle(rig: Rig) -> np.ndarray:
+def _middle(rig: Simulator) -> np.ndarray:
     inputs = rig.case.drives[0].inputs
     torque = inputs[:, INPUT.at.motor_torque_nm]
     return 0.5 * (torque[:-1] + torque[1:]) + inputs[:-1, INPUT.at.motor_torque_bend_nm]
@@ -232,7 +232,7 @@ def test_what_drives_the_car_has_the_steps_of_the_world_that_made_it():
     """Measured torques smoothed have none; with a lag of the motors that is not theirs they have them wrong."""
     log, true = _driven(0.02)
     vehicle = paper_car()
-    rig = Rig(prepare([log], 0.308), vehicle).quieted(nominal(vehicle))
+    rig = Simulator(prepare([log], 0.308), vehicle).quieted(nominal(vehicle))
     right = nominal(vehicle)
     right.p[P.motor_time_constant_s] = 0.02
     before = np.abs(_middle(rig) - true[: len(_middle(rig))]).max()
@@ -259,7 +259,7 @@ def test_what_drives_the_car_is_what_happened_however_the_torque_is_told(late_by
     taken_s = t * (1.0 - 5e-4) if late_by == "clock" else t - 0.006
     seen = 0.8 * true if late_by == "scale" else np.interp(taken_s, t, true)
     changed |= {f"motor_torque_{w}_nm": seen for w in WHEELS}
-    rig = Rig(prepare([replace(log, channels=changed)], 0.308), vehicle).quieted(world)
+    rig = Simulator(prepare([replace(log, channels=changed)], 0.308), vehicle).quieted(world)
     rig.keep(world)
     driving = rig._kept.replays[0].inputs[:, INPUT.at.motor_torque_nm]
     assert np.abs(seen - true)[20:-20].max() > 20.0
@@ -277,7 +277,7 @@ def test_a_torque_told_half_a_row_late_is_the_one_between_two_rows(told):
     vehicle = paper_car()
     level = nominal(vehicle)
     level.p[P.motor_time_constant_s] = 0.008
-    rig = Rig(prepare([log], 0.308), vehicle).quieted(level)
+    rig = Simulator(prepare([log], 0.308), vehicle).quieted(level)
     drive = rig.case.drives[0]
     world = (
         replace(level, late_s=late("motor", 0.005))
@@ -312,7 +312,7 @@ def test_steps_are_short_where_a_torque_steps_and_noise_is_no_step():
         for name, values in log.channels.items()
     }
     for one in (log, replace(log, channels=noisy)):
-        paces = Rig(prepare([one], 0.308), paper_car())._pace[0]
+        paces = Simulator(prepare([one], 0.308), paper_car())._pace[0]
         assert set(paces[205:212]) == {1}
         assert (paces[260:290] == STEPS).all()
         assert 0.0 < (paces == 1).mean() < 0.4
@@ -320,7 +320,7 @@ def test_steps_are_short_where_a_torque_steps_and_noise_is_no_step():
 
 def test_a_wheel_speed_that_is_a_mean_over_a_window_swings_less():
     log, _ = _driven(0.008)
-    rig = Rig(prepare([log], 0.308), paper_car())
+    rig = Simulator(prepare([log], 0.308), paper_car())
     level = nominal(rig.vehicle)
     sharp, mean = rig.run(level)["wheel"][:, 0], rig.run(replace(level, window_rows2=1.0))["wheel"][:, 0]
     step = slice(100, 110)
@@ -330,9 +330,9 @@ def test_a_wheel_speed_that_is_a_mean_over_a_window_swings_less():
 
 def test_a_car_held_straight_goes_on_in_its_line_with_a_weak_brake(rig):
     weak = np.array([-0.3, 0.0, 0.0, 0.0])
-    held = Rig(rig.case, rig.vehicle.held_straight())
+    held = Simulator(rig.case, rig.vehicle.held_straight())
 
-    def yaw_rate(of: Rig) -> np.ndarray:
+    def yaw_rate(of: Simulator) -> np.ndarray:
         return of.states(_with(nominal(of.vehicle), "pad_mu_gain", "gain", weak), ["state.yaw_rate_rad_s"])
 
     assert np.abs(yaw_rate(rig)).max() > 1e-3
@@ -351,6 +351,6 @@ def test_no_damping_of_a_standing_wheel_makes_the_steps_swing_by_themselves(at_o
     (damping,) = [one for one in paper_car().nuisances if one.name == "wheel_brake_windup_time_s"]
     assert damping.farthest == 3.0
     monkeypatch.setattr("hil.diagnosis.simulation.simulator.at_once", lambda drive: np.full(len(drive.inputs), at_once))
-    rig = Rig(case, paper_car())
+    rig = Simulator(case, paper_car())
     world = nominal(rig.vehicle).shifted([damping], np.array([damping.farthest]))
     assert np.abs(rig.run(world)["wheel"][-200:]).max() < 1e-4

@@ -4,7 +4,7 @@ import numpy as np
 
 from hil.diagnosis.data.log import make_log
 from hil.diagnosis.data.prepare import prepare
-from hil.diagnosis.simulation.substeps import STEPS, at_once
+from hil.diagnosis.simulation.substeps import STEPS, rows_per_step
 
 WHEELS = ("fl", "fr", "rl", "rr")
 BRAKES, STOPS, LEAVES, END = 4.0, 9.0, 20.0, 26.0
@@ -19,7 +19,7 @@ def _paces():
     channels |= {f"pressure_{w}_pa": 15e5 * braking for w in WHEELS}
     channels |= {f"pressure_demand_{w}_pa": 15e5 * braking for w in WHEELS}
     (drive,) = prepare([make_log("log", t, channels)], 0.308).drives
-    return at_once(drive)
+    return rows_per_step(drive)
 
 
 def test_steps_are_short_where_something_is_quick_and_long_elsewhere():

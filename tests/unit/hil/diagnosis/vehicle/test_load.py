@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hil.diagnosis.data.log import MOTOR_DEMAND, Log, UnusableError, make_log
-from hil.diagnosis.simulation.parameter_set import nominal, start_nuisances
+from hil.diagnosis.simulation.parameter_set import nominal, recording_nuisances
 from hil.diagnosis.vehicle.load import load_vehicle, paper_car
 from hil.diagnosis.vehicle.priors import HALF_WIDTH_TO_SIGMA
 from hil.diagnosis.vehicle.spec import Vehicle, rest_friction
@@ -162,7 +162,7 @@ def test_how_late_a_node_may_be_is_as_stated_or_four_milliseconds() -> None:
     vehicle = load_vehicle(SIX | {"node_latency_s_tolerance": 1e-3})
     assert vehicle.node_latency_s == 1e-3
     assert not any("node_latency" in remark for remark in vehicle.remarks)
-    late = {one.name: one.step[0] for one in start_nuisances(True, vehicle.node_latency_s) if "late_" in one.name}
+    late = {one.name: one.step[0] for one in recording_nuisances(True, vehicle.node_latency_s) if "late_" in one.name}
     assert late == {
         "late_imu": 5e-4, "late_pressure": 5e-4, "late_motor": 5e-4, "late_demand": 2e-3, "late_steering": 2e-3,
         "late_yaw_rate": 3e-3,
