@@ -62,7 +62,7 @@ def test_a_law_in_no_list_is_shown_with_joint_variable_and_curve(tmp_path: Path)
     assert 10.0 < lowest["x"] < 20.0
     assert -0.45 < lowest["y"] < -0.12
     assert all(point["low"] <= point["y"] <= point["high"] for point in curve)
-    assert len(load_extension(tmp_path / "extension.toml").terms) == 5
+    assert len(load_extension(tmp_path / "extension.toml").nonparametric_rows) == 5
 
 
 @pytest.mark.slow

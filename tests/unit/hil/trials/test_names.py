@@ -8,7 +8,7 @@ PHASED = {"dtv_judder", "wheel_tooth_error"}  # an amplitude and a phase there, 
 
 
 def test_the_plant_has_every_hidden_number_at_its_place_but_those_with_a_phase() -> None:
-    known = {(c.effect.name, c.parameter.name, c.place) for c in candidates(columns())}
+    known = {(c.effect.name, c.parameter.name, c.location) for c in candidates(columns())}
     strange = set()
     for kind in SEPARABLE:
         for place in kind.where:

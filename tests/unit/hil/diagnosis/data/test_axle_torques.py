@@ -52,9 +52,9 @@ def test_the_places_of_a_motor_are_those_of_wheels_that_have_one(told, wheels):
     without = undriven(with_both_axles([_log(*told)]))
     assert without == wheels
     listed = [one for one in candidates(columns(), without) if one.effect.name == "iwm_gain"]
-    members = {one.place: {*one.members()} for one in listed}
+    members = {one.location: {*one.members()} for one in listed}
     assert not any(those & wheels for those in members.values())
-    assert {one.places for one in listed} == {2 * len(members)}
+    assert {one.locations for one in listed} == {2 * len(members)}
     assert len(members) == (3 if wheels else 9)
-    brakes = {one.place for one in candidates(columns(), without) if one.effect.name == "pad_mu_gain"}
+    brakes = {one.location for one in candidates(columns(), without) if one.effect.name == "pad_mu_gain"}
     assert len(brakes) == 9

@@ -71,7 +71,7 @@ def test_a_segment_that_begins_anew_is_compared_again() -> None:
 def test_a_log_says_where_it_is_not_compared_any_more() -> None:
     channels = {f"wheel_speed_{w}_rad_s": _wheels()[:, k] for k, w in enumerate(WHEELS)}
     channels |= {f"pressure_{w}_pa": np.where(T > 5.0, 40e5, 0.0) for w in WHEELS}
-    (drive,) = prepare([make_log("log", T, channels)], RADIUS_M).drives
+    (drive,) = prepare([make_log("log", T, channels)], RADIUS_M).recordings
     times = np.arange(drive.samples) * drive.stride * 0.01
     assert drive.moving[times < FROM_S].all()
     assert not drive.moving[times > FROM_S + 0.1].any()

@@ -26,10 +26,10 @@ def _log(asked: float, given: float) -> Log:
 def test_demands_that_nobody_followed_are_left_out(asked: float, kept: bool) -> None:
     case = prepare([_log(20e5, 20e5), _log(asked, 20e5)], 0.3)
     assert ("pressure" in case.groups) is kept
-    for drive in case.drives:
+    for drive in case.recordings:
         assert drive.log.has("pressure_demand_fl_pa") is kept
         assert any("demands left out" in text for text in drive.log.remarks) is not kept
-    assert [drive.number for drive in case.drives] == [0, 1]
+    assert [drive.number for drive in case.recordings] == [0, 1]
 
 
 def test_released_brakes_contradict_nothing() -> None:
@@ -43,7 +43,7 @@ def test_a_demand_is_held_from_row_to_row_and_lies_between_sparse_samples(step_s
     rising = 1e4 * np.floor(t / 0.02 + 1e-6)
     channels = {f"wheel_speed_{w}_rad_s": np.full(len(t), 60.0) for w in WHEELS}
     channels |= {f"pressure_{w}_pa": rising for w in WHEELS} | {f"pressure_demand_{w}_pa": rising for w in WHEELS}
-    (drive,) = prepare([make_log("log", t, channels)], 0.3).drives
+    (drive,) = prepare([make_log("log", t, channels)], 0.3).recordings
     asked = drive.inputs[:, INPUT.slice("pressure_demand_pa")][:, 0]
     assert asked[2] == pytest.approx(1e4)
     assert asked[3] == pytest.approx(between)
@@ -54,7 +54,7 @@ def test_a_pressure_that_nobody_can_follow_is_compared_where_none_is_asked_for()
     beside the other at any time."""
     log = _log(20e5, 20e5)
     case = prepare([log], 0.3, unstated=("ehb", "motor"))
-    (drive,) = case.drives
+    (drive,) = case.recordings
     t = np.arange(drive.samples) * case.sample_s
     for track in ("pressure.mean", "pressure.front-rear"):
         compared = drive.compared[track] > 0.5
@@ -62,8 +62,8 @@ def test_a_pressure_that_nobody_can_follow_is_compared_where_none_is_asked_for()
         assert not compared[(t > 3.0) & (t < 7.0)].any()
         assert compared[t > 7.1].all()
     assert all((drive.compared[f"pressure.left-right {axle}"][t > 1.1] > 0.5).all() for axle in ("front", "rear"))
-    assert "pressure" not in case.followed
-    (drive,) = prepare([log], 0.3).drives
+    assert "pressure" not in case.tracked_actuators
+    (drive,) = prepare([log], 0.3).recordings
     assert not drive.compared
 
 
@@ -72,7 +72,7 @@ def test_unlike_demands_are_not_compared_as_alike() -> None:
     uneven = replace(
         log, channels=log.channels | {"pressure_demand_fr_pa": 0.5 * log.channels["pressure_demand_fr_pa"]}
     )
-    (drive,) = prepare([uneven], 0.3, unstated=("ehb", "motor")).drives
+    (drive,) = prepare([uneven], 0.3, unstated=("ehb", "motor")).recordings
     t = np.arange(drive.samples) * drive.stride * 0.01
     front, rear = (drive.compared[f"pressure.left-right {axle}"] > 0.5 for axle in ("front", "rear"))
     assert not front[(t > 3.0) & (t < 7.0)].any()

@@ -21,7 +21,7 @@ def _alike(log, one: str, other: str) -> float:
     """Cosine of two signatures in the acceleration, where that is compared."""
     vehicle = load_vehicle(VEHICLE)
     case = prepare([log], 0.318)
-    rig, frame, base = Simulator(case, vehicle).quieted(nominal(vehicle)), SampleMasks.of(case), nominal(vehicle)
+    rig, frame, base = Simulator(case, vehicle).denoised(nominal(vehicle)), SampleMasks.of(case), nominal(vehicle)
     listed = {candidate.name: candidate for candidate in CandidateSet(rig, frame, ()).candidates}
     shown = []
     for name in (one, other):
@@ -55,7 +55,7 @@ def test_of_a_sensor_that_tells_nothing_but_noise_no_scale_is_asked(torque_nm, t
     noise = Noise({name: ChannelNoise(0.5, 0.0, 0.0, 1.0) for name in shown}, ())
     quiet = unexcited_sensors(shown, noise)
     assert quiet == (["pressure"] if tells else ["pressure", "motor"])
-    places = {(one.effect.name, one.place) for one in candidates(columns(), quiet=quiet)}
+    places = {(one.effect.name, one.location) for one in candidates(columns(), quiet=quiet)}
     for name in ("wrong_scale", "timestamp_offset", "clock_drift"):
         assert ((name, "motor") in places) == tells
         assert (name, "imu") in places

@@ -39,7 +39,7 @@ def _any_curve(k: int = 0) -> BasisExpansion:
 
 
 def test_hats_of_equal_size_are_a_constant():
-    points = estimate_curve(_any_curve().pieces, [0.2] * BASIS_SIZE, np.zeros((BASIS_SIZE, BASIS_SIZE)))
+    points = estimate_curve(_any_curve().functions, [0.2] * BASIS_SIZE, np.zeros((BASIS_SIZE, BASIS_SIZE)))
     assert [point["y"] for point in points] == pytest.approx([0.2] * len(points))
 
 
@@ -49,15 +49,15 @@ def test_hats_of_equal_size_are_a_constant():
 )
 def test_what_is_written_is_read_again(values, law):
     for placed in at_each_location(_any_curve(law)):
-        rows = np.array([piece.row(value or 0.1) for piece, value in zip(placed.pieces, values, strict=True)])
+        rows = np.array([piece.row(value or 0.1) for piece, value in zip(placed.functions, values, strict=True)])
         assert np.array_equal(read_laws(written_laws(rows), "laws"), rows)
 
 
 def test_a_piece_is_added_to_what_a_world_has():
     world = nominal(paper_car())
-    piece = _any_curve().pieces[2]
+    piece = _any_curve().functions[2]
     twice = piece.applied(piece.applied(world, 0.1), 0.2)
-    assert twice.terms.shape == (2, len(term("friction.mu", 0.1, (1, 3, 0.0, 1.0))))
+    assert twice.nonparametric_rows.shape == (2, len(term("friction.mu", 0.1, (1, 3, 0.0, 1.0))))
 
 
 def test_a_law_is_driven_in_a_scenario(tmp_path):

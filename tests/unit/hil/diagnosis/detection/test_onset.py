@@ -88,20 +88,20 @@ def test_what_was_taken_to_begin_and_was_always_there_has_no_beginning(always):
 
     def fitter() -> Fitter:
         numbers = NuisanceFit(rig, SampleMasks.of(case), vehicle, base, relinearise=True)
-        numbers.anew(np.zeros(len(numbers.nuisances)))
+        numbers.relinearise(np.zeros(len(numbers.nuisances)))
         return numbers.fitter
 
     there = Term(pads, -0.2, onset=None if always else second)
     as_handed_in = fitter().start()[0].z
-    told = rig.run(fitter().world(as_handed_in, (there,)))
+    told = rig.run(fitter().parameter_set(as_handed_in, (there,)))
     rng, first = np.random.default_rng(5), 0
-    for drive in case.drives:
+    for drive in case.recordings:
         for group, values in told.items():
             own = values[first : first + drive.samples]
             drive.measured[group][:] = own + DEVIATIONS.get(group, 0.02) * rng.standard_normal(own.shape)
         first += drive.samples
     fresh = fitter()
-    noise = fresh.settle(fresh.at(as_handed_in, (there,), fresh.start()[1]), fresh.start()[1], 2)[1]
+    noise = fresh.alternate_noise_and_fit(fresh.at(as_handed_in, (there,), fresh.start()[1]), fresh.start()[1], 2)[1]
     taken = fresh.at(as_handed_in, (Term(pads, -0.2, onset=second),), noise)
     (term,) = estimate_onsets(fresh, taken, noise).terms
     assert (term.onset is None) is always

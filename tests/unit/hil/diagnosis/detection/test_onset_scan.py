@@ -40,26 +40,26 @@ def _screened(
 @pytest.mark.parametrize("begin", [2, 3, 5])
 def test_a_cause_in_the_second_half_explains_more_from_there_on(begin: int) -> None:
     always, later = _screened(begin, 15.0)
-    assert later.since == BEGINS[begin]
+    assert later.onset == BEGINS[begin]
     assert later.gain > always.gain
     assert later.value == pytest.approx(5.0 * 15.0 / ((MANOEUVRES - begin) * SAMPLES) ** 0.5, rel=0.3)
 
 
 def test_what_was_always_there_or_is_nothing_begins_nowhere() -> None:
-    assert _screened(0, 15.0)[1].since is None
-    assert all(_screened(None, 0.0, seed)[1].since is None for seed in range(50))
+    assert _screened(0, 15.0)[1].onset is None
+    assert all(_screened(None, 0.0, seed)[1].onset is None for seed in range(50))
 
 
 def test_what_one_log_alone_shows_may_be_the_model_that_errs_there() -> None:
-    assert _screened(6, 12.0)[1].since is None
+    assert _screened(6, 12.0)[1].onset is None
 
 
 def test_in_a_single_log_more_than_one_manoeuvre_has_to_show_it() -> None:
-    assert _screened(4, 12.0, begins=ONE_LOG)[1].since == ONE_LOG[4]
-    assert _screened(7, 12.0, begins=ONE_LOG)[1].since is None
+    assert _screened(4, 12.0, begins=ONE_LOG)[1].onset == ONE_LOG[4]
+    assert _screened(7, 12.0, begins=ONE_LOG)[1].onset is None
 
 
 def test_the_choice_of_a_time_has_its_price() -> None:
     (_, priced), (_, free) = _screened(5, 12.0), _screened(5, 12.0, price=0.0)
     assert free.gain - priced.gain == pytest.approx(PRICE)
-    assert free.evidence - priced.evidence == pytest.approx(0.5 * PRICE)
+    assert free.log_bayes_factor - priced.log_bayes_factor == pytest.approx(0.5 * PRICE)

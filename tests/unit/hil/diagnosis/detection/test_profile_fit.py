@@ -26,7 +26,9 @@ def test_a_value_as_far_off_as_it_may_be_is_at_its_end(share: float, ended: bool
 
 def _fitted(cost: float, evidence: float, error: float, name: str = "mass_offset@car") -> FittedHypothesis:
     nothing: Any = None
-    return FittedHypothesis(Term(CANDIDATES[name], 100.0), nothing, cost, evidence, 1.0, nothing, error=error)
+    return FittedHypothesis(
+        Term(CANDIDATES[name], 100.0), nothing, cost, evidence, 1.0, nothing, discrepancy_factor=error
+    )
 
 
 @pytest.mark.parametrize(("error", "shared_by"), [(np.inf, 1.0), (1.0, 1.0), (4.0, 4.0)])

@@ -28,7 +28,7 @@ def test_a_score_finds_the_value_that_made_the_residual() -> None:
     q, true = 1.0, 120.0
     found = score(candidate, q * true, q)
     assert found.value == pytest.approx(true, rel=1e-3)
-    assert found.raw == pytest.approx(q * true**2, rel=1e-3)
+    assert found.raw_gain == pytest.approx(q * true**2, rel=1e-3)
 
 
 def test_a_value_of_the_forbidden_sign_explains_nothing() -> None:
@@ -38,7 +38,7 @@ def test_a_value_of_the_forbidden_sign_explains_nothing() -> None:
 
 
 def test_what_leaves_no_trace_cannot_score() -> None:
-    assert score(CANDIDATES["mass_offset@car"], 1.0, 0.0).reach == 0.0
+    assert score(CANDIDATES["mass_offset@car"], 1.0, 0.0).max_snr == 0.0
 
 
 def test_more_looks_ask_for_more() -> None:
@@ -63,13 +63,13 @@ def test_a_cause_that_shows_through_others_is_no_error_of_the_model() -> None:
     count = 1 + max(c.columns[0] for c in listed)
     tau = np.ones(count)
     for candidate in listed:
-        tau[candidate.columns[0]] = candidate.spread
+        tau[candidate.columns[0]] = candidate.prior_sd
     cause, beside = listed[0], []
     for seed in range(11):
         rng = np.random.default_rng(seed)
         shared = rng.standard_normal(3000)
         signatures = (0.8 * shared[:, None] + 0.6 * rng.standard_normal((3000, count))) / tau
-        hidden = 0.3 * cause.spread * signatures[:, cause.columns[0]]
+        hidden = 0.3 * cause.prior_sd * signatures[:, cause.columns[0]]
         joined = np.column_stack((rng.standard_normal(3000) + hidden, signatures))
         total = InformationBlocks((joined.T @ joined)[None], 0, 3000, 0.0)
         found = scores(listed, marginalise(total.total(), 0), 0, [0.0] * len(listed))
@@ -82,17 +82,17 @@ def test_a_gain_is_shared_out_over_the_models_own_error() -> None:
     candidate = CANDIDATES["tyre_relaxation@car"]
     found = score(candidate, 0.1 * 1e4, 1e4)
     assert variance_inflation(candidate) > 1.0
-    assert found.gain == pytest.approx(found.raw / variance_inflation(candidate))
+    assert found.gain == pytest.approx(found.raw_gain / variance_inflation(candidate))
 
 
 def test_dive_errs_more_where_nobody_states_the_springs() -> None:
     candidate = CANDIDATES["pitch_dive@car"]
-    assert variance_inflation(replace(candidate, sprung=False)) > variance_inflation(candidate)
-    assert variance_inflation(candidate) == variance_inflation(replace(candidate, sprung=True))
+    assert variance_inflation(replace(candidate, suspension_stated=False)) > variance_inflation(candidate)
+    assert variance_inflation(candidate) == variance_inflation(replace(candidate, suspension_stated=True))
 
 
 def test_every_entry_of_the_models_own_error_is_a_candidates_number_or_a_law_at_a_kind_of_place() -> None:
-    kinds = {(c.effect.name, c.parameter.name, location_kind(c.place)) for c in CANDIDATES.values()}
+    kinds = {(c.effect.name, c.parameter.name, location_kind(c.location)) for c in CANDIDATES.values()}
     kinds |= {
         (UNLISTED, law.name, location_kind(place)) for law in NONPARAMETRIC_TERMS for place in LOCATIONS[law.scope]
     }

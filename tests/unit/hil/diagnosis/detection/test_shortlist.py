@@ -51,7 +51,7 @@ def test_a_cause_that_bent_numbers_leave_nothing_of_leads_as_seen_from_the_car_a
     vehicle = load_vehicle(VEHICLE)
     case, base = prepare([log_as_driven(vehicle, 0.318)], 0.318), nominal(vehicle)
     rng = np.random.default_rng(2)
-    (drive,) = case.drives
+    (drive,) = case.recordings
     for group, told in Simulator(case, vehicle).run(CANDIDATES["tyre_radius@rl"].applied(base, -0.02)).items():
         drive.measured[group][:] = told + _DEVIATIONS.get(group, 0.02) * rng.standard_normal(told.shape)
     races: list[bool] = []

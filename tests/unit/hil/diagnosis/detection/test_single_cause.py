@@ -34,13 +34,13 @@ class _Driven:
         world = base
         for name, value in hidden.items():
             world = self.candidate(name).applied(world, value)
-        (drive,) = case.drives
+        (drive,) = case.recordings
         for group, told in rig.run(world).items():
             drive.measured[group][:] = told + DEVIATIONS.get(group, 0.02) * rng.standard_normal(told.shape)
         self.numbers = NuisanceFit(rig, SampleMasks.of(case), vehicle, base, relinearise=True)
-        self.numbers.anew(np.zeros(len(self.numbers.nuisances)))
+        self.numbers.relinearise(np.zeros(len(self.numbers.nuisances)))
         self.fitter = self.numbers.fitter
-        self.bare, self.noise = self.numbers.fitted(*self.fitter.start())
+        self.bare, self.noise = self.numbers.fit(*self.fitter.start())
         self.case, self.vehicle = case, vehicle
 
     def candidate(self, name: str) -> Candidate:
@@ -81,11 +81,11 @@ def test_what_acts_alike_needs_no_fit_once_its_value_is_found(driven):
 def _singles(driven: _Driven, names: Sequence[str], values: Sequence[float]) -> list[FittedHypothesis]:
     """Single causes that would take the place of these."""
     model = driven.fitted(names, values, 8)
-    driven.field.taken_at(driven.fitter, driven.bare)
+    driven.field.linearise_at(driven.fitter, driven.bare)
     accepted = [[driven.contender(replace(model, terms=model.terms[:k]), driven.noise)] for k in (1, 2)]
     found = Diagnosis(
         driven.case, driven.vehicle, driven.fitter, driven.noise, driven.noise, driven.bare, driven.bare, model,
-        contenders=accepted,
+        hypotheses=accepted,
     )  # fmt: skip
     return try_single_cause(driven.fitter, driven.field, found, model, driven.noise)
 
@@ -94,7 +94,7 @@ def _singles(driven: _Driven, names: Sequence[str], values: Sequence[float]) -> 
 def test_one_cause_takes_the_place_of_two_that_imitate_it(driven):
     first, *_ = _singles(driven, ["tyre_radius@fl", "rolling_resistance@car"], [0.001, 0.2])
     assert first.term.candidate.effect.name in ("residual_drag", "stuck_corner")
-    assert first.term.candidate.place == "fl"
+    assert first.term.candidate.location == "fl"
 
 
 @pytest.mark.slow

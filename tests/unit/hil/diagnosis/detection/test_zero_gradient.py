@@ -32,15 +32,15 @@ def weaker():
     """
     vehicle, case = paper_car(), prepare([log_of_pulses()], 0.308)
     rig, base = Simulator(case, vehicle), nominal(vehicle)
-    (drive,) = case.drives
+    (drive,) = case.recordings
     rng = np.random.default_rng(5)
     for group, told in rig.run(POWER.applied(base, LOST)).items():
         size = {"pressure": 2e3, "motor": NOISE_NM}.get(group, 0.02)
         drive.measured[group][:] = told + size * rng.standard_normal(told.shape)
     frame = SampleMasks.of(case)
-    none = {name: np.zeros((len(frame.fresh), 0)) for name in frame.names}
+    none = {name: np.zeros((len(frame.log_start), 0)) for name in frame.names}
     fitter = Fitter(rig, frame, base, (), none)
-    return (fitter, *fitter.settle(*fitter.start(), 1))
+    return (fitter, *fitter.alternate_noise_and_fit(*fitter.start(), 1))
 
 
 def test_a_small_step_shows_nothing_and_a_replay_does(weaker):
@@ -53,12 +53,12 @@ def test_a_small_step_shows_nothing_and_a_replay_does(weaker):
     assert has_zero_gradient(item)
     met = line_search(fitter, model, noise, item)
     assert met.replayed
-    assert met.reach > 3.0
+    assert met.max_snr > 3.0
     assert met.value == pytest.approx(LOST, abs=0.05)
     contest = CandidateFits(fitter, shown, model, noise, relinearise=True)
-    again, quieter = contest.profiled(replace(met, candidate=replace(POWER, columns=(0,))))
-    assert again.raw >= met.raw
-    assert contest.contender(again, quieter).term.value == pytest.approx(LOST, abs=0.005)
+    again, quieter = contest.profile_over_noise(replace(met, candidate=replace(POWER, columns=(0,))))
+    assert again.raw_gain >= met.raw_gain
+    assert contest.fit(again, quieter).term.value == pytest.approx(LOST, abs=0.005)
 
 
 def test_what_no_size_explains_stays_at_nothing(weaker):
@@ -66,5 +66,5 @@ def test_what_no_size_explains_stays_at_nothing(weaker):
         one for one in candidates(COLUMNS) if one.effect.name == "pedal_sensor" and one.parameter.name == "gain"
     ]
     met = line_search(*weaker, score(pedal, 0.0, 0.0))
-    assert met.value == met.reach == 0.0
+    assert met.value == met.max_snr == 0.0
     assert not met.replayed

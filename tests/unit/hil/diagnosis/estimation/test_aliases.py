@@ -23,7 +23,7 @@ def _model(name: str, value: float, z: float, number: str) -> tuple[Model, int]:
 
 
 def _number(model: Model, at: int) -> float:
-    return float(BASE.shifted(VEHICLE.nuisances, model.z).p[VEHICLE.nuisances[at].at[0]])
+    return float(BASE.with_nuisances(VEHICLE.nuisances, model.z).p[VEHICLE.nuisances[at].at[0]])
 
 
 @pytest.mark.parametrize(("name", "number", "slope"), [
@@ -52,7 +52,7 @@ def test_stamps_of_a_node_that_are_late_are_its_latency(node):
     z[at] = 3.0
     term = Term(CANDIDATES[f"timestamp_offset@{node}"], 0.039)
     told = resolve_aliases(Model(z, (term,), {}, 9.0, np.zeros((0, 0))), nuisances, BASE)
-    late = BASE.shifted(nuisances, told.z).late_s[nuisances[at].at[0]]
+    late = BASE.with_nuisances(nuisances, told.z).latency_s[nuisances[at].at[0]]
     assert told.terms[0].value + late == pytest.approx(0.045)
     assert abs(late) < 5e-4
     same = alias_of(term, nuisances, BASE)

@@ -41,11 +41,11 @@ def test_squares_of_right_numbers_add_up_to_what_the_data_tell_of_them():
     case = prepare([log], 0.308)
     frame = SampleMasks.of(case)
     numbers = NuisanceFit(Simulator(case, vehicle), frame, vehicle, nominal(vehicle), False)
-    numbers.anew(np.zeros(len(numbers.nuisances)))
+    numbers.relinearise(np.zeros(len(numbers.nuisances)))
     noise = numbers.fitter.start()[1]
-    told, rng = numbers.fitter.told(noise), np.random.default_rng(11)
+    told, rng = numbers.fitter.effective_parameters(noise), np.random.default_rng(11)
     assert 1.0 < told < len(numbers.nuisances)
-    information = numbers.fitter.products(noise)
+    information = numbers.fitter.nuisance_information(noise)
     root = np.linalg.cholesky(information + 1e-9 * np.eye(len(information)))
 
     def fitted(times: float) -> float:
@@ -73,8 +73,8 @@ def test_what_single_wheels_are_off_makes_light_of_no_strain():
     fitter = Fitter(Simulator(case, vehicle), SampleMasks.of(case), nominal(vehicle), vehicle.nuisances, {})
     of_wheels = np.array([one.kind == "scatter" for one in vehicle.nuisances])
     assert of_wheels.sum() >= 16
-    assert fitter.strain(np.where(of_wheels, 0.0, 2.0)) == pytest.approx(4.0)
-    assert fitter.strain(np.where(of_wheels, 3.0, 0.0)) == 1.0
+    assert fitter.birge_ratio(np.where(of_wheels, 0.0, 2.0)) == pytest.approx(4.0)
+    assert fitter.birge_ratio(np.where(of_wheels, 3.0, 0.0)) == 1.0
 
 
 def test_the_discs_heat_matters_once_a_cause_reads_their_temperature():
@@ -82,14 +82,16 @@ def test_the_discs_heat_matters_once_a_cause_reads_their_temperature():
     vehicle = load_vehicle({"mass_kg": 1500.0, "wheelbase_m": 2.5, "rolling_radius_m": 0.3} | GAINS)
     case = prepare([replace(log_of_pulses(), disc_temperature_k=650.0)], 0.3)
     numbers = NuisanceFit(Simulator(case, vehicle), SampleMasks.of(case), vehicle, nominal(vehicle), False)
-    numbers.anew(np.zeros(len(numbers.nuisances)))
+    numbers.relinearise(np.zeros(len(numbers.nuisances)))
     bare, noise = numbers.fitter.start()
     (fade,) = (one for one in candidates(columns()) if one.name == "pad_temp_fade@front")
     fades = numbers.fitter.at(bare.z, (Term(fade, 2e-3),), noise)
     heat = [one.name for one in numbers.nuisances].index("friction_brake_heat_capacity_j_k_front")
 
     def acts(model):
-        return max(np.abs(values[:, heat]).max() for values in numbers.fitter.columns_at(model).values()) > 0.0
+        return (
+            max(np.abs(values[:, heat]).max() for values in numbers.fitter.nuisance_jacobian_at(model).values()) > 0.0
+        )
 
     assert not acts(bare)
     assert acts(fades)
@@ -104,7 +106,7 @@ def test_sensitivities_taken_lately_serve_again_where_cars_are_alike():
 
     def replays(z: np.ndarray, *terms: Term) -> int:
         before = rig.runs
-        numbers.beside(z, terms)
+        numbers.relinearise_cached(z, terms)
         return rig.runs - before
 
     assert replays(z) > len(z)
@@ -113,7 +115,7 @@ def test_sensitivities_taken_lately_serve_again_where_cars_are_alike():
     beside = numbers.fitter
     assert replays(z + 0.4) == 0
     assert numbers.fitter is bare
-    numbers.anew(z + 0.4)  # a fit of the numbers asks for its own
+    numbers.relinearise(z + 0.4)  # a fit of the numbers asks for its own
     assert numbers.fitter is not bare
     assert replays(z, Term(heavy, 110.0)) == 0
     assert numbers.fitter is beside
@@ -143,11 +145,11 @@ def test_a_dead_time_is_found_on_either_side(side):
     at = names.index("ehb_dead_time_s")
     numbers = NuisanceFit(rig, SampleMasks.of(case), vehicle, base, relinearise=True)
     off = np.where(np.arange(len(names)) == at, side * 0.6, 0.0)
-    told = rig.run(base.shifted(numbers.nuisances, off))["pressure"]
-    (drive,) = case.drives
+    told = rig.run(base.with_nuisances(numbers.nuisances, off))["pressure"]
+    (drive,) = case.recordings
     drive.measured["pressure"][:] = told + NOISE_PA * np.random.default_rng(1).standard_normal(told.shape)
-    numbers.anew(np.zeros(len(names)))
-    model, _ = numbers.fitted(*numbers.fitter.start())
+    numbers.relinearise(np.zeros(len(names)))
+    model, _ = numbers.fit(*numbers.fitter.start())
     assert np.sign(model.z[at]) == side  # how much of it is latency, one log leaves open
-    left = drive.measured["pressure"] - model.stack["pressure"]
+    left = drive.measured["pressure"] - model.channels["pressure"]
     assert np.sqrt(np.mean(left**2)) < 1.1 * NOISE_PA

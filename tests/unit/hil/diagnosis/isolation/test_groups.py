@@ -50,7 +50,7 @@ def test_mass_pads_and_drag_are_tied_together_though_no_pair_is():
     found = isolability_group(q, CANDIDATES, INDEX[MASS], 200.0)
     assert found.pairs == ()
     assert found.alone > 50.0
-    assert found.apart < ISOLABILITY_SIGMA
+    assert found.separation < ISOLABILITY_SIGMA
     assert sorted({CANDIDATES[k].effect.name for k in found.members}) == ["headwind", "pad_mu_gain"]
     assert len(found.members) == 3  # front and rear pads, or one axle and both
     pads = [v for k, v in zip(found.members, found.values, strict=True) if k != INDEX[DRAG]]
@@ -63,7 +63,7 @@ def test_the_null_vector_leaves_no_signature():
     products = summed(q, CANDIDATES)
     at = [INDEX[MASS], *found.members]
     null = np.array([200.0, *(-value for value in found.values)])
-    assert float(null @ products[np.ix_(at, at)] @ null) <= found.apart**2
+    assert float(null @ products[np.ix_(at, at)] @ null) <= found.separation**2
     assert 200.0**2 * products[at[0], at[0]] == pytest.approx(found.alone**2)
 
 
@@ -75,7 +75,7 @@ def test_a_known_force_unties_them():
     alone = information({MASS: -0.09 * pulse / 0.05})
     found = isolability_group(tied + alone, CANDIDATES, INDEX[MASS], 200.0)
     assert found.members == ()
-    assert found.apart > ISOLABILITY_SIGMA
+    assert found.separation > ISOLABILITY_SIGMA
 
 
 def test_one_rival_is_enough_where_it_imitates_alone():
@@ -84,7 +84,7 @@ def test_one_rival_is_enough_where_it_imitates_alone():
     found = isolability_group(q, CANDIDATES, INDEX["road_grade@car"], 0.02)
     assert found.members == (INDEX["imu_bias.ax_mps2@car"],)
     assert found.pairs[0][0] == found.members[0]
-    assert found.pairs[0][1] == pytest.approx(found.apart)
+    assert found.pairs[0][1] == pytest.approx(found.separation)
 
 
 def test_separable_causes_are_not_tied():
@@ -93,7 +93,7 @@ def test_separable_causes_are_not_tied():
     for name, value in (("road_grade@car", 0.02), (MASS, 150.0), ("tyre_radius@car", -0.01)):
         found = isolability_group(q, CANDIDATES, INDEX[name], value)
         assert found.indices == ()
-        assert found.apart > 3.0
+        assert found.separation > 3.0
 
 
 def test_a_rival_beyond_its_bounds_imitates_nothing():
@@ -101,14 +101,14 @@ def test_a_rival_beyond_its_bounds_imitates_nothing():
     q = information({"road_grade@car": signature, "pad_mu_gain@car": 0.02 * signature})  # would need 50 times its size
     found = isolability_group(q, CANDIDATES, INDEX["road_grade@car"], 0.02)
     assert found.indices == ()
-    assert found.apart > 10.0
+    assert found.separation > 10.0
 
 
 def test_what_stands_out_by_less_than_the_noise_is_tied_with_nothing_in_particular():
     q = information({"road_grade@car": np.full(SAMPLES, 1e-3)})
     found = isolability_group(q, CANDIDATES, INDEX["road_grade@car"], 0.02)
     assert found.indices == ()
-    assert found.apart == found.alone < ISOLABILITY_SIGMA
+    assert found.separation == found.alone < ISOLABILITY_SIGMA
 
 
 def test_the_same_effect_elsewhere_is_no_rival():
@@ -123,7 +123,7 @@ def test_columns_of_accepted_causes_may_come_first():
     wider[2:, 2:] = q
     plain, later = (isolability_group(m, CANDIDATES, INDEX[MASS], 200.0, k) for m, k in ((q, 0), (wider, 2)))
     assert plain.members == later.members
-    assert plain.apart == pytest.approx(later.apart)
+    assert plain.separation == pytest.approx(later.separation)
 
 
 @given(st.integers(0, 10_000), st.integers(3, 12), st.floats(0.5, 30.0))
@@ -143,11 +143,11 @@ def test_what_is_left_is_least_squares_with_priors(seed, count, value):
     fewer = [remaining(products, precision, 0, value, rivals[:k]) for k in range(count)]
     assert all(after <= before + 1e-6 for before, after in pairwise(fewer))
     found = imitation(products, precision, wide, 0, value)
-    assert found.apart >= left - 1e-4
+    assert found.separation >= left - 1e-4
     for k, apart in found.pairs:
         assert apart == pytest.approx(remaining(products, precision, 0, value, [k]), abs=1e-4)
-    assert bool(found.members) == (found.apart < ISOLABILITY_SIGMA <= found.alone)
+    assert bool(found.members) == (found.separation < ISOLABILITY_SIGMA <= found.alone)
 
 
 def test_the_prior_is_one_and_a_half_of_what_is_usual():
-    assert CANDIDATES[INDEX[MASS]].spread == 225.0
+    assert CANDIDATES[INDEX[MASS]].prior_sd == 225.0

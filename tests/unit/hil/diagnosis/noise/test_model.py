@@ -35,21 +35,21 @@ def test_frames_that_wait_are_noise_where_the_pressure_is_steep() -> None:
     log, true = _log(np.random.default_rng(1), WAIT_S)
     case = prepare([log], 0.3)
     frame = SampleMasks.of(case)
-    rows = len(case.drives[0].measured["pressure"])
+    rows = len(case.recordings[0].measured["pressure"])
     exact = np.interp(log.t_s[0] + 0.01 * np.arange(2 * rows), log.t_s, true).reshape(-1, 2).mean(axis=1)
-    off = {"pressure.mean": (case.drives[0].measured["pressure"].mean(axis=1) - exact)[:, None]}
+    off = {"pressure.mean": (case.recordings[0].measured["pressure"].mean(axis=1) - exact)[:, None]}
     noise = Noise({"pressure.mean": ChannelNoise(NOISE_PA / 8**0.5, 0.0, 0.0, 1.0)}, ())
     white = whiten(off, frame, noise)[0]["pressure.mean"]
-    unaware = whiten(off, replace(frame, waited={}), noise)[0]["pressure.mean"]
+    unaware = whiten(off, replace(frame, jitter_variance={}), noise)[0]["pressure.mean"]
     assert white[5:-5].std() == pytest.approx(1.0, abs=0.15)
     assert unaware[5:-5].std() > 3.0
 
 
 def test_wheels_carry_the_stamps_and_regular_stamps_wait_for_nothing() -> None:
     log, _ = _log(np.random.default_rng(1), WAIT_S)
-    assert not any(name.startswith("wheel") for name in SampleMasks.of(prepare([log], 0.3)).waited)
+    assert not any(name.startswith("wheel") for name in SampleMasks.of(prepare([log], 0.3)).jitter_variance)
     regular, _ = _log(np.random.default_rng(1), 0.0)
-    assert max(values.max() for values in SampleMasks.of(prepare([regular], 0.3)).waited.values()) < 1.0
+    assert max(values.max() for values in SampleMasks.of(prepare([regular], 0.3)).jitter_variance.values()) < 1.0
 
 
 def test_what_is_far_off_for_a_moment_does_not_make_all_noisier() -> None:
@@ -57,7 +57,7 @@ def test_what_is_far_off_for_a_moment_does_not_make_all_noisier() -> None:
     rng = np.random.default_rng(4)
     log, _ = _log(rng, 0.0)
     frame = SampleMasks.of(prepare([log], 0.3))
-    samples = len(frame.fresh)
+    samples = len(frame.log_start)
     quiet = NOISE_PA * rng.standard_normal((samples, 1))
     off = quiet.copy()
     off[samples // 2 : samples // 2 + 30] += 200.0 * NOISE_PA * rng.standard_normal((30, 1))

@@ -27,23 +27,23 @@ def _replayed(name: str, deviations: float) -> tuple[Watched, int]:
     first = log_of_pulses()
     logs = [first, first]  # several manoeuvres, to hold some out
     rig = Simulator(prepare(logs, 0.308), vehicle)
-    numbers = NuisanceFit(rig, SampleMasks.of(rig.case), vehicle, base, relinearise=True)
+    numbers = NuisanceFit(rig, SampleMasks.of(rig.dataset), vehicle, base, relinearise=True)
     names = [nuisance.name for nuisance in numbers.nuisances]
     number = names.index(name)
     off = np.where(np.arange(len(names)) == number, deviations, 0.0)
-    told, at = rig.run(base.shifted(numbers.nuisances, off)), 0
-    for drive in rig.case.drives:
+    told, at = rig.run(base.with_nuisances(numbers.nuisances, off)), 0
+    for drive in rig.dataset.recordings:
         for group, values in told.items():
             drive.measured[group][:] = values[at : at + drive.samples]
         at += drive.samples
-    numbers.anew(np.zeros(len(names)))
+    numbers.relinearise(np.zeros(len(names)))
     of = numbers.fitter
-    fitter = Watched(of.rig, of.frame, of.base, of.nuisances, of.nuisance_columns)
+    fitter = Watched(of.simulator, of.masks, of.base, of.nuisances, of.nuisance_jacobian)
     fitter.replayed = []
     model, noise = fitter.start()
     fitter.replayed.clear()
     held_out_residual(fitter, noise, model)
-    assert len(fitter.replayed) == len(folds(of.frame)) >= 2
+    assert len(fitter.replayed) == len(folds(of.masks)) >= 2
     return fitter, number
 
 
@@ -51,7 +51,7 @@ def test_no_fold_moves_a_number_farther_than_it_may_go():
     """A demand acted on before it was made spoilt the torque of motors on every manoeuvre held out."""
     fitter, early = _replayed("late_demand", -0.5)
     assert all(z[early] >= 0.0 for z in fitter.replayed)
-    assert all((np.abs(z) <= fitter.farthest).all() for z in fitter.replayed)
+    assert all((np.abs(z) <= fitter.bound).all() for z in fitter.replayed)
 
 
 def test_a_fold_moves_by_what_it_leaves_out_alone():

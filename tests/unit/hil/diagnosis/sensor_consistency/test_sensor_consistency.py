@@ -129,18 +129,30 @@ def test_slip_of_the_tyres_is_no_filter_of_the_accelerometer():
     channels = {n: v * (1.0 + slip * smooth) if n in WHEEL_SPEED else v for n, v in made.channels.items()}
     motion = motion_of([make_log("made", made.t_s, channels)], RADIUS_M)
     blind = select_parameters(LongitudinalModel(motion), motion.block, {}, {}, lambda _: None)
-    assert {step.number for step in blind.steps} & {"filter_s", "delay_s"}
+    assert {step.parameter for step in blind.steps} & {"filter_s", "delay_s"}
     model = LongitudinalModel(motion, known_slip(10.0, 0.2))
     found = select_parameters(model, motion.block, {}, {}, lambda _: None, always=[SLIP])
     assert found.steps == []
-    assert found.numbers[SLIP] == pytest.approx(slip, rel=0.3)
+    assert found.parameters[SLIP] == pytest.approx(slip, rel=0.3)
 
 
 def _late_or_filtered() -> tuple[Cause, Cause]:
     """An accelerometer that is filtered or, as likely, late; and pressures that are late."""
 
     def cause(number, name, channel, instead=()):
-        return Cause("along", number, (name,), (1.0,), 0.1, 0.08, 0.12, 50.0, (channel,), instead=instead, behind=1.0)
+        return Cause(
+            "along",
+            number,
+            (name,),
+            (1.0,),
+            0.1,
+            0.08,
+            0.12,
+            50.0,
+            (channel,),
+            substitutes=instead,
+            delta_criterion=1.0,
+        )
 
     late = cause("delay_s", Label("timestamp_offset", "delay_s", "imu", 1.0, 0.02), "ax_mps2")
     filtered = cause("filter_s", Label("imu_filter", "time_s", "imu", 1.0, 0.02), "ax_mps2", (late,))
@@ -150,11 +162,11 @@ def _late_or_filtered() -> tuple[Cause, Cause]:
 def test_a_rival_stays_where_its_effect_is_told_of_another_channel():
     """It was dropped, though the verdict counted the two as tied."""
     causes = _late_or_filtered()
-    assert causes[0].tied
-    assert not causes[1].tied
+    assert causes[0].is_ambiguous
+    assert not causes[1].is_ambiguous
     rivals = _rivals(causes, [cause.as_json() for cause in causes])
     assert [(one["effect"], one["channels"]) for one in rivals] == [("timestamp_offset", ["ax_mps2"])]
-    assert _rivals(causes[:1], [*(c.as_json() for c in causes), causes[0].instead[0].as_json()]) == []
+    assert _rivals(causes[:1], [*(c.as_json() for c in causes), causes[0].substitutes[0].as_json()]) == []
 
 
 def test_the_headline_names_all_that_are_tied():

@@ -58,29 +58,29 @@ def test_spots_are_turned_to_where_the_wheels_show_them(rolled: np.ndarray) -> N
     """Of a car whose spots stand elsewhere the amplitude is seen once they are turned, and was not before."""
     made = _stop(rolled)
     world = nominal(made.vehicle)
-    made._turned = [wheel_angles(drive) + QUARTER_RAD for drive in made.case.drives]
+    made._turned = [wheel_angles(drive) + QUARTER_RAD for drive in made.dataset.recordings]
     spots = made.states(_spotted(world, AMPLITUDE), SOURCE["wheel"]) - made.states(world, SOURCE["wheel"])
     seen = rolled[: len(spots)] + spots
 
     def told(rig: Simulator) -> float:
         """The amplitude that explains most, by one linear step, of the samples that are compared."""
-        compared = rig.case.drives[0].moving > 0.5
+        compared = rig.dataset.recordings[0].moving > 0.5
         bare = rig.run(world)["wheel"]
         left = np.diff((rig.measured()["wheel"] - bare)[compared], axis=0).ravel()
         shown = np.diff((rig.run(_spotted(world, 0.01))["wheel"] - bare)[compared], axis=0).ravel() / 0.01
         return float(left @ shown / (shown @ shown))
 
     rig = _stop(seen)
-    rig._turned = [wheel_angles(drive) for drive in rig.case.drives]
+    rig._turned = [wheel_angles(drive) for drive in rig.dataset.recordings]
     before = told(rig)
-    assert not rig.align(world)
+    assert not rig.fit_hot_spot_phase(world)
     assert before != pytest.approx(AMPLITUDE, rel=0.2)
     assert told(rig) == pytest.approx(AMPLITUDE, rel=0.2)
 
 
 @pytest.mark.parametrize("stand", [-0.3, -0.05, 0.0, 0.2, 0.31])
 def test_two_replays_tell_where_the_spots_stand(rolled: np.ndarray, stand: float) -> None:
-    (drive,) = _stop(rolled).case.drives
+    (drive,) = _stop(rolled).dataset.recordings
     rng = np.random.default_rng(3)
     shown = [rng.normal(size=(drive.samples, 4)) for _ in range(2)]
     left = 7.0 * (np.cos(ORDER * stand) * shown[0] + np.sin(ORDER * stand) * shown[1])
@@ -107,7 +107,7 @@ def test_angles_where_spots_do_not_show_cost_nothing() -> None:
 
 
 def test_angles_are_those_of_the_measured_wheels(rolled: np.ndarray) -> None:
-    (drive,) = _stop(np.full((600, 4), 30.0)).case.drives
+    (drive,) = _stop(np.full((600, 4), 30.0)).dataset.recordings
     turned = wheel_angles(drive)
     assert turned[0] == pytest.approx(0.0)
     assert turned[100] == pytest.approx(30.0)
@@ -123,13 +123,13 @@ def test_parts_have_all_rows_once() -> None:
 def test_spots_are_turned_for_the_sign_they_have(rolled: np.ndarray, sign: float) -> None:
     """Of a car handed in with spots: less than none is the same spots half the way to the next."""
     made = _stop(rolled)
-    made._turned = [wheel_angles(drive) for drive in made.case.drives]
+    made._turned = [wheel_angles(drive) for drive in made.dataset.recordings]
     world = _spotted(nominal(made.vehicle), AMPLITUDE)
     seen = made.states(world, SOURCE["wheel"])
     rig = _stop(seen)
     told = _spotted(world, sign * AMPLITUDE)
-    assert rig.align(told)
-    compared = rig.case.drives[0].moving > 0.5
+    assert rig.fit_hot_spot_phase(told)
+    compared = rig.dataset.recordings[0].moving > 0.5
     left, bare = (rig.measured()["wheel"] - rig.run(one)["wheel"] for one in (told, nominal(rig.vehicle)))
     assert np.diff(left[compared], axis=0).std() < 0.4 * np.diff(bare[compared], axis=0).std()
 

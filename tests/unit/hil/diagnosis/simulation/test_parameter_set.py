@@ -27,7 +27,7 @@ def test_every_number_of_the_vehicle_moves_without_a_corner(vehicle):
     base = nominal(vehicle)
     for nuisance in vehicle.nuisances:
         for at, step in zip(nuisance.at, nuisance.step, strict=True):
-            worlds = [base.shifted([nuisance], np.array([z])) for z in nuisance.farthest * STEPS]
+            worlds = [base.with_nuisances([nuisance], np.array([z])) for z in nuisance.farthest * STEPS]
             told = nuisance.kind in ("sensor", "scatter", "line")
             values = np.array([(world.theta if told else world.p)[at] for world in worlds])
             moved = np.diff(values) * np.sign(step)
@@ -42,7 +42,9 @@ def test_one_standard_deviation_is_what_the_set_says():
     vehicle = paper_car()
     mass = next(nuisance for nuisance in vehicle.nuisances if nuisance.name == "vehicle_mass_kg")
     base = nominal(vehicle)
-    assert base.shifted([mass], np.array([1.0])).p[mass.at[0]] == pytest.approx(base.p[mass.at[0]] + mass.step[0])
+    assert base.with_nuisances([mass], np.array([1.0])).p[mass.at[0]] == pytest.approx(
+        base.p[mass.at[0]] + mass.step[0]
+    )
 
 
 def test_what_single_wheels_are_off_was_there_before_a_cause_of_the_same_kind():
@@ -53,13 +55,13 @@ def test_what_single_wheels_are_off_was_there_before_a_cause_of_the_same_kind():
     off.theta[pads] = (0.01, -0.02, 0.0, 0.01)
     weak = replace(off, theta=off.theta.copy())
     weak.theta[pads.start] -= 0.1
-    begun = weak.begun("pad_mu_gain", 1, 2.0, before=off)
+    begun = weak.with_onset("pad_mu_gain", 1, 2.0, before=off)
     t = np.arange(3000) * 0.01
     logs = [
         make_log(name, t, {f"{what}_{w}_{unit}": 20.0 + 0.0 * t for w in WHEELS for what, unit in TOLD})
         for name in "abc"
     ]
-    first, second, third = prepare(logs, 0.318).drives
+    first, second, third = prepare(logs, 0.318).recordings
     assert begun.theta_in(first)[pads].tolist() == off.theta[pads].tolist()
     assert begun.theta_in(second)[THETA.slice("pad_mu_gain", "onset_s")] == 2.0
     assert begun.theta_in(third)[pads].tolist() == weak.theta[pads].tolist()
@@ -70,8 +72,8 @@ def test_an_inertial_unit_has_zeros_across():
     nuisances = recording_nuisances(True, LATENCY_S)
     base = nominal(paper_car())
     z = np.array([1.0 if one.kind == "sensor" else 0.0 for one in nuisances])
-    theta = base.shifted(nuisances, z).theta
+    theta = base.with_nuisances(nuisances, z).theta
     assert theta[THETA.slice("imu_bias", "ay_mps2")] == pytest.approx(ZEROS["ay_mps2"])
     assert theta[THETA.slice("imu_bias", "yaw_rate_rad_s")] == pytest.approx(ZEROS["yaw_rate_rad_s"])
     assert np.flatnonzero(theta != base.theta).size == 2
-    assert (base.shifted(nuisances, 0.0 * z).theta == base.theta).all()
+    assert (base.with_nuisances(nuisances, 0.0 * z).theta == base.theta).all()

@@ -72,7 +72,7 @@ def test_a_motor_that_pulls_away_is_not_compared_before_the_wheels_turn():
     pressed = {f"pressure_{w}_pa": 5e5 * ~pulls for w in WHEELS}
     case = prepare([make_log("log", t, turning | asked | told | pressed)], 0.308)
     car = paper_car()
-    (drive,) = Simulator(case, car).quieted(nominal(car)).case.drives
+    (drive,) = Simulator(case, car).denoised(nominal(car)).dataset.recordings
     at = np.arange(len(drive.measured["motor"])) * 0.01 * drive.stride
     rests = (at > 5.1) & (at < 5.4)
     assert rests.any()
@@ -120,9 +120,9 @@ def test_a_standing_car_is_replayed_for_what_acts_on_it(effect, number, value, a
     for name in ("pressure_{}_pa", "pressure_demand_{}_pa"):
         channels |= {name.format(w): 15e5 * (t > 2.0) for w in WHEELS}
     stands = Simulator(prepare([make_log("stands", t, channels), _log()], 0.308), paper_car())
-    samples, level = stands.case.drives[0].samples, nominal(stands.vehicle)
+    samples, level = stands.dataset.recordings[0].samples, nominal(stands.vehicle)
     before, fresh = stands.run(level), stands.run(_with(level, effect, number, value))
-    stands.keep(level)
+    stands.cache_baseline(level)
     kept = stands.run(_with(level, effect, number, value))
     same = all(np.array_equal(values[:samples], kept[group][:samples]) for group, values in before.items())
     assert same != acts
@@ -150,7 +150,7 @@ def test_until_a_cause_begins_what_single_wheels_are_off_is_there(rig):
     level = nominal(rig.vehicle)
     unlike = _with(level, "pad_mu_gain", "gain", np.array([0.01, -0.03, 0.02, 0.0]))
     weak = _with(unlike, "pad_mu_gain", "gain", np.array([-0.3, -0.03, 0.02, 0.0]))
-    begun = weak.begun("pad_mu_gain", 0, 21.0, before=unlike)
+    begun = weak.with_onset("pad_mu_gain", 0, 21.0, before=unlike)
     alone, always, within = (rig.run(world)["wheel"] for world in (unlike, weak, begun))
     assert np.abs(within - alone)[:1049].max() == 0.0
     assert np.abs(within - alone)[1075:1140].max() > 0.5
@@ -173,7 +173,7 @@ def test_a_ground_speed_that_tells_too_much_starts_a_car_as_slow_as_it_was():
     channels = {name: values for name, values in log.channels.items() if not name.startswith("wheel_speed")}
     rig = Simulator(prepare([make_log("log", log.t_s, {**channels, "speed_mps": ground})], 0.308), paper_car())
     level = nominal(rig.vehicle)
-    rig.keep(level)
+    rig.cache_baseline(level)
     right, wrong = (rig.run(world)["gps"] for world in (level, _with(level, "speed_scale", "gain", 0.05)))
     assert wrong[:20] == pytest.approx(right[:20], rel=1e-3)
     assert np.abs(wrong - right).max() > 0.05  # the drag of a slower car is less
@@ -223,7 +223,7 @@ def _driven(time_constant_s: float) -> tuple[Log, np.ndarray]:
 
 
 def _middle(rig: Simulator) -> np.ndarray:
-    inputs = rig.case.drives[0].inputs
+    inputs = rig.dataset.recordings[0].inputs
     torque = inputs[:, INPUT.at.motor_torque_nm]
     return 0.5 * (torque[:-1] + torque[1:]) + inputs[:-1, INPUT.at.motor_torque_bend_nm]
 
@@ -232,11 +232,11 @@ def test_what_drives_the_car_has_the_steps_of_the_world_that_made_it():
     """Measured torques smoothed have none; with a lag of the motors that is not theirs they have them wrong."""
     log, true = _driven(0.02)
     vehicle = paper_car()
-    rig = Simulator(prepare([log], 0.308), vehicle).quieted(nominal(vehicle))
+    rig = Simulator(prepare([log], 0.308), vehicle).denoised(nominal(vehicle))
     right = nominal(vehicle)
     right.p[P.motor_time_constant_s] = 0.02
     before = np.abs(_middle(rig) - true[: len(_middle(rig))]).max()
-    rig.quieten(right)
+    rig.denoise_inputs(right)
     after = np.abs(_middle(rig) - true[: len(_middle(rig))]).max()
     assert before > 10.0
     assert after < 1.0
@@ -251,7 +251,7 @@ def test_what_drives_the_car_is_what_happened_however_the_torque_is_told(late_by
     true = changed["motor_torque_fl_nm"]
     level = nominal(vehicle)
     world = {
-        "latency": replace(level, late_s=late("motor", 0.006)),
+        "latency": replace(level, latency_s=late("motor", 0.006)),
         "stamp": _with(level, "timestamp_offset", "delay_s", MOTOR_NODE * 0.006),
         "clock": _with(level, "clock_drift", "share", MOTOR_NODE * 5e-4),
         "scale": _with(level, "wrong_scale", "factor", MOTOR_NODE * -0.2),
@@ -259,8 +259,8 @@ def test_what_drives_the_car_is_what_happened_however_the_torque_is_told(late_by
     taken_s = t * (1.0 - 5e-4) if late_by == "clock" else t - 0.006
     seen = 0.8 * true if late_by == "scale" else np.interp(taken_s, t, true)
     changed |= {f"motor_torque_{w}_nm": seen for w in WHEELS}
-    rig = Simulator(prepare([replace(log, channels=changed)], 0.308), vehicle).quieted(world)
-    rig.keep(world)
+    rig = Simulator(prepare([replace(log, channels=changed)], 0.308), vehicle).denoised(world)
+    rig.cache_baseline(world)
     driving = rig._kept.replays[0].inputs[:, INPUT.at.motor_torque_nm]
     assert np.abs(seen - true)[20:-20].max() > 20.0
     assert np.abs(driving - true[: len(driving)])[20:-20].max() < 6.0
@@ -277,15 +277,15 @@ def test_a_torque_told_half_a_row_late_is_the_one_between_two_rows(told):
     vehicle = paper_car()
     level = nominal(vehicle)
     level.p[P.motor_time_constant_s] = 0.008
-    rig = Simulator(prepare([log], 0.308), vehicle).quieted(level)
-    drive = rig.case.drives[0]
+    rig = Simulator(prepare([log], 0.308), vehicle).denoised(level)
+    drive = rig.dataset.recordings[0]
     world = (
-        replace(level, late_s=late("motor", 0.005))
+        replace(level, latency_s=late("motor", 0.005))
         if told == "latency"
         else _with(level, "timestamp_offset", "delay_s", MOTOR_NODE * 0.005)
     )
     happened = {"motor": drive.inputs[:, INPUT.slice("motor_torque_nm")]}
-    seen = rig.telling.at_rows(happened, drive, world)["motor"][1:, 0]
+    seen = rig.measurement_model.measure_rows(happened, drive, world)["motor"][1:, 0]
     straight = 0.5 * (happened["motor"][:-1, 0] + happened["motor"][1:, 0])
     far, near = (np.abs(values - true[: len(values)])[20:-20].max() for values in (straight, seen))
     assert near < 0.8 < 2.0 < far
@@ -298,7 +298,7 @@ def test_a_yaw_rate_comes_later_than_the_accelerations(rig):
     level = nominal(rig.vehicle)
     in_time, later = (
         rig.telling.at_rows({"ay": ramp, "yaw": ramp}, drive, world)
-        for world in (level, replace(level, late_s=late("yaw_rate", 0.5 * ROW_S)))
+        for world in (level, replace(level, latency_s=late("yaw_rate", 0.5 * ROW_S)))
     )
     assert later["yaw"][5:-5] == pytest.approx(in_time["yaw"][5:-5] - 0.5)
     assert np.array_equal(later["ay"], in_time["ay"])
@@ -337,7 +337,7 @@ def test_a_car_held_straight_goes_on_in_its_line_with_a_weak_brake(rig):
 
     assert np.abs(yaw_rate(rig)).max() > 1e-3
     assert np.abs(yaw_rate(held)).max() < 1e-9
-    assert "steer_lateral" in held.vehicle.untold
+    assert "steer_lateral" in held.vehicle.undiagnosable_effects
 
 
 @pytest.mark.parametrize("at_once", [1, 2, 4])
@@ -349,8 +349,8 @@ def test_no_damping_of_a_standing_wheel_makes_the_steps_swing_by_themselves(at_o
     channels |= {f"pressure_{w}_pa": 15e5 * (t > 1.0) for w in WHEELS}
     case = prepare([make_log("log", t, channels)], 0.308)
     (damping,) = [one for one in paper_car().nuisances if one.name == "wheel_brake_windup_time_s"]
-    assert damping.farthest == 3.0
+    assert damping.bound == 3.0
     monkeypatch.setattr("hil.diagnosis.simulation.simulator.at_once", lambda drive: np.full(len(drive.inputs), at_once))
     rig = Simulator(case, paper_car())
-    world = nominal(rig.vehicle).shifted([damping], np.array([damping.farthest]))
+    world = nominal(rig.vehicle).with_nuisances([damping], np.array([damping.bound]))
     assert np.abs(rig.run(world)["wheel"][-200:]).max() < 1e-4

@@ -18,7 +18,7 @@ def _paces():
     channels = {f"wheel_speed_{w}_rad_s": speed / 0.308 for w in WHEELS}
     channels |= {f"pressure_{w}_pa": 15e5 * braking for w in WHEELS}
     channels |= {f"pressure_demand_{w}_pa": 15e5 * braking for w in WHEELS}
-    (drive,) = prepare([make_log("log", t, channels)], 0.308).drives
+    (drive,) = prepare([make_log("log", t, channels)], 0.308).recordings
     return rows_per_step(drive)
 
 

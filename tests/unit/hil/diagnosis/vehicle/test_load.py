@@ -146,15 +146,15 @@ def test_the_curvature_of_a_tyre_ends_where_its_equation_does() -> None:
     """Beyond a curvature factor of 1 the plant's tyre is that of 1: no sensitivity leads a fit back from there."""
     car = load_vehicle(SIX)
     (curve,) = (one for one in car.nuisances if one.name == "tyre_curve")
-    world = nominal(car).shifted([curve], np.array([curve.highest]))
+    world = nominal(car).with_nuisances([curve], np.array([curve.upper]))
     assert float(world.p[P.tyre_lex] * world.p[P.tyre_pex1]) == pytest.approx(1.0)
-    assert curve.highest < curve.farthest
+    assert curve.upper < curve.bound
 
 
 def test_curves_that_a_set_does_not_state_go_as_far_as_a_guess() -> None:
     by_name = {one.name: one for one in load_vehicle(SIX | {"tyre_lkx": 1.1, "tyre_lkx_tolerance": 0.1}).nuisances}
-    assert by_name["tyre_lkx"].farthest == 3.0
-    assert by_name["tyre_friction_load"].farthest > 3.0
+    assert by_name["tyre_lkx"].bound == 3.0
+    assert by_name["tyre_friction_load"].bound > 3.0
 
 
 def test_how_late_a_node_may_be_is_as_stated_or_four_milliseconds() -> None:
@@ -175,7 +175,7 @@ def test_pads_lag_behind_their_sensors_by_as_much_as_is_stated_or_usual() -> Non
     car = load_vehicle(SIX)
     (line,) = (one for one in car.nuisances if one.name == "line_lag")
     assert line.step[0] == pytest.approx(4e-3)
-    lagging = nominal(car).shifted([line], np.ones(1))
+    lagging = nominal(car).with_nuisances([line], np.ones(1))
     assert lagging.theta[THETA.slice("pressure_location", "lag_s")] == pytest.approx(4e-3)
     for half, count in ((2e-3, 1), (0.0, 0)):
         told = load_vehicle(SIX | {"line_lag_s_tolerance": half})
@@ -187,8 +187,8 @@ def test_pads_lag_behind_their_sensors_by_as_much_as_is_stated_or_usual() -> Non
 @pytest.mark.parametrize("missing", [None, *SPRINGS])
 def test_the_suspension_is_stated_if_every_number_of_it_is(missing: str | None) -> None:
     told = {name: value for name, value in SPRINGS.items() if name != missing}
-    assert load_vehicle(SIX | told).sprung == (missing is None)
-    assert not load_vehicle(SIX).sprung
+    assert load_vehicle(SIX | told).suspension_stated == (missing is None)
+    assert not load_vehicle(SIX).suspension_stated
 
 
 def test_the_shipped_car_keeps_its_own_numbers() -> None:
@@ -208,13 +208,13 @@ def test_what_is_no_number_is_refused(value: object) -> None:
 
 def test_what_a_set_says_nothing_of_is_not_judged() -> None:
     car = load_vehicle(SIX)
-    assert {"ehb_dead_time", "motor_tau", "battery_soc"} <= set(car.untold)
+    assert {"ehb_dead_time", "motor_tau", "battery_soc"} <= set(car.undiagnosable_effects)
     assert car.parameters.motor.peak_torque_nm > 2000.0
     said = next(text for text in car.remarks if "nothing said of ehb, motor, battery" in text)
     assert "pressures are compared only where none" in said
     assert "torques of the motors are not compared" in said
     told = load_vehicle({**SIX, "ehb_dead_time_s": 0.02, "motor_peak_torque_nm": 400.0, "tyre_lkx": 1.0})
-    assert set(told.untold) == {"battery_soc"}
+    assert set(told.undiagnosable_effects) == {"battery_soc"}
     assert not any("compared" in text for text in told.remarks)
     motor, ehb = told.parameters.motor, told.parameters.ehb
     assert motor.peak_torque_nm == 400.0
@@ -271,9 +271,9 @@ def test_nobody_knows_to_a_mrad_where_a_wheel_points_straight_ahead(told, known)
     car = load_vehicle({**SIX, **told, "steering_ratio": 20.0})
     assert [one.step for one in car.nuisances if one.name == "zero_steering"] == ([] if known else [(5e-4,)])
     off = np.array([float(one.name == "zero_steering") for one in car.nuisances])
-    theta = nominal(car).shifted(car.nuisances, off).theta
+    theta = nominal(car).with_nuisances(car.nuisances, off).theta
     assert theta[THETA.slice("steer_lateral", "offset_rad")] == pytest.approx(0.0 if known else 5e-4)
-    assert "zero_steering" not in {one.name for one in car.held_straight().nuisances}
+    assert "zero_steering" not in {one.name for one in car.without_lateral_dynamics().nuisances}
 
 
 def _asks(torque_nm: float) -> Log:
@@ -284,11 +284,11 @@ def _asks(torque_nm: float) -> Log:
 def test_motors_of_unknown_strength_are_as_strong_as_they_are_asked() -> None:
     """A fading that begins 3 m/s early did nothing to 315 N m: motors could do 5 kN m where nobody stated what."""
     car = load_vehicle({**SIX, "motor_fade_start_mps": 3.2, "motor_fade_end_mps": 0.9})
-    told = car.asked([_asks(-315.0), _asks(120.0)])
+    told = car.with_motor_limits_from([_asks(-315.0), _asks(120.0)])
     assert told.parameters.motor.peak_torque_nm == told.p[P.motor_peak_torque_nm] == 315.0
-    assert car.asked([]) is car
+    assert car.with_motor_limits_from([]) is car
     stated = load_vehicle({**SIX, "motor_peak_torque_nm": 400.0})
-    assert stated.asked([_asks(-315.0)]) is stated
+    assert stated.with_motor_limits_from([_asks(-315.0)]) is stated
 
 
 def test_motors_are_supported_as_brakes_are_where_a_set_says_nothing_else() -> None:
@@ -296,4 +296,4 @@ def test_motors_are_supported_as_brakes_are_where_a_set_says_nothing_else() -> N
     assert load_vehicle(SIX | SPRINGS).p[at].tolist() == SPRINGS["suspension_brake_support_tangent"]
     own = load_vehicle(SIX | SPRINGS | {"suspension_drive_support_tangent": [0.05, 0.1]})
     assert own.p[at].tolist() == [0.05, 0.1]
-    assert load_vehicle(SIX | SPRINGS).sprung
+    assert load_vehicle(SIX | SPRINGS).suspension_stated
