@@ -78,6 +78,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _unusable(why: str) -> dict[str, object]:
     return {
-        "verdict": "unusable", "why": why, "causes": [], "rivals": [], "not_testable": [], "decide_with": [],
-        "wrong": [], "gain": {}, "extension": None,
+        "verdict": "unusable", "why": why, "causes": [], "rivals": [], "undetectable_effects": [], "discriminating_manoeuvres": [],
+        "residual_patterns": [], "held_out_error": {}, "extension": None,
     }  # fmt: skip

@@ -36,7 +36,7 @@ def told(found: Diagnosis, hidden: Mapping[str, Any]) -> Errors | None:
     places = {(c.effect.name, c.parameter.name, c.location): c for c in candidates(columns())}
     base = found.fitter.base
     for name, value in numbers(hidden).items():
-        candidate = places.get((hidden["effect"], name, hidden["wheel"]))
+        candidate = places.get((hidden["effect"], name, hidden["location"]))
         if candidate is None:
             return None
         base = candidate.applied(base, value)

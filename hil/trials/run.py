@@ -108,13 +108,13 @@ def _explained(case: Case, folder: Path, settings: Settings | None) -> tuple[Ans
         answered = explain(logs, logs / "vehicle.toml", out=folder / "out", settings=settings)
     except UnusableError as error:
         return None, {
-            "verdict": "unusable", "why": str(error), "named": [], "causes": [], "rivals": [], "not_testable": [],
-            "gain": {},
+            "verdict": "unusable", "why": str(error), "named": [], "causes": [], "rivals": [], "undetectable_effects": [],
+            "held_out_error": {},
         }  # fmt: skip
     assert isinstance(answered, Answer)  # the hidden car's logs tell forces
     found = answered.json
     return answered, {
         "verdict": found["verdict"], "named": [cause["effect"] for cause in found["causes"]],
         "causes": found["causes"], "rivals": [rival["effect"] for rival in found["rivals"]],
-        "not_testable": found["not_testable"], "gain": found["gain"],
+        "undetectable_effects": found["undetectable_effects"], "held_out_error": found["held_out_error"],
     }  # fmt: skip

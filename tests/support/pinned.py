@@ -1,6 +1,7 @@
 """Small cases whose answers are on record: what `explain` says of them, as plain numbers and names."""
 
 import json
+import re
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,7 +18,7 @@ from plant.effects.theta import THETA
 HERE = Path(__file__).parent.parent / "pinned"
 RECORDS = HERE / "records"
 KEYS: dict[str, str] = tomllib.loads((HERE / "keys.toml").read_text(encoding="utf-8"))
-"""Keys as recorded, and as they are called now; keys that are not listed have kept their name."""
+"""Paths as recorded (regular expressions), and as they are now; paths that match none have kept their keys."""
 WORDS = ("remarks", "missing", "title", "extension", "pattern")
 """Texts for people: not compared."""
 
@@ -78,7 +79,9 @@ def flat(content: Any, at: str = "") -> Iterator[tuple[str, str, Any]]:
 
 def renamed(path: str) -> str:
     """A recorded path by the keys of now."""
-    return "/".join(KEYS.get(key, key) for key in path.split("/"))
+    for then, now in KEYS.items():
+        path = re.sub(then, now, path)
+    return path
 
 
 def recorded(case: str) -> dict[str, Any]:

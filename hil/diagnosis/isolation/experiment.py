@@ -41,7 +41,7 @@ from plant.vectors import INPUT
 MAX_RECOMMENDATIONS = 3
 STRAIGHT_STOP = "straight_stop"
 """Of `plant.effects.manoeuvres`: what every drive is compared with."""
-FOLDER = "decide_with"
+FOLDER = "discriminating_manoeuvres"
 _LONGEST_S, _SETTLE_S = 90.0, 0.4
 _VISIBLE = 1.0
 _OF_THE_ROAD = ("road_grade.grade", "headwind.wind_mps")
@@ -110,7 +110,7 @@ def separation(scenario: str, effects: Sequence[str]) -> float:
 
 
 def write(advice: Sequence[Recommendation], folder: Path) -> list[Path]:
-    """Write the scenarios into ``folder/decide_with``, for ``brakebench run FILE``; their paths, in order."""
+    """Write the scenarios into ``folder/discriminating_manoeuvres``, for ``brakebench run FILE``; their paths, in order."""
     into = Path(folder) / FOLDER
     if advice:
         into.mkdir(parents=True, exist_ok=True)

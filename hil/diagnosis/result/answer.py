@@ -53,12 +53,12 @@ def answer(
         "verdict": verdict,
         "causes": causes,
         "rivals": rivals,
-        "not_testable": found.undetectable_effects,
-        "decide_with": _decide_with(found, tied, fitted, out) if verdict == "cannot_tell_apart" else [],
-        "wrong": [
+        "undetectable_effects": found.undetectable_effects,
+        "discriminating_manoeuvres": _decide_with(found, tied, fitted, out) if verdict == "cannot_tell_apart" else [],
+        "residual_patterns": [
             {"channel": w.channel, "rms": w.rms, "noise": w.noise, "unit": w.unit, "pattern": w.pattern} for w in wrongs
         ],
-        "gain": {
+        "held_out_error": {
             WORDS[g.channel]: {
                 "before": g.before, "after": g.after, "ci95": [g.low, g.high], "tuned": g.tuned,
                 "best_wrong": g.best_wrong,
@@ -112,8 +112,8 @@ def _causes(found: Diagnosis) -> list[dict[str, Any]]:
         entry = merged.setdefault(
             effect.name,
             {
-                "effect": effect.name, "title": effect.title, "joint": effect.joints[0] if effect.joints else "",
-                "wheel": candidate.location, "parameters": {}, "probability": own, **_onset(found, term),
+                "effect": effect.name, "title": effect.title, "injection_point": effect.joints[0] if effect.joints else "",
+                "location": candidate.location, "parameters": {}, "probability": own, **_onset(found, term),
                 "variables": [], "curve": [],
             },
         )  # fmt: skip
@@ -146,7 +146,7 @@ def _unlisted(found: Diagnosis, piece: BasisFunction, listed: list[FittedHypothe
     pieces = [term.candidate for term in terms if isinstance(term.candidate, BasisFunction)]
     error = variance_inflation_nonparametric(piece.term.name, piece.location)
     return {
-        "effect": UNLISTED, "title": piece.effect.title, "joint": piece.term.injection_point, "wheel": piece.location,
+        "effect": UNLISTED, "title": piece.effect.title, "injection_point": piece.term.injection_point, "location": piece.location,
         "parameters": {}, "probability": probabilities(listed)[0], "onset": None, "onset_s": None,
         "variables": [piece.variable], "adds": piece.term.adds,
         "curve": estimate_curve(pieces, [terms[k].value for k in own], error * covariance[np.ix_(own, own)]),
@@ -170,8 +170,8 @@ def _rival(found: Diagnosis, contender: FittedHypothesis, chance: float) -> dict
     candidate, value = contender.term.candidate, contender.term.value
     half = half_width(candidate, value, max(contender.information, 1e-30) ** -0.5)
     return {
-        "effect": candidate.effect.name, "title": candidate.effect.title, "wheel": candidate.location,
-        "joint": candidate.effect.joints[0] if candidate.effect.joints else "",
+        "effect": candidate.effect.name, "title": candidate.effect.title, "location": candidate.location,
+        "injection_point": candidate.effect.joints[0] if candidate.effect.joints else "",
         "parameters": {
             candidate.parameter.name: {
                 "value": value, "unit": candidate.parameter.unit, "ci95": [value - half, value + half],

@@ -129,6 +129,3 @@ def probabilities(contenders: Sequence[FittedHypothesis], tempering: float = 1.5
     logs -= logs.max()
     weights = np.exp(logs)
     return [float(v) for v in weights / weights.sum()]
-
-
-__all__ = ["Gain", "best_wrong", "gains", "held_out", "probabilities"]

@@ -213,7 +213,7 @@ def _laws(answer: Answer) -> list[Section]:
         (variable,) = cause["variables"]
         unit = _VARIABLES.get(variable, "")
         curve = Curve("found", x, y, low, high, group="fl")
-        added = JOINTS[cause["joint"]][1] if cause["adds"] else ""
+        added = JOINTS[cause["injection_point"]][1] if cause["adds"] else ""
         label = f"added to {cause['joint']}" if cause["adds"] else f"change of {cause['joint']}, share"
         chart = Chart(f"{cause['title']}, {cause['wheel']}", variable.replace("_", " "), unit, label, added, (curve,))
         sections.append(Section("A cause in no list", charts=(chart,), text="The band is its 95 % interval."))
@@ -312,9 +312,14 @@ def _gain_charts(answer: Answer) -> tuple[Chart, ...]:
 
 def _limits(answer: Answer) -> Section:
     content = answer.json
-    rows = [("not testable with these manoeuvres", ", ".join(content["not_testable"]) or "-")]
+    rows = [("not testable with these manoeuvres", ", ".join(content["undetectable_effects"]) or "-")]
     rows += [("missing channel", text) for text in content["missing"]]
     rows += [("remark", text) for text in content["remarks"]]
-    if content["decide_with"]:
-        rows.append(("drive this instead", ", ".join(Path(one["scenario"]).stem for one in content["decide_with"])))
+    if content["discriminating_manoeuvres"]:
+        rows.append(
+            (
+                "drive this instead",
+                ", ".join(Path(one["scenario"]).stem for one in content["discriminating_manoeuvres"]),
+            )
+        )
     return Section("What these data cannot show", tables=(Table("Limits", ("what", "which"), tuple(rows)),))

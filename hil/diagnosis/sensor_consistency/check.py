@@ -96,13 +96,13 @@ def check(
         "verdict": "cannot_tell_apart" if tied else "named" if causes else "none",
         "causes": listed,
         "rivals": rivals,
-        "not_testable": sorted(told),
-        "decide_with": _decide_with(causes),
-        "wrong": [
+        "undetectable_effects": sorted(told),
+        "discriminating_manoeuvres": _decide_with(causes),
+        "residual_patterns": [
             {"channel": m.channel, "rms": m.before, "noise": m.after, "unit": m.unit, "pattern": m.pattern}
             for m in missed
         ],
-        "gain": {
+        "held_out_error": {
             m.channel: {
                 "before": m.before, "after": m.held_out, "ci95": [m.low, m.high], "tuned": m.tuned,
                 "best_wrong": m.best_wrong,

@@ -100,7 +100,7 @@ class Cause:
         parameter = {"value": name.factor * self.value, "unit": effect.parameter(name.parameter).unit}
         probability = (self._share if share is None else share) * self.log_density[at] / sum(self.log_density)
         return {
-            "effect": name.effect, "title": effect.title, "joint": joint, "wheel": name.location,
+            "effect": name.effect, "title": effect.title, "injection_point": joint, "location": name.location,
             "parameters": {name.parameter: parameter | {"ci95": [low, high]}},
             "probability": probability, "onset": None, "onset_s": None, "variables": [], "curve": [],
             "channels": list(self.channels),

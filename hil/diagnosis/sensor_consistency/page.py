@@ -173,7 +173,7 @@ def _numbers_section(answer: Consistency) -> Section:
             w["channel"], w["unit"], _short(w["rms"]), _short(g["after"]), f"{g['ci95'][0]:.3g} to {g['ci95'][1]:.3g}",
             None if g["best_wrong"] is None else _short(g["best_wrong"]), w["pattern"],
         )
-        for w, g in zip(answer.json["wrong"], answer.json["gain"].values(), strict=True)
+        for w, g in zip(answer.json["residual_patterns"], answer.json["held_out_error"].values(), strict=True)
     )  # fmt: skip
     heads = ("channel", "unit", "handed in", "extended, held out", "95 %", "best wrong effect", "the error handed in")
     tables.append(Table("Error (root mean square) on manoeuvres that no fit saw", heads, gains))
@@ -279,6 +279,8 @@ def _limits(answer: Consistency) -> Section:
     rows = [(f"not testable: {text}", ", ".join(names)) for text, names in grouped.items()]
     rows += [("missing channel", text) for text in content["missing"]]
     rows += [("remark", text) for text in content["remarks"]]
-    if content["decide_with"]:
-        rows.append(("drive this to decide", ", ".join(one["scenario"] for one in content["decide_with"])))
+    if content["discriminating_manoeuvres"]:
+        rows.append(
+            ("drive this to decide", ", ".join(one["scenario"] for one in content["discriminating_manoeuvres"]))
+        )
     return Section("What these data cannot show", tables=(Table("Limits", ("what", "which"), tuple(rows)),))

@@ -19,7 +19,7 @@ def test_nothing_is_found_in_nothing() -> None:
     answer = explain(logs(THETA.neutral(), 5))
     assert answer.json["verdict"] == "none"
     assert answer.json["causes"] == []
-    assert json.loads(json.dumps(answer.json))["gain"]["wheel_speed"]["after"] > 0.0
+    assert json.loads(json.dumps(answer.json))["held_out_error"]["wheel_speed"]["after"] > 0.0
 
 
 @pytest.mark.slow
@@ -29,7 +29,7 @@ def test_a_hidden_drag_is_named_extended_and_then_nothing_is_left(tmp_path: Path
     dragging = logs(theta, 6)
     found = explain(dragging, out=tmp_path).json
     assert found["causes"][0]["effect"] == "residual_drag"
-    assert found["causes"][0]["wheel"] == "rl"
+    assert found["causes"][0]["location"] == "rl"
     assert found["causes"][0]["parameters"]["torque_nm"]["value"] == pytest.approx(30.0, rel=0.3)
     taught = load_extension(tmp_path / "extension.toml")
     assert taught.theta[THETA.slice("residual_drag", "torque_nm")][2] == pytest.approx(30.0, rel=0.3)
@@ -44,7 +44,7 @@ def test_a_drag_that_begins_in_the_middle_is_named_with_its_time() -> None:
     beginning[THETA.slice("residual_drag", "onset_s")] = 5.0
     drives = [log(theta, 8, k) for k, theta in enumerate((THETA.neutral(), beginning, dragging))]
     (cause,) = explain(drives).json["causes"]
-    assert (cause["effect"], cause["wheel"]) == ("residual_drag", "rl")
+    assert (cause["effect"], cause["location"]) == ("residual_drag", "rl")
     assert cause["onset"]["log"].endswith("1")
     assert cause["onset"]["t_s"] == pytest.approx(5.0, abs=0.1)
     assert cause["onset_s"] == pytest.approx(14.0 + 5.0, abs=0.1)

@@ -25,5 +25,5 @@ def test_a_number_keeps_its_value() -> None:
 
 
 def test_spots_half_a_turn_on_are_the_same_spots() -> None:
-    hidden = {"effect": "hot_spot", "wheel": "rear", "parameters": {"amplitude": {"value": -0.002, "unit": ""}}}
+    hidden = {"effect": "hot_spot", "location": "rear", "parameters": {"amplitude": {"value": -0.002, "unit": ""}}}
     assert numbers(hidden) == {"amplitude": 0.002}

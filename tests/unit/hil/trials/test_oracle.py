@@ -23,5 +23,5 @@ def test_the_truth_beats_the_tuned_car_and_half_the_truth(tmp_path) -> None:
     assert set(truth) == set(tuned)
     assert truth["wheel_speed"] < 0.7 * tuned["wheel_speed"]
     assert truth["wheel_speed"] < half["wheel_speed"] < tuned["wheel_speed"]
-    judder = {"effect": "dtv_judder", "wheel": "fl", "parameters": {"amplitude": {"value": 0.05}}}
+    judder = {"effect": "dtv_judder", "location": "fl", "parameters": {"amplitude": {"value": 0.05}}}
     assert told(answered.diagnosis, judder) is None
