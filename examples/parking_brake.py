@@ -10,7 +10,7 @@ is compiled alone when a run first needs it; nothing of brakebench is compiled a
 """
 
 from plant.effects.effect import Effect, Parameter, Scope, slots
-from plant.effects.joints import J
+from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
 

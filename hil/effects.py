@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from hil.errors import BrakebenchError
-from plant.effects.apply import SIZE
-from plant.effects.bank import NO_TERMS, Shape, Variable, term
 from plant.effects.effect import NODES, Effect, Scope
-from plant.effects.joints import J
-from plant.effects.places import JOINTS
-from plant.effects.places import field as place
-from plant.effects.plugin import NO_PLUGINS, table
-from plant.effects.theta import THETA, Theta
+from plant.inject import J
+from plant.injection.apply import SIZE
+from plant.injection.bank import NO_TERMS, Shape, Variable, term
+from plant.injection.plugin import NO_PLUGINS, table
+from plant.injection.theta import THETA, Theta
+from plant.injection_points import JOINTS
+from plant.injection_points import field as place
 from plant.layout import Vector
 from plant.vectors import INPUT, OUTPUT, STATE
 
@@ -161,7 +161,7 @@ def _refuse_unseen(gain: float, where: str) -> None:
 def read_laws(laws: Any, where: str) -> Vector:
     """Rows of the basis bank out of a list of tables: hats of one variable at a joint.
 
-    Each has ``joint``, ``variable`` (of `plant.effects.bank.Variable`, lower case), ``centre``, ``width``, ``value``,
+    Each has ``joint``, ``variable`` (of `plant.injection.bank.Variable`, lower case), ``centre``, ``width``, ``value``,
     ``adds`` (to the joint, else a share of it) and, at joints of the wheels, ``at``, the wheels.
 
     Raises
@@ -187,7 +187,7 @@ def read_laws(laws: Any, where: str) -> Vector:
 
 
 def written_laws(terms: Vector) -> list[dict[str, Any]]:
-    """Tables that `read_laws` makes the same rows of; for hats at joints of `plant.effects.places`.
+    """Tables that `read_laws` makes the same rows of; for hats at joints of `plant.injection_points`.
 
     Raises
     ------

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from typing import Any
 
 from plant.effects.effect import Effect
-from plant.effects.manoeuvres import MANOEUVRES
-from plant.effects.places import JOINTS
+from plant.injection_points import JOINTS
+from plant.open_loop_manoeuvres import MANOEUVRES
 
 NOT_HERE = {
     67: ("jitter", "random latency of frames: `late` of a scenario's `[[frame_faults]]`"),

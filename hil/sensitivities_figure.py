@@ -11,7 +11,7 @@ from hil.effects_page import PARTS
 from hil.report.palette import INK, NEUTRAL
 from hil.sensitivities import SHOWN, Signature
 from plant.effects.catalogue import BUILT_IN
-from plant.effects.signals import CHANNELS, NAMES
+from plant.signals import CHANNELS, NAMES
 
 LEAST, MOST = 0.1, 100.0  # sigma; smaller is left white, larger saturates
 GROUPS = {

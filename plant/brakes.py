@@ -1,15 +1,16 @@
+"""Friction brakes of all wheels: demand -> pressure -> clamping force -> torque, pad and disc."""
+
 # mypy: disable-error-code=no-any-return
 # (elements of a vector are Any to the type checker)
-"""Friction brakes of all wheels: demand -> pressure -> clamping force -> torque, pad and disc."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from plant.brake_thermal import disc_temperature_rate
 from plant.compiled import equation
-from plant.effects.joints import J, at_wheel
 from plant.friction import mu_rate, temperature_rate
 from plant.hydraulics import pad_force, pressure_jerk, sliding_torque, windup_held
+from plant.inject import J, at_wheel
 from plant.vectors import C, P, U, X, Y
 
 Vector = NDArray[np.float64]

@@ -1,6 +1,7 @@
+"""Contact of the tyres with the road: loads, relaxed slips, forces, down to standstill."""
+
 # mypy: disable-error-code=no-any-return
 # (elements of a vector are Any to the type checker)
-"""Contact of the tyres with the road: loads, relaxed slips, forces, down to standstill."""
 
 from math import pi
 
@@ -9,8 +10,8 @@ from numpy.typing import NDArray
 
 from plant.brakes import per_axle
 from plant.compiled import equation
-from plant.effects.joints import J, at_wheel
 from plant.fastmath import atan, sin
+from plant.inject import J, at_wheel
 from plant.suspension import link_force, spring_force
 from plant.tyre import (
     combined_at,

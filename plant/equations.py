@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from plant.brakes import brakes
 from plant.compiled import block, equation
 from plant.contact import contacts, static_load
-from plant.effects.apply import after, before
-from plant.effects.joints import J, at_car, at_wheel
+from plant.inject import J, at_car, at_wheel
+from plant.injection.apply import after, before
 from plant.motors import motors
 from plant.road import segment_at
 from plant.vectors import CUT_PARTS, P, U, X, Y
@@ -146,7 +146,7 @@ def derivative(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, roa
     ----------
     x : state (``STATE``).  u : inputs (``INPUT``), pressure demand already delayed.
     cut : ``CUT``, above 0.5 where a measured value in ``u`` replaces the simulated one.  switch : ``SWITCH``.
-    p : as of `plant.effects.apply.Q`.  road : rows of `plant.road.road_table`.  y : ``OUTPUT``, written.
+    p : as of `plant.injection.apply.Q`.  road : rows of `plant.road.road_table`.  y : ``OUTPUT``, written.
     """
     wheels = cut.size // CUT_PARTS  # 4, but unknown to the compiler: it puts four wheels in one register
     before(x, u, cut, p, y)

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from plant.compiled import equation, section
 from plant.contact import rolling_radius
-from plant.effects.apply import extra_states_move
 from plant.equations import derivative
 from plant.fastmath import exp
+from plant.injection.apply import extra_states_move
 from plant.phi import GONE, SMALL, phi_1, phi_2
 from plant.vectors import BASE_RATES, OUTPUT, RATES, STATE, P, X, Y
 

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.compiled import entry, section
-from plant.effects import apply
-from plant.effects.bank import NO_TERMS
-from plant.effects.plugin import NO_PLUGINS
-from plant.effects.theta import THETA
 from plant.equations import derivative, sensed
 from plant.friction import mu_equilibrium
+from plant.injection import apply
+from plant.injection.bank import NO_TERMS
+from plant.injection.plugin import NO_PLUGINS
+from plant.injection.theta import THETA
 from plant.integrate import (
     EXPONENTIAL,
     SEMI_IMPLICIT,
@@ -124,8 +124,8 @@ def simulate(
     method : `plant.integrate.SEMI_IMPLICIT`, `RUNGE_KUTTA_4` or `EXPONENTIAL`.
     columns : what to note at the start of each row, as indices into the state followed by the outputs.
     table : the notes, shape (rows, columns), written.  y : outputs (``OUTPUT``) at the end, written.
-    theta : numbers of all effects (`plant.effects.theta`); onsets act from row to row.
-    terms, plugins : tables of `plant.effects.bank` and `plant.effects.plugin`, a row each.
+    theta : numbers of all effects (`plant.injection.theta`); onsets act from row to row.
+    terms, plugins : tables of `plant.injection.bank` and `plant.injection.plugin`, a row each.
     """
     work = np.empty(WORK_SHAPE)
     now = np.empty(inputs.shape[1])

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from plant.battery import charge_limit
 from plant.compiled import equation
-from plant.effects.joints import J, at_wheel
+from plant.inject import J, at_wheel
 from plant.motor import derating, fade_out, torque_limit, torque_rate, winding_rate
 from plant.vectors import C, P, S, U, X, Y
 

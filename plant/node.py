@@ -9,15 +9,15 @@ from dbc.frame import Frame, Received
 from dbc.messages import BatteryStatus
 from plant import driver, reports
 from plant.demands import DEMANDS, Demands
-from plant.effects.bank import NO_TERMS
-from plant.effects.plugin import NO_PLUGINS
-from plant.effects.sensing.chain import Chain
-from plant.effects.theta import THETA, Theta
+from plant.external_nodes import Partners
+from plant.injection.bank import NO_TERMS
+from plant.injection.plugin import NO_PLUGINS
+from plant.injection.sensing_chain import Chain
+from plant.injection.theta import THETA, Theta
 from plant.layout import Vector
 from plant.manoeuvre import Manoeuvre, value_at
 from plant.model import NEUTRAL, STEP_S, advance, healthy, initial_state, pack
 from plant.parameters.plant import PlantParameters
-from plant.partners import Partners
 from plant.road import road_table
 from plant.sensors import Sensors
 from plant.vectors import INPUT, OUTPUT, STATE, S, U, X, Y

@@ -1,6 +1,7 @@
+"""Long steps of a car that rolls: exact in each state's own decay, and in what swings in pairs."""
+
 # mypy: disable-error-code=no-any-return
 # (elements of a vector are Any to the type checker)
-"""Long steps of a car that rolls: exact in each state's own decay, and in what swings in pairs."""
 
 from math import pi
 
@@ -10,10 +11,10 @@ from numpy.typing import NDArray
 from plant.brakes import per_axle
 from plant.compiled import EFFECTS, equation, section
 from plant.contact import rolling_radius
-from plant.effects.apply import extra_states_move
 from plant.equations import derivative
 from plant.fastmath import exp
 from plant.hydraulics import pressure_jerk
+from plant.injection.apply import extra_states_move
 from plant.integrate import N_ALL, N, hold_pressure_rates
 from plant.phi import GONE, phi_1, phi_2, phi_of_pair
 from plant.vectors import CUT_PARTS, P, U, X, Y

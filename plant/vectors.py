@@ -5,8 +5,8 @@ negative. Compiled code reads ``x[X.speed_mps]``; Python reads ``x[STATE.slice("
 """
 
 from plant.compiled import EFFECTS
-from plant.effects.places import FIELDS
-from plant.effects.states import EXTRA_STATES
+from plant.extra_states import EXTRA_STATES
+from plant.injection_points import FIELDS
 from plant.layout import Layout, dataclass_sizes
 from plant.parameters.plant import PlantParameters
 

@@ -14,7 +14,7 @@ from matplotlib.patches import Rectangle
 from hil.effects_page import PARTS
 from hil.report.palette import INK, NEUTRAL, SEVERITY_COLOURS
 from hil.trials.metrics import Record
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 NONE = "none"
 _ROWS = {effect.name: effect.row for effect in THETA.effects}

@@ -74,13 +74,13 @@ class Effect:
     joints : where it acts.  parameters, scope : its numbers and what has values of its own.
     source : where equation and sizes are from.  signature : what it leaves in the residuals.
     confounded_with : what looks alike in some manoeuvres.  twins : what looks alike in every manoeuvre of this model.
-    manoeuvre : which of `plant.effects.manoeuvres` shows it.
+    manoeuvre : which of `plant.open_loop_manoeuvres` shows it.
     dissipates : whether it may only take energy out of the motion.
     states : extra states it uses.
     static : ``(q, k, y)``, from its numbers alone.  dynamic : ``(x, u, q, k, y)``, from the state.
     rates : ``(x, u, q, k, y)``, of its extra states.  Its numbers begin at ``k`` in ``q``; parameters are changed in
         ``q``, joints in ``y``.
-    sense : of a sensing effect, which acts on measured arrays and not in the model (`plant.effects.sensing.chain`).
+    sense : of a sensing effect, which acts on measured arrays and not in the model (`plant.injection.sensing_chain`).
     undo : its inverse on arrays, where it has one.
     nodes : of `NODES`, or `GROUND`, whose signals a sensing effect changes.
     """

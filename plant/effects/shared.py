@@ -1,6 +1,7 @@
+"""Quantities that several effects look at."""
+
 # mypy: disable-error-code=no-any-return
 # (elements of a vector are Any to the type checker)
-"""Quantities that several effects look at."""
 
 from plant.compiled import equation
 from plant.layout import Vector

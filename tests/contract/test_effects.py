@@ -14,14 +14,14 @@ from scipy.optimize import least_squares
 
 from hil.parameters import load_set
 from plant.effects.catalogue import BUILT_IN
-from plant.effects.manoeuvres import MANOEUVRES, drive
-from plant.effects.places import JOINTS
-from plant.effects.signals import noise, simulate
-from plant.effects.states import EXTRA_STATES
-from plant.effects.theta import THETA
+from plant.extra_states import EXTRA_STATES
+from plant.injection.theta import THETA
+from plant.injection_points import JOINTS
 from plant.integrate import RUNGE_KUTTA_4, SEMI_IMPLICIT
 from plant.model import NEUTRAL, replay
+from plant.open_loop_manoeuvres import MANOEUVRES, drive
 from plant.parameters import PlantParameters
+from plant.signals import noise, simulate
 from plant.vectors import BASE_RATES, OUTPUTS, PARAMETER
 
 NAMES = [effect.name for effect in BUILT_IN]

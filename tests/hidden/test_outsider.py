@@ -12,7 +12,7 @@ from hil.study.explain import explain
 from hil.study.logs.table import make_log
 from hil.study.search.diagnosis import Settings
 from hil.study.verdict.extension import load_extension
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 
 def _plain(speed_mps: float, pressure_pa: np.ndarray) -> np.ndarray:

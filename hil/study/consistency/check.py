@@ -20,7 +20,7 @@ from hil.study.consistency.turning import Turning
 from hil.study.consistency.wheels import SPREAD, Wheels
 from hil.study.logs.table import MOTOR_DEMAND, MOTOR_TORQUE, PRESSURE, PRESSURE_DEMAND, WHEEL_SPEED, WHEELS, Floats, Log
 from hil.study.replay.vehicle import Vehicle
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 _ROLL = 0.15  # the body rolls, and its accelerometer with it (effects, 56)
 _DIVE = 0.02  # its nose goes down by 1 to 1.5 deg/g, and the accelerometer with it (effects, 8)

@@ -8,7 +8,7 @@ from hil.study.consistency.names import Cause
 from hil.study.consistency.search import Found
 from hil.study.logs.table import UnusableError
 from plant.effects.effect import Scope
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 MODELS = ("along", "turning", "wheels", "braking")
 

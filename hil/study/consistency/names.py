@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.study.consistency.search import RARE, Found
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 GRAVITY_MPS2 = 9.80665
 TIED = 4.6

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from hil.study.logs.table import Floats
 from hil.study.replay.world import World
 from plant.effects.effect import NODES, Effect, Parameter, Scope
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 _SHARE = 0.05
 _SHARES = {

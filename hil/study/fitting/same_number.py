@@ -15,8 +15,8 @@ from hil.study.fitting.fit import Model, Term
 from hil.study.logs.table import Floats
 from hil.study.replay.nuisances import Nuisance
 from hil.study.replay.world import World
-from plant.effects.apply import Q
-from plant.effects.theta import THETA
+from plant.injection.apply import Q
+from plant.injection.theta import THETA
 from plant.vectors import OUTPUT, PARAMETER
 
 _STAMPS = "timestamp_offset"

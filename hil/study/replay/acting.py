@@ -13,9 +13,9 @@ from hil.study.logs.prepare import STRAIGHT_RAD
 from hil.study.logs.table import Floats
 from hil.study.replay.sensing import WATCHING
 from plant.effects.effect import NODES
-from plant.effects.joints import J
-from plant.effects.places import JOINTS, field
-from plant.effects.theta import THETA
+from plant.inject import J
+from plant.injection.theta import THETA
+from plant.injection_points import JOINTS, field
 from plant.vectors import INPUT, PARAMETER
 
 

@@ -24,9 +24,9 @@ from hil.study.replay.turning import QUARTER_RAD, angles, parts, standing, turns
 from hil.study.replay.vehicle import Vehicle
 from hil.study.replay.world import World, apart, told_alike
 from hil.study.side_by_side import side_by_side
-from plant.effects.plugin import NO_PLUGINS
-from plant.effects.states import EXTRA_STATES
-from plant.effects.theta import THETA
+from plant.extra_states import EXTRA_STATES
+from plant.injection.plugin import NO_PLUGINS
+from plant.injection.theta import THETA
 from plant.integrate import EXPONENTIAL
 from plant.model import column_indices, healthy, simulate
 from plant.road import DRY, road_table

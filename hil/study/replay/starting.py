@@ -7,8 +7,8 @@ from hil.study.logs.table import Floats
 from hil.study.replay.sensing import ground_speed_before, wheel_speed_before
 from hil.study.replay.vehicle import Vehicle
 from hil.study.replay.world import World
-from plant.effects.theta import THETA
 from plant.friction import mu_equilibrium
+from plant.injection.theta import THETA
 from plant.model import initial_state
 from plant.vectors import DELAY_SLOTS, INPUT, STATE, P, X
 

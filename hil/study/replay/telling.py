@@ -13,7 +13,7 @@ from hil.study.logs.table import Floats
 from hil.study.replay.latency import later
 from hil.study.replay.sensing import sensed
 from hil.study.replay.world import World
-from plant.effects.sensing.chain import Chain
+from plant.injection.sensing_chain import Chain
 from plant.parameters.plant import PlantParameters
 from plant.vectors import INPUT
 

@@ -8,8 +8,8 @@ import numpy as np
 from hil.study.logs.case import ROW_S, Drive
 from hil.study.logs.table import Floats
 from hil.study.replay.world import World
-from plant.effects.hot_spot import ORDER
-from plant.effects.theta import THETA
+from plant.effects.pads.hot_spot import ORDER
+from plant.injection.theta import THETA
 from plant.vectors import INPUT
 
 _SPEEDS = INPUT.slice("wheel_speed_rad_s")

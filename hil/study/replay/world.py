@@ -13,9 +13,9 @@ from hil.study.replay.nuisances import HALF_WIDTH_TO_SIGMA, Nuisance, factor_of
 from hil.study.replay.sensing import SENSORS
 from hil.study.replay.vehicle import Vehicle
 from hil.study.replay.vehicle_keys import LATENCY_S
-from plant.effects.bank import NO_TERMS
 from plant.effects.effect import NODES
-from plant.effects.theta import THETA
+from plant.injection.bank import NO_TERMS
+from plant.injection.theta import THETA
 
 _OF_THE_ROAD = (("road_grade", "grade"), ("headwind", "wind_mps"))
 LATE = ("imu", "pressure", "motor", "demand", "steering", "yaw_rate")
@@ -44,7 +44,7 @@ class Begun:
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """One car: flat parameters, theta, basis terms (rows as in `plant.effects.bank`), discs at the start, latencies.
+    """One car: flat parameters, theta, basis terms (rows as in `plant.injection.bank`), discs at the start, latencies.
 
     ``onsets`` are effects that begin in the middle.
     ``tooth_share`` multiplies the lag of a toothed wheel, half the time between two teeth: the speed is told when a

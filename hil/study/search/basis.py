@@ -1,7 +1,7 @@
 """Causes nobody listed: curves of one variable at a joint, in the same race as the listed effects.
 
 A law is ``c_1 f_1(v) + ... + c_5 f_5(v)`` with hats over the range that the logs cover, multiplied or added at a joint
-of the plant (`plant.effects.bank`). Listed effects alone would take a wrong name for what is in no list.
+of the plant (`plant.injection.bank`). Listed effects alone would take a wrong name for what is in no list.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,9 +14,9 @@ from hil.study.fitting.own_error import UNLISTED
 from hil.study.logs.table import Floats
 from hil.study.replay.rig import Rig
 from hil.study.replay.world import World
-from plant.effects.bank import Shape, Variable, term
 from plant.effects.effect import Effect, Parameter, Scope
-from plant.effects.places import JOINTS
+from plant.injection.bank import Shape, Variable, term
+from plant.injection_points import JOINTS
 
 PIECES = 5
 _WHEELS = Scope.WHEEL.members

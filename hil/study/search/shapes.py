@@ -22,7 +22,7 @@ from hil.study.search.basis import Piece
 from hil.study.search.contest import Contender, Contest, refitted
 from hil.study.search.intervals import DEVIATION_BY_FORM
 from plant.effects.effect import Parameter
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 _OFFERED = 9
 """Values of a shape that are looked at by one step, evenly between its bounds, in proportion where these are far

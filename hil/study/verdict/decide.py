@@ -32,15 +32,15 @@ from hil.study.replay.vehicle_set import paper_car
 from hil.study.replay.world import World, nominal
 from hil.study.verdict.tied import APART, remaining, summed
 from plant.effects.effect import GROUND, Scope
-from plant.effects.manoeuvres import MANOEUVRES, ROW_S, Drive, Show, drive
-from plant.effects.signals import NAMES, noise, simulate
 from plant.model import pack
 from plant.node import PlantNode
+from plant.open_loop_manoeuvres import MANOEUVRES, ROW_S, Drive, Show, drive
+from plant.signals import NAMES, noise, simulate
 from plant.vectors import INPUT
 
 MOST = 3
 STRAIGHT_STOP = "straight_stop"
-"""Of `plant.effects.manoeuvres`: what every drive is compared with."""
+"""Of `plant.open_loop_manoeuvres`: what every drive is compared with."""
 FOLDER = "decide_with"
 _LONGEST_S, _SETTLE_S = 90.0, 0.4
 _VISIBLE = 1.0

@@ -14,7 +14,7 @@ from hil.study.search.diagnosis import TIED
 from hil.study.verdict.answer import Answer
 from hil.study.verdict.measure import Gain, probabilities
 from hil.study.verdict.patterns import UNITS, WORDS
-from plant.effects.places import JOINTS
+from plant.injection_points import JOINTS
 
 _SENTENCE = {
     "none": "Nothing beyond noise and the stated tolerances.",

@@ -11,7 +11,7 @@ from hil.scenario import load_scenario
 from hil.sensitivities import alike, recorded, signatures
 from hil.virtual import simulate
 from plant.effects.catalogue import BUILT_IN
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 ROOT = Path(__file__).parents[3]
 WHERE = "a.toml: effects"

@@ -10,7 +10,7 @@ from hil.study.explain import explain
 from hil.study.logs.table import UnusableError
 from hil.study.replay.vehicle_set import paper_car
 from hil.study.verdict.extension import load_extension
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 from plant.model import initial_state, pack, replay
 from plant.vectors import INPUT
 

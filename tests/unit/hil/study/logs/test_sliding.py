@@ -7,7 +7,7 @@ from hil.study.logs.case import Segment
 from hil.study.logs.prepare import prepare
 from hil.study.logs.sliding import since_sliding
 from hil.study.logs.table import Floats, make_log
-from plant.effects.signals import WHEELS
+from plant.signals import WHEELS
 
 RADIUS_M = 0.3
 T = np.arange(0.0, 12.0, 0.01)

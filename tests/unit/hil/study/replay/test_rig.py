@@ -13,7 +13,7 @@ from hil.study.replay.steps import STEPS
 from hil.study.replay.vehicle_set import load_vehicle, paper_car
 from hil.study.replay.world import LATE, World, nominal
 from plant.effects.effect import NODES
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 from plant.model import initial_state, pack, replay
 from plant.vectors import INPUT, P
 

@@ -22,9 +22,9 @@ from hil.study.replay.turning import (
 )
 from hil.study.replay.vehicle_set import paper_car
 from hil.study.replay.world import World, nominal
-from plant.effects.hot_spot import ORDER
-from plant.effects.signals import WHEELS
-from plant.effects.theta import THETA
+from plant.effects.pads.hot_spot import ORDER
+from plant.injection.theta import THETA
+from plant.signals import WHEELS
 
 AMPLITUDE = 0.1
 RADIUS_M, BRAKES_S = 0.308, 2.0

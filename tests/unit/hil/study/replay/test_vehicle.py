@@ -8,7 +8,7 @@ from hil.study.replay.nuisances import HALF_WIDTH_TO_SIGMA
 from hil.study.replay.vehicle import Vehicle, rest_friction
 from hil.study.replay.vehicle_set import load_vehicle, paper_car
 from hil.study.replay.world import nominal, start_nuisances
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 from plant.vectors import PARAMETER, P
 
 SIX = {

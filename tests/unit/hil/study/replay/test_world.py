@@ -10,7 +10,7 @@ from hil.study.logs.table import make_log
 from hil.study.replay.vehicle_keys import LATENCY_S
 from hil.study.replay.vehicle_set import load_vehicle, paper_car
 from hil.study.replay.world import ZEROS, nominal, start_nuisances
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 SIX = {
     "mass_kg": 1650.0, "wheelbase_m": 2.72, "cog_to_front_axle_m": 1.3, "rolling_radius_m": 0.318,

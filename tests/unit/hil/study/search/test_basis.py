@@ -13,7 +13,7 @@ from hil.study.replay.vehicle_set import paper_car
 from hil.study.replay.world import nominal
 from hil.study.search.basis import LAWS, PIECES, Curve, curve_of, places, shown
 from hil.study.verdict.extended import extended_scenario
-from plant.effects.bank import term
+from plant.injection.bank import term
 
 LAW_TOML = """
 [[laws]]

@@ -7,7 +7,7 @@ import pytest
 from hil.scenario import load_scenario
 from hil.study.logs.table import UnusableError
 from hil.study.verdict.extended import extended_scenario
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 EXTENSION = """
 [effects.imu_bias]
