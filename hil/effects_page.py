@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from plant.effects.effect import Effect
-from plant.injection_points import JOINTS
+from plant.injection_points import INJECTION_POINTS
 from plant.open_loop_manoeuvres import MANOEUVRES
 
 NOT_HERE = {
@@ -30,7 +30,7 @@ def described(effect: Effect) -> dict[str, Any]:
         "row": effect.row,
         "title": effect.title,
         "equation": effect.equation,
-        "joints": list(effect.joints),
+        "injection_points": list(effect.injection_points),
         "scope": effect.scope.value,
         "members": list(effect.scope.members),
         "parameters": [
@@ -69,7 +69,7 @@ def text(effect: dict[str, Any]) -> str:
     lines = [
         f"{effect['name']} (row {effect['row']}): {effect['title']}",
         f"  equation    {effect['equation']}",
-        f"  joints      {', '.join(effect['joints'])}",
+        f"  injected at {', '.join(effect['injection_points'])}",
         f"  scope       {effect['scope']} ({', '.join(effect['members'])})",
         *[f"  parameter   {_number(p).replace('`', '')}" for p in effect["parameters"]],
         f"  source      {effect['source']}",
@@ -110,9 +110,13 @@ def page(effects: Iterable[Effect]) -> str:
         for effect in sorted(known, key=lambda effect: effect["row"]):
             if effect["row"] in rows:
                 lines += _section(effect)
-    lines += ["", "## Joints", "", "| joint | unit | what |", "|---|---|---|"]
-    lines += [f"| `{name}` | {unit} | {what} |" for name, (_, unit, what) in JOINTS.items()]
-    lines += ["", "Every number of the parameter set is a joint too, by its own name (`vehicle_mass_kg`).", ""]
+    lines += ["", "## Injection points", "", "| injection point | unit | what |", "|---|---|---|"]
+    lines += [f"| `{name}` | {unit} | {what} |" for name, (_, unit, what) in INJECTION_POINTS.items()]
+    lines += [
+        "",
+        "Every number of the parameter set is an injection point too, by its own name (`vehicle_mass_kg`).",
+        "",
+    ]
     lines += ["## Manoeuvres", "", "| name | what |", "|---|---|"]
     lines += [f"| `{name}` | {show.what} |" for name, show in MANOEUVRES.items()]
     return "\n".join(lines) + "\n"
@@ -123,8 +127,8 @@ def _section(effect: dict[str, Any]) -> list[str]:
         "",
         f"### {effect['row']}. `{effect['name']}`",
         "",
-        f"{effect['title']}. `{effect['equation']}` at {', '.join(f'`{j}`' for j in effect['joints'])}; one for each "
-        f"{effect['scope']}.",
+        f"{effect['title']}. `{effect['equation']}` at {', '.join(f'`{p}`' for p in effect['injection_points'])}; "
+        f"one for each {effect['scope']}.",
         "",
         *[f"- {_number(p)}" for p in effect["parameters"]],
         f"- shows as: {effect['signature']}; in `{effect['manoeuvre']}`",

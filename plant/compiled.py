@@ -61,7 +61,7 @@ def equation(function: F) -> F:
     return _equation(function, forceinline=True)
 
 
-def joint(function: F) -> F:
+def unfused(function: F) -> F:
     """As `equation`, but no product of the function is fused with what stands before or behind it."""
     return _equation(function, forceinline=True, fastmath=False)
 

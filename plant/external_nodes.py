@@ -1,4 +1,4 @@
-"""Real nodes beside the plant: where it does not play a node, that node's frames enter at the joint it belongs to."""
+"""Real nodes beside the plant: the frames of a node that it does not play enter at that node's cut point."""
 
 from collections.abc import Sequence
 
@@ -17,7 +17,7 @@ FRAMES_OF: dict[str, tuple[type[Message], ...]] = {
 }
 
 
-class Partners:
+class ExternalNodes:
     """What the nodes say that the plant does not play.
 
     Measured pressures and motor currents replace the simulated ones; the last pressure holds when its frames stop (a

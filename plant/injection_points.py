@@ -1,10 +1,10 @@
-"""Joints: named places of the model where ``value' = value * factor + addend``.
+"""Injection points: named places of the model where ``value' = value * factor + addend``.
 
-Each has one place in the equations. Every number of the parameter set is a joint too, by its own name, where factor and
-addend are applied to the number itself.
+Each has one place in the equations. Every number of the parameter set is an injection point too, by its own name, where
+factor and addend are applied to the number itself.
 """
 
-JOINTS: dict[str, tuple[int, str, str]] = {  # name: (size, unit, what)
+INJECTION_POINTS: dict[str, tuple[int, str, str]] = {  # name: (size, unit, what)
     "road.grade": (1, "", "rise over run under the car"),
     "road.friction": (4, "", "friction scale of the road under a wheel"),
     "air.speed": (1, "m/s", "speed of the car against the air"),
@@ -34,9 +34,9 @@ JOINTS: dict[str, tuple[int, str, str]] = {  # name: (size, unit, what)
 }
 
 
-def field(joint: str) -> str:
-    """Name of a joint in `plant.inject.J`: dots become underscores."""
-    return joint.replace(".", "_")
+def field(point: str) -> str:
+    """Name of an injection point in `plant.inject.J`: dots become underscores."""
+    return point.replace(".", "_")
 
 
-FIELDS = {field(name): 2 * size for name, (size, _, _) in JOINTS.items()}
+FIELDS = {field(name): 2 * size for name, (size, _, _) in INJECTION_POINTS.items()}

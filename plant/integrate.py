@@ -10,7 +10,7 @@ from plant.contact import rolling_radius
 from plant.equations import derivative
 from plant.fastmath import exp
 from plant.injection.apply import extra_states_move
-from plant.phi import GONE, SMALL, phi_1, phi_2
+from plant.phi import EXPONENT_LIMIT, SMALL, phi_1, phi_2
 from plant.vectors import BASE_RATES, OUTPUT, RATES, STATE, P, X, Y
 
 Vector = NDArray[np.float64]
@@ -80,7 +80,7 @@ def exponential_step(
     derivative(x, u, cut, switch, p, road, y)
     for i in range(last):
         z = 0.5 * step_s * y[Y.decay_1_s + i]
-        half[i] = exp(-min(z, GONE))
+        half[i] = exp(-min(z, EXPONENT_LIMIT))
         mean[i] = 0.5 * step_s * phi_1(z, half[i])
         trial[i] = x[i] + mean[i] * y[Y.rate + i]
     derivative(trial, u, cut, switch, p, road, stage)

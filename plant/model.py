@@ -25,7 +25,7 @@ from plant.integrate import (
 from plant.layout import flatten
 from plant.parameters.plant import PlantParameters
 from plant.road import DRY, road_table
-from plant.rolling import CREEPING_S, rolling_step, rolls_on
+from plant.rolling import CREEPING_S, long_step_valid, rolling_step
 from plant.vectors import CUT, DELAY_SLOTS, INPUT, OUTPUT, PARAMETER, STATE, SWITCH, P, U, X
 
 Vector = NDArray[np.float64]
@@ -161,7 +161,7 @@ def simulate(
             if method == SEMI_IMPLICIT:
                 semi_implicit_step(x, now, cut, switch, q, road, long_s, y)
             elif method == EXPONENTIAL:
-                if rolls_on(x, now, q, long_s):
+                if long_step_valid(x, now, q, long_s):
                     rolling_step(x, now, cut, switch, q, road, long_s, work, y)
                 else:
                     parts = 2 if long_s > CREEPING_S else 1

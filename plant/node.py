@@ -9,7 +9,7 @@ from dbc.frame import Frame, Received
 from dbc.messages import BatteryStatus
 from plant import driver, reports
 from plant.demands import DEMANDS, Demands
-from plant.external_nodes import Partners
+from plant.external_nodes import ExternalNodes
 from plant.injection.bank import NO_TERMS
 from plant.injection.plugin import NO_PLUGINS
 from plant.injection.sensing_chain import Chain
@@ -79,8 +79,8 @@ class PlantNode:
             manoeuvre.initial_pad_friction,
         )
         self._start = self._x.copy()
-        self._partners = Partners(play, parameters.motor.torque_constant_nm_a)
-        self._u, self._y, self._cut, self._switch = INPUT.zeros(), OUTPUT.zeros(), self._partners.cut(), healthy()
+        self._external_nodes = ExternalNodes(play, parameters.motor.torque_constant_nm_a)
+        self._u, self._y, self._cut, self._switch = INPUT.zeros(), OUTPUT.zeros(), self._external_nodes.cut(), healthy()
         self._own_road = self._road = road_table(manoeuvre.road)
         first_speed = manoeuvre.initial_speed_mps / parameters.wheel.rolling_radius_m
         self._sensors = Sensors(parameters.sensor, parameters.motor.torque_constant_nm_a, seed, self._x, first_speed)
@@ -107,7 +107,7 @@ class PlantNode:
         self._last_ns = now_ns
         self._advance(elapsed_ns)
         self._receiver.accept(now_ns, inbox)
-        self._partners.accept(now_ns, inbox)
+        self._external_nodes.accept(now_ns, inbox)
         self._take_faults(now_ns, inbox)
         if now_ns >= self._notice_ends_ns:
             self._switch[S.battery_accepts] = self._switch[S.battery_announces]
@@ -202,7 +202,7 @@ class PlantNode:
             pedal = pedal if live.pedal_travel is None else live.pedal_travel
             target = target if live.target_speed_mps is None else live.target_speed_mps
             steering = steering if live.steering_wheel_angle_rad is None else live.steering_wheel_angle_rad
-        theirs = self._partners.pedal_travel(), self._partners.steering_wheel_rad()
+        theirs = self._external_nodes.pedal_travel(), self._external_nodes.steering_wheel_rad()
         self._pedal = pedal if theirs[0] is None else theirs[0]
         self._steering_rad = steering if theirs[1] is None else theirs[1]
         self._override_road(now_ns)
@@ -216,7 +216,7 @@ class PlantNode:
             motor = [value_at(t, time_s) if t else v for t, v in zip(direct.motor_nm, motor, strict=True)]
         u[U.pressure_demand_pa : U.pressure_demand_pa + 4] = pressure
         u[U.motor_demand_nm : U.motor_demand_nm + 4] = motor
-        self._partners.enter(now_ns, u)
+        self._external_nodes.enter(now_ns, u)
 
     def _hold_torque_nm(self, target_mps: float | None) -> float:
         if target_mps is None or self._pedal > driver.PEDAL_FREE:

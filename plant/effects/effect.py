@@ -71,7 +71,8 @@ class Effect:
     ----------
     name : field name, also in scenarios and reports.  row : of the effect catalogue.
     title : one line for people.  equation : in words of mathematics.
-    joints : where it acts.  parameters, scope : its numbers and what has values of its own.
+    injection_points : where it acts (`plant.injection_points`).
+    parameters, scope : its numbers and what has values of its own.
     source : where equation and sizes are from.  signature : what it leaves in the residuals.
     confounded_with : what looks alike in some manoeuvres.  twins : what looks alike in every manoeuvre of this model.
     manoeuvre : which of `plant.open_loop_manoeuvres` shows it.
@@ -79,7 +80,7 @@ class Effect:
     states : extra states it uses.
     static : ``(q, k, y)``, from its numbers alone.  dynamic : ``(x, u, q, k, y)``, from the state.
     rates : ``(x, u, q, k, y)``, of its extra states.  Its numbers begin at ``k`` in ``q``; parameters are changed in
-        ``q``, joints in ``y``.
+        ``q``, injection points in ``y``.
     sense : of a sensing effect, which acts on measured arrays and not in the model (`plant.injection.sensing_chain`).
     undo : its inverse on arrays, where it has one.
     nodes : of `NODES`, or `GROUND`, whose signals a sensing effect changes.
@@ -89,7 +90,7 @@ class Effect:
     row: int
     title: str
     equation: str
-    joints: tuple[str, ...]
+    injection_points: tuple[str, ...]
     scope: Scope
     parameters: tuple[Parameter, ...]
     source: str

@@ -1,7 +1,8 @@
 """From parameters and theta to what the equations read; the effects' equations in their order.
 
-The vector ``q``: parameters as the equations read them, parameters and joints without what the state decides, theta at
-the time, which effects are on, the basis terms, the effects from outside. The joints lie in ``y``, behind the outputs.
+The vector ``q``: parameters as the equations read them, parameters and injection points without what the state decides,
+theta at the time, which effects are on, the basis terms, the effects from outside. The injection points lie in ``y``,
+behind the outputs.
 """
 
 # mypy: disable-error-code=no-any-return
@@ -14,7 +15,7 @@ import numpy as np
 
 from plant.compiled import EFFECTS, block, equation, section
 from plant.effects.catalogue import BUILT_IN
-from plant.inject import COUNT, FIRST, neutral_joints
+from plant.inject import COUNT, FIRST, neutral_injection
 from plant.injection import bank, plugin
 from plant.injection.theta import ALWAYS_S, THETA
 from plant.layout import Layout, Vector
@@ -27,11 +28,11 @@ Q = Layout(
     {
         "live": PARAMETER.size,
         "static": PARAMETER.size,
-        "joints": COUNT,
+        "injection_points": COUNT,
         "theta": THETA.size,
         "on": len(ON_OFF),
         "anything": 1,  # whether any effect is on at any time
-        "turned": 1,  # whether the rest of a call is as this row is
+        "settled": 1,  # whether the rest of a call is as this row is
         "dynamic": 1,  # whether the state decides anything
         "rates": 1,  # whether extra states move
         "terms": 1,
@@ -40,7 +41,7 @@ Q = Layout(
         "plugin_rows": plugin.MOST_PLUGINS * plugin.COLUMNS,
     },
 )
-_NEUTRAL = neutral_joints()
+_NEUTRAL = neutral_injection()
 _AT = Q.at
 _PARAMETERS, _THETA = PARAMETER.size, THETA.size
 _NUMBERS = THETA.strengths
@@ -150,7 +151,7 @@ _static, _dynamic, _rates = _stage("static"), _stage("dynamic"), _stage("rates")
 
 @section
 def _load(p: Vector, theta: Vector, terms: Vector, plugins: Vector, q: Vector, y: Vector, stage: Vector) -> None:
-    """Fill ``q`` for a call: parameters, neutral joints, which effects are on at any time.
+    """Fill ``q`` for a call: parameters, neutral injection points, which effects are on at any time.
 
     ``y`` and ``stage`` are the vectors of outputs that the call will use.
     """
@@ -158,7 +159,7 @@ def _load(p: Vector, theta: Vector, terms: Vector, plugins: Vector, q: Vector, y
         q[k] = p[k]
         q[_AT.static + k] = p[k]
     for k in range(COUNT):
-        q[_AT.joints + k] = _NEUTRAL[k]
+        q[_AT.injection_points + k] = _NEUTRAL[k]
         y[FIRST + k] = _NEUTRAL[k]
         stage[FIRST + k] = _NEUTRAL[k]
     anything = False
@@ -169,7 +170,7 @@ def _load(p: Vector, theta: Vector, terms: Vector, plugins: Vector, q: Vector, y
     bank.load(terms, q, _AT.terms, _AT.term_rows)
     plugin.load(plugins, q, _AT.plugins, _AT.plugin_rows)
     q[_AT.anything] = 1.0 if anything else 0.0
-    q[_AT.turned] = 0.0
+    q[_AT.settled] = 0.0
     q[_AT.dynamic] = 1.0 if terms.shape[0] + plugins.shape[0] > 0 else 0.0
     q[_AT.rates] = 1.0 if bank.moves(terms) or plugins.shape[0] > 0 else 0.0
     for k in range(len(ON_OFF)):
@@ -188,7 +189,7 @@ def _load(p: Vector, theta: Vector, terms: Vector, plugins: Vector, q: Vector, y
 
 
 @block
-def turn(
+def update_row(
     x: Vector, u: Vector, p: Vector, theta: Vector, begin_s: float, end_s: float, q: Vector, y: Vector, stage: Vector
 ) -> None:
     """Bring ``q`` to a row of inputs: theta within its times, then what theta alone decides.
@@ -209,12 +210,12 @@ def turn(
         q[k] = p[k]
     for k in range(COUNT):
         y[FIRST + k] = _NEUTRAL[k]
-    q[_AT.turned] = 0.0 if later else 1.0
+    q[_AT.settled] = 0.0 if later else 1.0
     _static(x, u, q, y)
     for k in range(_PARAMETERS):
         q[_AT.static + k] = q[k]
     for k in range(COUNT):
-        q[_AT.joints + k] = y[FIRST + k]
+        q[_AT.injection_points + k] = y[FIRST + k]
         stage[FIRST + k] = y[FIRST + k]
 
 
@@ -223,7 +224,7 @@ def _decide(x: Vector, u: Vector, cut: Vector, q: Vector, y: Vector) -> None:
     for k in range(_PARAMETERS):
         q[k] = q[_AT.static + k]
     for k in range(COUNT):
-        y[FIRST + k] = q[_AT.joints + k]
+        y[FIRST + k] = q[_AT.injection_points + k]
     for i in range(4):
         y[Y.pressure_pa + i] = u[U.pressure_pa + i] if cut[C.pressure + i] > 0.5 else x[X.pressure_pa + i]
     _dynamic(x, u, q, y)
@@ -246,7 +247,7 @@ def _move(x: Vector, u: Vector, q: Vector, y: Vector) -> None:
 
 @section
 def _before(x: Vector, u: Vector, cut: Vector, q: Vector, y: Vector) -> None:
-    """What the state decides at the joints."""
+    """What the state decides at the injection points."""
     if q[_AT.dynamic] > 0.5:
         _decide(x, u, cut, q, y)
 
@@ -269,8 +270,8 @@ def _row(
     x: Vector, u: Vector, p: Vector, theta: Vector, begin_s: float, end_s: float, q: Vector, y: Vector, stage: Vector
 ) -> None:
     """Bring ``q`` to a row of inputs, where an effect may change it."""
-    if q[_AT.anything] > 0.5 and q[_AT.turned] < 0.5:
-        turn(x, u, p, theta, begin_s, end_s, q, y, stage)
+    if q[_AT.anything] > 0.5 and q[_AT.settled] < 0.5:
+        update_row(x, u, p, theta, begin_s, end_s, q, y, stage)
 
 
 @section

@@ -1,7 +1,8 @@
-"""The generic bank: basis functions of one or two variables, multiplied or added at any joint.
+"""The generic bank: basis functions of one or two variables, multiplied or added at any injection point.
 
-The place for terms that nobody has listed. A term adds ``c_i f(v) g(w)`` to the factor or the addend of its joint, with
-a coefficient for each wheel; `term` makes its row, and a table of rows goes beside theta. Nothing is recompiled.
+The place for terms that nobody has listed. A term adds ``c_i f(v) g(w)`` to the factor or the addend of its injection
+point, with a coefficient for each wheel; `term` makes its row, and a table of rows goes beside theta. Nothing is
+recompiled.
 """
 
 # mypy: disable-error-code=no-any-return
@@ -16,7 +17,7 @@ import numpy as np
 from plant.compiled import equation
 from plant.effects.shared import applied_rates, brake_gain_nm_pa
 from plant.inject import J
-from plant.injection_points import JOINTS, field
+from plant.injection_points import INJECTION_POINTS, field
 from plant.layout import Vector
 from plant.vectors import PARAMETER, X, Y
 
@@ -25,7 +26,7 @@ COLUMNS = 15
 
 
 class Variable(IntEnum):
-    """What a term can depend on; SI units, of the wheel where it has one (the front left for the car's own joints)."""
+    """What a term can depend on; in SI units; of the wheel, at points of the whole car of the front left one."""
 
     ONE = 0
     SPEED = 1  # of the car
@@ -161,7 +162,7 @@ def moves(terms: Vector) -> bool:
 
 @equation
 def apply(x: Vector, u: Vector, q: Vector, y: Vector, count: int, rows: int) -> None:
-    """Bring every term to its joint."""
+    """Bring every term to its injection point."""
     for k in range(int(q[count])):
         row = rows + k * COLUMNS
         target, size, adds = int(q[row]), int(q[row + 1]), q[row + 2] > 0.5
@@ -184,13 +185,13 @@ def rates(x: Vector, q: Vector, y: Vector, count: int) -> None:
         applied_rates(x, y)
 
 
-def joint_names() -> list[str]:
-    """Every joint: the named places of the model, then each number of the parameter set."""
-    return [*JOINTS, *PARAMETER.sizes]
+def injection_point_names() -> list[str]:
+    """Every injection point: the named places of the model, then each number of the parameter set."""
+    return [*INJECTION_POINTS, *PARAMETER.sizes]
 
 
 def term(
-    joint: str,
+    injection_point: str,
     coefficient: float | Sequence[float],
     first: tuple[Variable, Shape, float, float],
     second: tuple[Variable, Shape, float, float] = (Variable.ONE, Shape.CONSTANT, 0.0, 1.0),
@@ -201,24 +202,25 @@ def term(
 
     Parameters
     ----------
-    joint : of `joint_names`.
-    coefficient : one for all members of the joint, or one each.
+    injection_point : of `injection_point_names`.
+    coefficient : one for all members of the point, or one each.
     first, second : variable, shape, centre and width; the term is their product.
-    add : True for the addend (in the joint's unit), False for the factor (a share).
+    add : True for the addend (in the point's unit), False for the factor (a share).
     """
-    if joint in JOINTS:
-        size = JOINTS[joint][0]
-        target = int(getattr(J, field(joint))) + (size if add else 0)
-    elif joint in PARAMETER.sizes:
-        size, target = PARAMETER.sizes[joint], -1 - PARAMETER.slice(joint).start  # negative: in q, not in y
+    if injection_point in INJECTION_POINTS:
+        size = INJECTION_POINTS[injection_point][0]
+        target = int(getattr(J, field(injection_point))) + (size if add else 0)
+    elif injection_point in PARAMETER.sizes:
+        size = PARAMETER.sizes[injection_point]
+        target = -1 - PARAMETER.slice(injection_point).start  # negative: in q, not in y
     else:
-        raise ValueError(f"no joint {joint!r}; known: {', '.join(joint_names())}")
+        raise ValueError(f"no injection point {injection_point!r}; known: {', '.join(injection_point_names())}")
     numbers = [float(coefficient)] * size if isinstance(coefficient, int | float) else [float(c) for c in coefficient]
     if len(numbers) != size:
-        raise ValueError(f"{joint}: expected {size} coefficients, got {len(numbers)}")
+        raise ValueError(f"{injection_point}: expected {size} coefficients, got {len(numbers)}")
     for _, _, _, width in (first, second):
         if not width > 0.0:
-            raise ValueError(f"{joint}: width of a basis function must be above 0, got {width!r}")
+            raise ValueError(f"{injection_point}: width of a basis function must be above 0, got {width!r}")
     return np.array([target, size, float(add), *numbers, *[0.0] * (4 - size), *map(float, first), *map(float, second)])
 
 

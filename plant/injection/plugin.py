@@ -59,7 +59,7 @@ def load(plugins: Vector, q: Vector, count: int, rows: int) -> None:
 
 @equation
 def call(x: Vector, u: Vector, q: Vector, y: Vector, count: int, rows: int, theta: int, stage: int) -> None:
-    """Call every effect from outside; ``stage`` 0 its equation at the joints, 1 the rates of its states."""
+    """Call every effect from outside; ``stage`` 0 its equation at the injection points, 1 the rates of its states."""
     for k in range(int(q[count])):
         row = rows + k * COLUMNS
         address = int(q[row + stage])

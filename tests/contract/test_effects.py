@@ -16,7 +16,7 @@ from hil.parameters import load_set
 from plant.effects.catalogue import BUILT_IN
 from plant.extra_states import EXTRA_STATES
 from plant.injection.theta import THETA
-from plant.injection_points import JOINTS
+from plant.injection_points import INJECTION_POINTS
 from plant.integrate import RUNGE_KUTTA_4, SEMI_IMPLICIT
 from plant.model import NEUTRAL, replay
 from plant.open_loop_manoeuvres import MANOEUVRES, drive
@@ -116,10 +116,10 @@ def found(name, plan, data, sigma, *, noisy=False):
 def test_catalogue_is_complete_and_consistent():
     rows = [effect.row for effect in BUILT_IN]
     assert sorted(rows) == sorted({*range(1, 72), 76} - {67, 68})  # jitter and lost frames are the port's
-    joints = {*JOINTS, *PARAMETER.sizes}
+    points = {*INJECTION_POINTS, *PARAMETER.sizes}
     for effect in BUILT_IN:
         assert effect.manoeuvre in MANOEUVRES, effect.name
-        assert effect.sensing or set(effect.joints) <= joints, effect.name
+        assert effect.sensing or set(effect.injection_points) <= points, effect.name
         assert set(effect.states) <= set(EXTRA_STATES), effect.name
         assert {*effect.twins} <= {*NAMES}, effect.name
         assert all(effect.name in THETA.effect(twin).twins for twin in effect.twins), effect.name

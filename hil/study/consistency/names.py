@@ -90,7 +90,7 @@ class Cause:
         """As a cause (its first name), or a rival; ``share`` as `_share` if None."""
         name = self.names[at]
         effect = THETA.effect(name.effect)
-        joint = next((j for j in effect.joints if j == f"sensor.{name.wheel}"), effect.joints[0])
+        joint = next((j for j in effect.injection_points if j == f"sensor.{name.wheel}"), effect.injection_points[0])
         low, high = sorted((name.factor * self.low, name.factor * self.high))
         parameter = {"value": name.factor * self.value, "unit": effect.parameter(name.parameter).unit}
         probability = (self._share if share is None else share) * self.odds[at] / sum(self.odds)

@@ -132,7 +132,7 @@ def candidates(
     found = []
     for effect in dict.fromkeys(column.effect for column in of):
         groups = PLACES[effect.scope]
-        if effect.scope is Scope.WHEEL and all(joint.startswith(_MOTOR) for joint in effect.joints):
+        if effect.scope is Scope.WHEEL and all(joint.startswith(_MOTOR) for joint in effect.injection_points):
             groups = {place: members for place, members in groups.items() if not {*members} & {*undriven}}
         if effect.scope is Scope.NODE:
             groups = {node: members for node, members in groups.items() if node not in quiet}

@@ -15,7 +15,7 @@ from hil.study.replay.sensing import WATCHING
 from plant.effects.effect import NODES
 from plant.inject import J
 from plant.injection.theta import THETA
-from plant.injection_points import JOINTS, field
+from plant.injection_points import INJECTION_POINTS, field
 from plant.vectors import INPUT, PARAMETER
 
 
@@ -64,7 +64,7 @@ def _of_number(name: str) -> Acting:
 
 
 def _of_joint(joint: str) -> Acting:
-    return _AT_JOINT.get(joint, Acting.DRIVING) if joint in JOINTS else _of_number(joint)
+    return _AT_JOINT.get(joint, Acting.DRIVING) if joint in INJECTION_POINTS else _of_number(joint)
 
 
 def _of_parameters() -> NDArray[np.int64]:
@@ -77,7 +77,7 @@ def _of_parameters() -> NDArray[np.int64]:
 def _of_theta() -> NDArray[np.int64]:
     found = np.full(THETA.size, int(Acting.DRIVING), np.int64)
     for effect in THETA.effects:
-        joints = [_of_joint(joint) for joint in effect.joints]
+        joints = [_of_joint(joint) for joint in effect.injection_points]
         for parameter in effect.strengths:
             where = THETA.slice(effect.name, parameter.name)
             if effect.name not in _ALWAYS and Acting.DRIVING not in joints:

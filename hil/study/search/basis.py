@@ -16,7 +16,7 @@ from hil.study.replay.rig import Rig
 from hil.study.replay.world import World
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.injection.bank import Shape, Variable, term
-from plant.injection_points import JOINTS
+from plant.injection_points import INJECTION_POINTS
 
 PIECES = 5
 _WHEELS = Scope.WHEEL.members
@@ -56,7 +56,7 @@ class Law:
     @property
     def scope(self) -> Scope:
         """Whether each wheel has its own."""
-        return Scope.WHEEL if JOINTS[self.joint][0] == 4 else Scope.CAR
+        return Scope.WHEEL if INJECTION_POINTS[self.joint][0] == 4 else Scope.CAR
 
 
 LAWS = (
@@ -146,12 +146,12 @@ def places(curve: Curve) -> Iterator[Curve]:
 def curve_of(law: Law, low: float, high: float) -> Curve:
     """A law at all members, its hats evenly over a range of its variable."""
     centres = np.linspace(low, high, PIECES)
-    unit = JOINTS[law.joint][1] if law.adds else ""
+    unit = INJECTION_POINTS[law.joint][1] if law.adds else ""
     bound = 20.0 * law.usual if law.adds else 0.9
     numbers = tuple(Parameter(f"c{k + 1}", unit, -bound, bound, law.usual) for k in range(PIECES))
     effect = Effect(
         name=UNLISTED, row=0, title=f"{law.joint} depends on {_CALLED[law.variable]} in a way that no list has",
-        equation="sum c_k hat((v - v_k) / w)", joints=(law.joint,), scope=law.scope, parameters=numbers,
+        equation="sum c_k hat((v - v_k) / w)", injection_points=(law.joint,), scope=law.scope, parameters=numbers,
         source="measured data", signature="", manoeuvre="",
     )  # fmt: skip
     width = float(centres[1] - centres[0])

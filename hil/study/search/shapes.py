@@ -71,7 +71,7 @@ def of_another_shape(contest: Contest, fitter: Fitter, listed: Sequence[Candidat
         Shaped(one.effect, one.parameter, one.place, one.columns, one.places, shape, at, sprung=one.sprung)
         for one in listed
         for shape in one.effect.parameters
-        if shape.shape and piece.law.joint in one.effect.joints and one.place == piece.place
+        if shape.shape and piece.law.joint in one.effect.injection_points and one.place == piece.place
         for at in _values(shape)
     ]
     if not offered:

@@ -110,7 +110,8 @@ def _causes(found: Diagnosis) -> list[dict[str, Any]]:
         entry = merged.setdefault(
             effect.name,
             {
-                "effect": effect.name, "title": effect.title, "joint": effect.joints[0] if effect.joints else "",
+                "effect": effect.name, "title": effect.title,
+                "joint": effect.injection_points[0] if effect.injection_points else "",
                 "wheel": candidate.place, "parameters": {}, "probability": own, **_onset(found, term),
                 "variables": [], "curve": [],
             },
@@ -169,7 +170,7 @@ def _rival(found: Diagnosis, contender: Contender, chance: float) -> dict[str, A
     half = half_width(candidate, value, max(contender.information, 1e-30) ** -0.5)
     return {
         "effect": candidate.effect.name, "title": candidate.effect.title, "wheel": candidate.place,
-        "joint": candidate.effect.joints[0] if candidate.effect.joints else "",
+        "joint": candidate.effect.injection_points[0] if candidate.effect.injection_points else "",
         "parameters": {
             candidate.parameter.name: {
                 "value": value, "unit": candidate.parameter.unit, "ci95": [value - half, value + half],

@@ -14,7 +14,7 @@ from hil.study.search.diagnosis import TIED
 from hil.study.verdict.answer import Answer
 from hil.study.verdict.measure import Gain, probabilities
 from hil.study.verdict.patterns import UNITS, WORDS
-from plant.injection_points import JOINTS
+from plant.injection_points import INJECTION_POINTS
 
 _SENTENCE = {
     "none": "Nothing beyond noise and the stated tolerances.",
@@ -213,7 +213,7 @@ def _laws(answer: Answer) -> list[Section]:
         (variable,) = cause["variables"]
         unit = _VARIABLES.get(variable, "")
         curve = Curve("found", x, y, low, high, group="fl")
-        added = JOINTS[cause["joint"]][1] if cause["adds"] else ""
+        added = INJECTION_POINTS[cause["joint"]][1] if cause["adds"] else ""
         label = f"added to {cause['joint']}" if cause["adds"] else f"change of {cause['joint']}, share"
         chart = Chart(f"{cause['title']}, {cause['wheel']}", variable.replace("_", " "), unit, label, added, (curve,))
         sections.append(Section("A cause in no list", charts=(chart,), text="The band is its 95 % interval."))

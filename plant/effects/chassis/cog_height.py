@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=7,
     title="Height of the centre of gravity off",
     equation="h' = h + dh",
-    joints=("vehicle_cog_height_m",),
+    injection_points=("vehicle_cog_height_m",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="S: 5 to 10 % of the load transfer; roof loads more",

@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=2,
     title="Mass off by passengers and luggage",
     equation="m' = m + dm",
-    joints=("vehicle_mass_kg",),
+    injection_points=("vehicle_mass_kg",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 75 to 350 kg, 5 to 25 % of the mass",

@@ -21,7 +21,7 @@ EFFECT = Effect(
     row=8,
     title="Softer springs: more dive and a lower pitch frequency",
     equation="c' = c / (1+e)",
-    joints=("suspension_ride_rate_n_m",),
+    injection_points=("suspension_ride_rate_n_m",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: Reimpell; 1 to 1.5 deg/g, 1.3 to 1.6 Hz",

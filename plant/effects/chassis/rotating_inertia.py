@@ -21,7 +21,7 @@ EFFECT = Effect(
     row=3,
     title="Rotating inertia of a wheel off",
     equation="I' = I + dI",
-    joints=("wheel_inertia_kg_m2",),
+    injection_points=("wheel_inertia_kg_m2",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="D: 4 to 6 % of the mass for four wheels with rotors",

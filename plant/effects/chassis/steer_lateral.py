@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=10,
     title="Front wheels do not point where the steering wheel says",
     equation="delta' = delta + e",
-    joints=("steering.angle",),
+    injection_points=("steering.angle",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: alignment and steering compliance, 0.1 to 1 deg at the wheel",

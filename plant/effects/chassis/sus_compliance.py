@@ -44,7 +44,7 @@ EFFECT = Effect(
     row=9,
     title="Fore-aft compliance of the hubs",
     equation="d'' = w^2 (c F - d) - 2 zeta w d', the contact moves with d'",
-    joints=("contact.speed",),
+    injection_points=("contact.speed",),
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: 12 to 20 Hz, 1 to 2 mm under braking",

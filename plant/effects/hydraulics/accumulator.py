@@ -36,7 +36,7 @@ EFFECT = Effect(
     row=45,
     title="Accumulator runs empty",
     equation="p*' = p* (1 - d s), s' = sum(p'+)/P - s/20 s, P = 8 applications of 4 x 30 bar",
-    joints=("hydraulics.demand",),
+    injection_points=("hydraulics.demand",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: -10 to -30 % after eight applications",

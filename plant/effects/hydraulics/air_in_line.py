@@ -27,7 +27,7 @@ EFFECT = Effect(
     row=32,
     title="Air in the brake line",
     equation="p' = c/(c + V p0/(p+p0)^2) times the rate, c = 0.5 cm3/MPa",
-    joints=("hydraulics.rate",),
+    injection_points=("hydraulics.rate",),
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: 1 to 3 cm3",

@@ -35,7 +35,7 @@ EFFECT = Effect(
     row=53,
     title="Friction comes late when regeneration goes out",
     equation="p*' = p* - (T - T_lag) / gain, T_lag follows T with tau",
-    joints=("hydraulics.demand",),
+    injection_points=("hydraulics.demand",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: dips of 0.1 to 0.3 m/s2 for 100 to 300 ms",

@@ -24,7 +24,7 @@ EFFECT = Effect(
     row=42,
     title="Bandwidth and damping of the pressure control off",
     equation="f' = f (1+e), zeta' = zeta (1+d)",
-    joints=("ehb_natural_frequency_hz", "ehb_damping_ratio"),
+    injection_points=("ehb_natural_frequency_hz", "ehb_damping_ratio"),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 4 to 10 Hz, 0.7 to 1",

@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=41,
     title="Dead time of the pressure control off",
     equation="t_d' = t_d + e",
-    joints=("ehb_dead_time_s",),
+    injection_points=("ehb_dead_time_s",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 10 to 40 ms",

@@ -24,7 +24,7 @@ EFFECT = Effect(
     row=44,
     title="Pressure control does not answer small errors",
     equation="p* = p + dead zone of (p* - p)",
-    joints=("hydraulics.demand",),
+    injection_points=("hydraulics.demand",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 0.3 to 1 bar",

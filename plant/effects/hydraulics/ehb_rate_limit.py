@@ -21,7 +21,7 @@ EFFECT = Effect(
     row=43,
     title="Rate limits of the pressure control off",
     equation="r' = r (1+e)",
-    joints=("ehb_build_rate_pa_s", "ehb_release_rate_pa_s"),
+    injection_points=("ehb_build_rate_pa_s", "ehb_release_rate_pa_s"),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 180 to 400 bar/s",

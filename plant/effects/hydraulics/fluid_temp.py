@@ -23,7 +23,7 @@ EFFECT = Effect(
     row=33,
     title="Cold, viscous brake fluid",
     equation="f' = f/(1+e), rates' = rates/(1+e)^2",
-    joints=("ehb_natural_frequency_hz", "ehb_build_rate_pa_s", "ehb_release_rate_pa_s"),
+    injection_points=("ehb_natural_frequency_hz", "ehb_build_rate_pa_s", "ehb_release_rate_pa_s"),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: two to four times slower at -20 degC",

@@ -32,7 +32,7 @@ EFFECT = Effect(
     row=63,
     title="Pressure is measured before the line",
     equation="p_caliper' = (p - p_caliper) / tau",
-    joints=("brake.pressure",),
+    injection_points=("brake.pressure",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 5 to 20 ms, some bar in transients",

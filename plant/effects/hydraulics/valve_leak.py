@@ -22,7 +22,7 @@ EFFECT = Effect(
     row=46,
     title="A valve leaks",
     equation="p' = rate - k p",
-    joints=("hydraulics.rate",),
+    injection_points=("hydraulics.rate",),
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source=("M: 1 to 5 bar/min at a closed valve; C: larger here, because the closed pressure loop makes good for it"),

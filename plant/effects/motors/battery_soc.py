@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=50,
     title="Battery accepts more or less",
     equation="P' = P (1+e)",
-    joints=("battery_charge_power_w",),
+    injection_points=("battery_charge_power_w",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 60 to 100 kW; none above 90 to 95 % charge, less in the cold",

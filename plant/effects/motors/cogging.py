@@ -26,7 +26,7 @@ EFFECT = Effect(
     row=51,
     title="Cogging torque",
     equation="T' = T + T_c sin(28 th)",
-    joints=("motor.torque",),
+    injection_points=("motor.torque",),
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: 0.5 to 2 % of the peak, orders 28 to 84",

@@ -23,7 +23,7 @@ EFFECT = Effect(
     row=71,
     title="Torque per current falls with the temperature",
     equation="T' = T (1 - k (T_w - 293 K))",
-    joints=("motor.torque",),
+    injection_points=("motor.torque",),
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: magnets lose 0.1 %/K, 8 % at 80 K",

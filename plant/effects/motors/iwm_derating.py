@@ -27,7 +27,7 @@ EFFECT = Effect(
     row=48,
     title="Motor derates early",
     equation="able' = able (1 - d sat((T_w - T_s)/40 K))",
-    joints=("motor.available",),
+    injection_points=("motor.available",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: -20 to -50 %, time constant 60 s",

@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=49,
     title="Power of the motors off",
     equation="P' = P (1+e)",
-    joints=("motor_peak_power_w",),
+    injection_points=("motor_peak_power_w",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source=(

@@ -25,7 +25,7 @@ EFFECT = Effect(
     row=47,
     title="A motor gives more or less than it is told, or than its current tells",
     equation="T*' = (1+e) T*, T' = (1+e_u) T",
-    joints=("motor.demand", "motor.torque"),
+    injection_points=("motor.demand", "motor.torque"),
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: +-3 to 5 %",

@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=54,
     title="Motors answer later",
     equation="tau' = tau + e",
-    joints=("motor_time_constant_s",),
+    injection_points=("motor_time_constant_s",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 8 ms of the torque loop and 10 ms of CAN",

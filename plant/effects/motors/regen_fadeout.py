@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=52,
     title="Regeneration fades out at another speed",
     equation="v_1' = v_1 + e",
-    joints=("motor_fade_start_mps",),
+    injection_points=("motor_fade_start_mps",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: between 3 and 10 km/h",

@@ -34,7 +34,7 @@ EFFECT = Effect(
     row=34,
     title="New pads bed in",
     equation="mu' = mu (1 - d exp(-E/E0))",
-    joints=("friction.mu",),
+    injection_points=("friction.mu",),
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: -15 to +15 % over 20 to 50 stops",

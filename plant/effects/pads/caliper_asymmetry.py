@@ -24,7 +24,7 @@ EFFECT = Effect(
     row=40,
     title="Caliper grips unlike forward and backward",
     equation="mu' = mu (1 + e sign(omega))",
-    joints=("friction.mu",),
+    injection_points=("friction.mu",),
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: +-2 %, of the leading end of the pad",

@@ -30,7 +30,7 @@ EFFECT = Effect(
     row=37,
     title="Judder of an uneven disc",
     equation="T' = T (1 + a sin th + b cos th + c sin 2 th)",
-    joints=("brake.torque",),
+    injection_points=("brake.torque",),
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: thickness off by 10 to 20 um gives 3 to 10 %; S: cold judder has orders 1 and 2",

@@ -29,7 +29,7 @@ EFFECT = Effect(
     row=35,
     title="Friction drifts with wear, glazing, taper",
     equation="mu' = mu (1 - d E), at least 0.3 mu",
-    joints=("friction.mu",),
+    injection_points=("friction.mu",),
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: 5 to 10 % over weeks; here over the work of the brake in one log",

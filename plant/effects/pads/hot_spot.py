@@ -29,7 +29,7 @@ EFFECT = Effect(
     row=38,
     title="Judder of hot spots",
     equation="T' = T (1 + a sat((T-523 K)/100 K) sin 10 th)",
-    joints=("brake.torque",),
+    injection_points=("brake.torque",),
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="S: hot judder has orders 6 to 20; M: above 300 degC",

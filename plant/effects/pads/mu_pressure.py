@@ -26,7 +26,7 @@ EFFECT = Effect(
     row=27,
     title="Friction over the pressure",
     equation="mu' = mu (p / 30 bar)^-n, p at least 1 bar",
-    joints=("friction.mu",),
+    injection_points=("friction.mu",),
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: n of 0.05 to 0.1",

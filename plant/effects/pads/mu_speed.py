@@ -32,7 +32,7 @@ EFFECT = Effect(
     row=26,
     title="Friction over the sliding speed (Stribeck)",
     equation="mu' = mu (1 + s exp(-(v/v_s)^2)) (1 + k v), v_s = 1.5 m/s",
-    joints=("friction.mu",),
+    injection_points=("friction.mu",),
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: -10 to -25 % from 5 to 120 km/h, +20 % in the last half second",

@@ -27,7 +27,7 @@ EFFECT = Effect(
     row=25,
     title="Cold pads grip less",
     equation="mu' = mu (1 - c sat((423 K - T)/100 K))",
-    joints=("friction.mu",),
+    injection_points=("friction.mu",),
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: 10 to 25 % gained over the first three stops",

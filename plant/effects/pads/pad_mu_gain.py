@@ -21,7 +21,7 @@ EFFECT = Effect(
     row=22,
     title="Pad friction off by a constant share",
     equation="mu' = mu (1+e)",
-    joints=("friction.mu",),
+    injection_points=("friction.mu",),
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: batches differ by 15 % (Breuer/Bill, Bremsenhandbuch)",

@@ -26,7 +26,7 @@ EFFECT = Effect(
     row=23,
     title="Friction falls above a temperature",
     equation="mu' = mu max(1 - k (T - T_f)+, 0.2)",
-    joints=("friction.mu",),
+    injection_points=("friction.mu",),
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: -20 to -40 % from 350 to 600 degC (Breuer/Bill)",

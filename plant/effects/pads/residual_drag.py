@@ -21,7 +21,7 @@ EFFECT = Effect(
     row=30,
     title="Pads drag with the brake released",
     equation="T' = T + T_d, against the rotation",
-    joints=("brake.torque",),
+    injection_points=("brake.torque",),
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="S: limits of 6.9 and 9.8 N m (Mitsubishi Fuso service manual); M: 0.5 to 10 N m; C: 200, where it binds",

@@ -26,7 +26,7 @@ EFFECT = Effect(
     row=31,
     title="A caliper that gives too little, or does not let go",
     equation="T' = (1-e) T; clamping pressure at least p_s",
-    joints=("brake.torque", "brake.pressure"),
+    injection_points=("brake.torque", "brake.pressure"),
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: one wheel at 20 to 50 % less; a seized piston holds some bar",

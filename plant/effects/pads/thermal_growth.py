@@ -23,7 +23,7 @@ EFFECT = Effect(
     row=39,
     title="Hot disc and pads grow into the gap",
     equation="p' = p + g (T - 423 K)+",
-    joints=("brake.pressure",),
+    injection_points=("brake.pressure",),
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: 0.1 mm, 1 to 2 bar of drag after a hot stop",

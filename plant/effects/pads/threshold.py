@@ -35,7 +35,7 @@ EFFECT = Effect(
     row=29,
     title="Threshold pressure off, and a gap to close after knock-back",
     equation="p' = p - p0; no torque until the pressure has acted long enough on the gap",
-    joints=("brake.pressure", "brake.torque"),
+    injection_points=("brake.pressure", "brake.torque"),
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: 0.3 to 1 bar (Breuer/Bill); knock-back of 0.2 to 0.5 mm costs 50 to 150 ms",

@@ -34,7 +34,7 @@ EFFECT = Effect(
     row=36,
     title="Wet or rusty discs at the first application",
     equation="mu' = mu (1 - w exp(-t/tau)), t the time braked so far",
-    joints=("friction.mu",),
+    injection_points=("friction.mu",),
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: 10 to 50 % less for 0.5 to 2 s; rust grips up to 30 % more",

@@ -21,7 +21,7 @@ EFFECT = Effect(
     row=6,
     title="Aerodynamic lift off",
     equation="cl' = cl + e of an axle",
-    joints=("vehicle_lift_coefficient",),
+    injection_points=("vehicle_lift_coefficient",),
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: Hucho; 1 to 3 % of the load at 130 km/h",

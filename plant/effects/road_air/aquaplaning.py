@@ -25,7 +25,7 @@ EFFECT = Effect(
     row=18,
     title="Water film",
     equation="mu' = mu max(1 - k v^2 h, 0.05), k = 0.33 s2/m3",
-    joints=("road.friction",),
+    injection_points=("road.friction",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: begins at 70 km/h with 3 mm",

@@ -25,7 +25,7 @@ EFFECT = Effect(
     row=4,
     title="Headwind, and drag area off",
     equation="F = rho/2 cd (1+e) A (v+w)|v+w|",
-    joints=("air.speed", "vehicle_drag_coefficient"),
+    injection_points=("air.speed", "vehicle_drag_coefficient"),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 5 m/s of wind at 36 m/s is 29 % of the drag; roof loads to 60 %, weather",

@@ -21,7 +21,7 @@ EFFECT = Effect(
     row=17,
     title="Grip of the road off: wet, snow, ice",
     equation="mu' = mu (1+e)",
-    joints=("road.friction",),
+    injection_points=("road.friction",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 0.8 wet, 0.2 snow, 0.05 ice (Burckhardt)",

@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=1,
     title="Road grade",
     equation="grade' = grade + e",
-    joints=("road.grade",),
+    injection_points=("road.grade",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: roads have up to 8 %, usually within 2 %",

@@ -35,7 +35,7 @@ EFFECT = Effect(
     row=11,
     title="Uneven road under the tyres",
     equation="dFz = c z(s), dR = -z(s)/3, six waves of 0.9 to 7 m, left and right apart",
-    joints=("wheel.load", "wheel.radius"),
+    injection_points=("wheel.load", "wheel.radius"),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: ISO 8608 class B to C, rms height of the short waves",

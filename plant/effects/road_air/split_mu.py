@@ -21,7 +21,7 @@ EFFECT = Effect(
     row=12,
     title="Less grip under the right wheels",
     equation="mu' = mu (1+e) on the right",
-    joints=("road.friction",),
+    injection_points=("road.friction",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 0.2 against 0.9",

@@ -23,7 +23,7 @@ EFFECT = Effect(
     row=66,
     title="One node's clock runs slow, or fast",
     equation="s'(t) = s(t - e t)",
-    joints=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
+    injection_points=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
     scope=Scope.NODE,
     parameters=(Parameter("share", "", -0.002, 0.002, 0.0005),),
     source="M: 20 to 100 ppm, 6 ms a minute; C: larger here, to be seen within a minute",

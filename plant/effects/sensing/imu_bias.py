@@ -24,7 +24,7 @@ EFFECT = Effect(
     row=55,
     title="IMU zero off and drifting",
     equation="a' = a + b + d t, r' = r + b_r",
-    joints=("sensor.imu",),
+    injection_points=("sensor.imu",),
     scope=Scope.CAR,
     parameters=(
         Parameter("ax_mps2", "m/s2", -1.0, 1.0, 0.05),

@@ -35,7 +35,7 @@ EFFECT = Effect(
     row=58,
     title="A further low-pass in the IMU",
     equation="tau a'' = a - a''",
-    joints=("sensor.imu",),
+    injection_points=("sensor.imu",),
     scope=Scope.CAR,
     parameters=(Parameter("time_s", "s", 0.0, 0.1, 0.01),),
     source="S: cut-off of 20 to 40 Hz, lag of 6 to 10 ms (Hyundai)",

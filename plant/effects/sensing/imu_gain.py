@@ -29,7 +29,7 @@ EFFECT = Effect(
     row=56,
     title="IMU scale and misalignment",
     equation="ax' = ax (1+e) + g sin m + c ay",
-    joints=("sensor.imu",),
+    injection_points=("sensor.imu",),
     scope=Scope.CAR,
     parameters=(
         Parameter("gain", "", -0.2, 0.2, 0.02),

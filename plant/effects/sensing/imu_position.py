@@ -32,7 +32,7 @@ EFFECT = Effect(
     row=57,
     title="IMU away from the centre of gravity",
     equation="ax' = ax - x r^2 - y dr/dt, ay' = ay - y r^2 + x dr/dt",
-    joints=("sensor.imu",),
+    injection_points=("sensor.imu",),
     scope=Scope.CAR,
     parameters=(
         Parameter("x_m", "m", -1.5, 1.5, 0.3),

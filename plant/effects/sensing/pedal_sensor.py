@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=70,
     title="Pedal sensor zero and scale off",
     equation="s' = s (1+e) + o",
-    joints=("sensor.driver",),
+    injection_points=("sensor.driver",),
     scope=Scope.CAR,
     parameters=(
         Parameter("offset", "", -0.1, 0.1, 0.01),

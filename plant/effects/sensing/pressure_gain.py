@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=62,
     title="Pressure sensor scale off, drifting",
     equation="p' = p (1 + e + d t)",
-    joints=("sensor.pressure",),
+    injection_points=("sensor.pressure",),
     scope=Scope.WHEEL,
     parameters=(
         Parameter("gain", "", -0.2, 0.2, 0.02),

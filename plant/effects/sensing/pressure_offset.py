@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=61,
     title="Pressure sensor zero off",
     equation="p' = p + o",
-    joints=("sensor.pressure",),
+    injection_points=("sensor.pressure",),
     scope=Scope.WHEEL,
     parameters=(Parameter("offset_pa", "Pa", -500000.0, 500000.0, 100000.0),),
     source="M: +-1 bar",

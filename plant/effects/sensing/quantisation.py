@@ -27,7 +27,7 @@ EFFECT = Effect(
     row=64,
     title="Coarse steps of the signals",
     equation="s' = q round(s/q)",
-    joints=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor"),
+    injection_points=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor"),
     scope=Scope.CAR,
     parameters=(
         Parameter("wheel_rad_s", "rad/s", 0.0, 1.0, 0.1),

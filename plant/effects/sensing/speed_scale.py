@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=76,
     title="Speed over ground told too fast or too slow",
     equation="v' = v (1+e)",
-    joints=("sensor.ground",),
+    injection_points=("sensor.ground",),
     scope=Scope.CAR,
     parameters=(Parameter("gain", "", -0.1, 0.1, 0.01),),
     source="C: an optical sensor mounted askew by 8 degrees tells 1 % too little; a satellite receiver is far better",

@@ -21,7 +21,7 @@ EFFECT = Effect(
     row=65,
     title="One node's samples are older than their stamps, or newer",
     equation="s'(t) = s(t - d)",
-    joints=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
+    injection_points=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
     scope=Scope.NODE,
     parameters=(Parameter("delay_s", "s", -0.05, 0.1, 0.02),),
     source="M: 2 to 50 ms",

@@ -22,7 +22,7 @@ EFFECT = Effect(
     row=59,
     title="Toothed wheel runs out of centre",
     equation="w' = w (1 + a cos th + b sin th), th the integral of w",
-    joints=("sensor.wheel",),
+    injection_points=("sensor.wheel",),
     scope=Scope.WHEEL,
     parameters=(
         Parameter("first_cosine", "", -0.02, 0.02, 0.001),

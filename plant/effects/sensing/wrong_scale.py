@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=69,
     title="Wrong scale, sign or byte order in a database",
     equation="k' = k (1+e): e = -2 a sign, 2.6 km/h for m/s, 255 a byte",
-    joints=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
+    injection_points=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
     scope=Scope.NODE,
     parameters=(Parameter("factor", "", -3.0, 300.0, 2.6),),
     source="M: 1, -1, 3.6, 256",

@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=20,
     title="Grip falls faster or slower with the load",
     equation="p_Dx2' = p_Dx2 + e",
-    joints=("tyre_pdx2",),
+    injection_points=("tyre_pdx2",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="S: -0.16 in the PAC2002 sample",

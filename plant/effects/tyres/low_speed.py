@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=21,
     title="Damping of the contact at walking pace off",
     equation="k' = k (1+e)",
-    joints=("tyre_low_speed_damping_ns_m",),
+    injection_points=("tyre_low_speed_damping_ns_m",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: Pacejka 2006, section 8.6",

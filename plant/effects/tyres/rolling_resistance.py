@@ -21,7 +21,7 @@ EFFECT = Effect(
     row=5,
     title="Rolling resistance off",
     equation="M' = M (1+e)",
-    joints=("wheel.rolling_torque",),
+    injection_points=("wheel.rolling_torque",),
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="S: 0.0164 (IPG) against 0.009 of eco tyres; warms up in 15 to 30 min",

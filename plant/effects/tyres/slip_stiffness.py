@@ -21,7 +21,7 @@ EFFECT = Effect(
     row=16,
     title="Slip stiffness off: temperature, tread, wear",
     equation="C_k' = C_k (1+e)",
-    joints=("tyre.stiffness",),
+    injection_points=("tyre.stiffness",),
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: +-25 %; -0.5 %/K of the carcass",

@@ -21,7 +21,7 @@ EFFECT = Effect(
     row=13,
     title="Rolling radius off: wear, inflation",
     equation="R' = R (1+e)",
-    joints=("wheel.radius",),
+    injection_points=("wheel.radius",),
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="S: wheel to wheel 0.12 % (comma2k19); M: wear -1.5 %",

@@ -20,7 +20,7 @@ EFFECT = Effect(
     row=15,
     title="Relaxation length off",
     equation="sigma' = sigma (1+e)",
-    joints=("tyre_lsgkp",),
+    injection_points=("tyre_lsgkp",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="S: 0.12 m (IPG) against 0.60 m (PAC2002 sample)",

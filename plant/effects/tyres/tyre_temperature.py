@@ -39,7 +39,7 @@ EFFECT = Effect(
     row=19,
     title="Tread warms in the contact",
     equation="C_k' = C_k (1 + a dT), mu' = mu (1 + b dT), dT' = |F v_s| / C - dT / tau",
-    joints=("tyre.stiffness", "road.friction"),
+    injection_points=("tyre.stiffness", "road.friction"),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: -0.5 %/K of the carcass, grip within 5 % over three stops; C: tread of 1 kJ/K, 60 s",

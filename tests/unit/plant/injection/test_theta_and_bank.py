@@ -4,7 +4,7 @@ import pytest
 from plant.inject import J
 from plant.injection.bank import Shape, Variable, term
 from plant.injection.theta import THETA
-from plant.injection_points import JOINTS
+from plant.injection_points import INJECTION_POINTS
 from plant.open_loop_manoeuvres import MANOEUVRES, drive
 from plant.signals import NAMES, simulate
 
@@ -85,19 +85,19 @@ def test_a_basis_term_does_what_the_effect_does(stop):
     np.testing.assert_allclose(simulate(plan, terms=row[None]), simulate(plan, theta), rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("joint", [*JOINTS, "vehicle_mass_kg", "friction_brake_piston_area_m2"])
+@pytest.mark.parametrize("point", [*INJECTION_POINTS, "vehicle_mass_kg", "friction_brake_piston_area_m2"])
 @pytest.mark.parametrize("add", [False, True])
-def test_a_term_at_every_joint_acts_and_stays_finite(paper_car, joint, add):
+def test_a_term_at_every_injection_point_acts_and_stays_finite(paper_car, point, add):
     plan = drive(MANOEUVRES["brake_in_turn"], paper_car)
-    size = {"N": 100.0, "Pa": 5e4, "Pa/s": 1e5, "N m": 20.0}.get(JOINTS.get(joint, (0, "", ""))[1], 0.01)
-    if joint == "friction_brake_piston_area_m2":
+    size = {"N": 100.0, "Pa": 5e4, "Pa/s": 1e5, "N m": 20.0}.get(INJECTION_POINTS.get(point, (0, "", ""))[1], 0.01)
+    if point == "friction_brake_piston_area_m2":
         size = 1e-4
-    row = term(joint, size if add else 0.05, (Variable.SPEED, Shape.LINEAR, 0.0, 20.0), add=add)
+    row = term(point, size if add else 0.05, (Variable.SPEED, Shape.LINEAR, 0.0, 20.0), add=add)
     free, changed = simulate(plan)[0], simulate(plan, terms=row[None])[0]
     assert np.isfinite(changed).all()
-    silent = joint in ("motor.demand", "motor.torque", "sensor.motor_torque", "road.grade", "air.speed",
+    silent = point in ("motor.demand", "motor.torque", "sensor.motor_torque", "road.grade", "air.speed",
                        "steering.angle", "contact.speed", "hydraulics.rate") and not add  # fmt: skip
-    silent = silent or joint == "motor.available"  # no motor is asked for more than it is able to give
+    silent = silent or point == "motor.available"  # no motor is asked for more than it is able to give
     assert silent or not np.array_equal(free, changed)
 
 
@@ -112,7 +112,7 @@ def test_every_variable_and_shape_stays_finite(stop, variable, shape):
 
 def test_terms_that_cannot_be_are_refused():
     one = (Variable.ONE, Shape.CONSTANT, 0.0, 1.0)
-    with pytest.raises(ValueError, match="no joint"):
+    with pytest.raises(ValueError, match="no injection point"):
         term("friction.glue", 0.1, one)
     with pytest.raises(ValueError, match="expected 4 coefficients"):
         term("friction.mu", [0.1], one)
@@ -120,5 +120,5 @@ def test_terms_that_cannot_be_are_refused():
         term("friction.mu", 0.1, (Variable.SPEED, Shape.LINEAR, 0.0, 0.0))
 
 
-def test_joints_lie_behind_each_other():
-    assert len({getattr(J, name.replace(".", "_")) for name in JOINTS}) == len(JOINTS)
+def test_injection_points_lie_behind_each_other():
+    assert len({getattr(J, name.replace(".", "_")) for name in INJECTION_POINTS}) == len(INJECTION_POINTS)

@@ -17,7 +17,7 @@ from plant.injection.bank import term
 
 LAW_TOML = """
 [[laws]]
-joint = "friction.mu"
+injection_point = "friction.mu"
 variable = "speed"
 adds = false
 centre = 15.0
