@@ -13,14 +13,17 @@ NOT_HERE = {
 }
 """Rows of the catalogue that are no effect of the plant, and where they are."""
 
-PARTS = (
-    (range(1, 13), "Environment and vehicle body"),
-    (range(13, 22), "Tyre"),
-    (range(22, 41), "Friction brake"),
-    (range(41, 55), "Electro-hydraulic brake and motors"),
-    (range(55, 72), "Sensors, clocks, bus"),
-    (range(76, 77), "Beyond the catalogue"),
-)
+SUBSYSTEMS = {
+    "road_air": "Road and air",
+    "chassis": "Chassis",
+    "tyres": "Tyres",
+    "pads": "Pads, discs and calipers",
+    "hydraulics": "Pressure control and lines",
+    "motors": "Motors and battery",
+    "sensing": "Sensors and clocks",
+    "": "From outside",
+}
+"""Headings of the page, by `plant.effects.effect.Effect.subsystem`."""
 
 
 def described(effect: Effect) -> dict[str, Any]:
@@ -28,6 +31,7 @@ def described(effect: Effect) -> dict[str, Any]:
     return {
         "name": effect.name,
         "row": effect.row,
+        "subsystem": effect.subsystem,
         "title": effect.title,
         "equation": effect.equation,
         "injection_points": list(effect.injection_points),
@@ -105,11 +109,11 @@ def page(effects: Iterable[Effect]) -> str:
         + "; ".join(f"{row} `{name}`: {why}" for row, (name, why) in NOT_HERE.items())
         + ".",
     ]
-    for rows, title in PARTS:
-        lines += ["", f"## {title}"]
-        for effect in sorted(known, key=lambda effect: effect["row"]):
-            if effect["row"] in rows:
-                lines += _section(effect)
+    for subsystem, title in SUBSYSTEMS.items():
+        own = sorted((one for one in known if one["subsystem"] == subsystem), key=lambda one: one["row"])
+        lines += ["", f"## {title}"] if own else []
+        for effect in own:
+            lines += _section(effect)
     lines += ["", "## Injection points", "", "| injection point | unit | what |", "|---|---|---|"]
     lines += [f"| `{name}` | {unit} | {what} |" for name, (_, unit, what) in INJECTION_POINTS.items()]
     lines += [

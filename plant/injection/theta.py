@@ -84,6 +84,15 @@ class Theta:
                     late[where] += start_s
         return late
 
+    def driven_back(self, theta: Vector) -> Vector:
+        """The same stretch of road, driven the other way."""
+        back = theta.copy()
+        for effect in self.effects:
+            for parameter in effect.parameters:
+                if parameter.sign_along_road:
+                    back[self.slice(effect.name, parameter.name)] *= -1.0
+        return back
+
     def timed(self, theta: Vector) -> bool:
         """Whether any effect begins or ends at some time."""
         return not np.array_equal(self.shifted(theta, 1.0), theta)

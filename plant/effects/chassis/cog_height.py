@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("height_m", "m", -0.25, 0.4, 0.06),)
+PARAMETERS = (Parameter("height_m", "m", -0.25, 0.4, 0.06, aliases=("vehicle_cog_height_m",)),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -21,6 +22,7 @@ EFFECT = Effect(
     title="Height of the centre of gravity off",
     equation="h' = h + dh",
     injection_points=("vehicle_cog_height_m",),
+    acts_when=Excitation.MOVING,
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="S: 5 to 10 % of the load transfer; roof loads more",

@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("mass_kg", "kg", -300.0, 800.0, 150.0),)
+PARAMETERS = (Parameter("mass_kg", "kg", -300.0, 800.0, 150.0, aliases=("vehicle_mass_kg",)),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -21,6 +22,7 @@ EFFECT = Effect(
     title="Mass off by passengers and luggage",
     equation="m' = m + dm",
     injection_points=("vehicle_mass_kg",),
+    acts_when=Excitation.MOVING,
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 75 to 350 kg, 5 to 25 % of the mass",

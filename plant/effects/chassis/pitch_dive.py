@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("softness", "", -0.4, 1.0, 0.25),)
+PARAMETERS = (Parameter("softness", "", -0.4, 1.0, 0.25, aliases=("suspension_ride_rate_n_m",)),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -22,6 +23,7 @@ EFFECT = Effect(
     title="Softer springs: more dive and a lower pitch frequency",
     equation="c' = c / (1+e)",
     injection_points=("suspension_ride_rate_n_m",),
+    acts_when=Excitation.MOVING,
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: Reimpell; 1 to 1.5 deg/g, 1.3 to 1.6 Hz",

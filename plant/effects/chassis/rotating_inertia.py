@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("inertia_kg_m2", "kg m2", -0.8, 2.0, 0.4),)
+PARAMETERS = (Parameter("inertia_kg_m2", "kg m2", -0.8, 2.0, 0.4, aliases=("wheel_inertia_kg_m2",)),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -22,6 +23,7 @@ EFFECT = Effect(
     title="Rotating inertia of a wheel off",
     equation="I' = I + dI",
     injection_points=("wheel_inertia_kg_m2",),
+    acts_when=Excitation.MOVING,
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="D: 4 to 6 % of the mass for four wheels with rotors",

@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
@@ -21,6 +22,7 @@ EFFECT = Effect(
     title="Front wheels do not point where the steering wheel says",
     equation="delta' = delta + e",
     injection_points=("steering.angle",),
+    acts_when=Excitation.MOVING,
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: alignment and steering compliance, 0.1 to 1 deg at the wheel",

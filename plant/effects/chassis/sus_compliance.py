@@ -4,6 +4,7 @@ from math import pi
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, shape, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X, Y
@@ -11,7 +12,7 @@ from plant.vectors import X, Y
 DAMPING_RATIO = 0.05
 
 PARAMETERS = (
-    Parameter("compliance_m_n", "m/N", 0.0, 2e-06, 5e-07),
+    Parameter("compliance_m_n", "m/N", 0.0, 2e-06, 5e-07, difference_step=0.5),
     shape("frequency_hz", "Hz", 8.0, 25.0, 15.0),
 )
 L = slots(Scope.AXLE, PARAMETERS)
@@ -45,6 +46,7 @@ EFFECT = Effect(
     title="Fore-aft compliance of the hubs",
     equation="d'' = w^2 (c F - d) - 2 zeta w d', the contact moves with d'",
     injection_points=("contact.speed",),
+    acts_when=Excitation.MOVING,
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: 12 to 20 Hz, 1 to 2 mm under braking",

@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X, Y
@@ -37,6 +38,8 @@ EFFECT = Effect(
     title="Accumulator runs empty",
     equation="p*' = p* (1 - d s), s' = sum(p'+)/P - s/20 s, P = 8 applications of 4 x 30 bar",
     injection_points=("hydraulics.demand",),
+    acts_when=Excitation.BRAKES,
+    baseline_section="ehb",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: -10 to -30 % after eight applications",

@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
@@ -28,6 +29,8 @@ EFFECT = Effect(
     title="Air in the brake line",
     equation="p' = c/(c + V p0/(p+p0)^2) times the rate, c = 0.5 cm3/MPa",
     injection_points=("hydraulics.rate",),
+    acts_when=Excitation.BRAKES,
+    baseline_section="ehb",
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: 1 to 3 cm3",

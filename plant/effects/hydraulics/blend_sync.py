@@ -3,6 +3,7 @@
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
 from plant.effects.shared import brake_gain_nm_pa
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import U, X, Y
@@ -36,6 +37,8 @@ EFFECT = Effect(
     title="Friction comes late when regeneration goes out",
     equation="p*' = p* - (T - T_lag) / gain, T_lag follows T with tau",
     injection_points=("hydraulics.demand",),
+    acts_when=Excitation.BRAKES,
+    baseline_section="ehb",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: dips of 0.1 to 0.3 m/s2 for 100 to 300 ms",

@@ -2,12 +2,13 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
 PARAMETERS = (
-    Parameter("frequency", "", -0.7, 1.5, -0.3),
-    Parameter("damping", "", -0.6, 1.0, -0.25),
+    Parameter("frequency", "", -0.7, 1.5, -0.3, aliases=("ehb_natural_frequency_hz",)),
+    Parameter("damping", "", -0.6, 1.0, -0.25, aliases=("ehb_damping_ratio",)),
 )
 L = slots(Scope.CAR, PARAMETERS)
 
@@ -25,6 +26,8 @@ EFFECT = Effect(
     title="Bandwidth and damping of the pressure control off",
     equation="f' = f (1+e), zeta' = zeta (1+d)",
     injection_points=("ehb_natural_frequency_hz", "ehb_damping_ratio"),
+    acts_when=Excitation.BRAKES,
+    baseline_section="ehb",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 4 to 10 Hz, 0.7 to 1",

@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("time_s", "s", -0.02, 0.08, 0.02),)
+PARAMETERS = (Parameter("time_s", "s", -0.02, 0.08, 0.02, aliases=("ehb_dead_time_s",)),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -21,6 +22,8 @@ EFFECT = Effect(
     title="Dead time of the pressure control off",
     equation="t_d' = t_d + e",
     injection_points=("ehb_dead_time_s",),
+    acts_when=Excitation.BRAKES,
+    baseline_section="ehb",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 10 to 40 ms",

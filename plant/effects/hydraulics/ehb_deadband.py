@@ -3,6 +3,7 @@
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
 from plant.effects.shared import clip
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import U, X
@@ -25,6 +26,8 @@ EFFECT = Effect(
     title="Pressure control does not answer small errors",
     equation="p* = p + dead zone of (p* - p)",
     injection_points=("hydraulics.demand",),
+    acts_when=Excitation.ALWAYS,
+    baseline_section="ehb",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 0.3 to 1 bar",

@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("gain", "", -0.9, 1.0, -0.4),)
+PARAMETERS = (Parameter("gain", "", -0.9, 1.0, -0.4, aliases=("ehb_build_rate_pa_s", "ehb_release_rate_pa_s")),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -22,6 +23,8 @@ EFFECT = Effect(
     title="Rate limits of the pressure control off",
     equation="r' = r (1+e)",
     injection_points=("ehb_build_rate_pa_s", "ehb_release_rate_pa_s"),
+    acts_when=Excitation.BRAKES,
+    baseline_section="ehb",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 180 to 400 bar/s",

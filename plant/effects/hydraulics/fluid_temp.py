@@ -2,10 +2,13 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("slowness", "", 0.0, 3.0, 0.6),)
+SLOWED = ("ehb_natural_frequency_hz", "ehb_build_rate_pa_s", "ehb_release_rate_pa_s")
+
+PARAMETERS = (Parameter("slowness", "", 0.0, 3.0, 0.6, aliases=SLOWED),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -23,7 +26,9 @@ EFFECT = Effect(
     row=33,
     title="Cold, viscous brake fluid",
     equation="f' = f/(1+e), rates' = rates/(1+e)^2",
-    injection_points=("ehb_natural_frequency_hz", "ehb_build_rate_pa_s", "ehb_release_rate_pa_s"),
+    injection_points=SLOWED,
+    acts_when=Excitation.BRAKES,
+    baseline_section="ehb",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: two to four times slower at -20 degC",

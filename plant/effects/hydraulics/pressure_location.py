@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X, Y
@@ -33,6 +34,7 @@ EFFECT = Effect(
     title="Pressure is measured before the line",
     equation="p_caliper' = (p - p_caliper) / tau",
     injection_points=("brake.pressure",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 5 to 20 ms, some bar in transients",

@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
@@ -23,6 +24,7 @@ EFFECT = Effect(
     title="A valve leaks",
     equation="p' = rate - k p",
     injection_points=("hydraulics.rate",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source=("M: 1 to 5 bar/min at a closed valve; C: larger here, because the closed pressure loop makes good for it"),

@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("power", "", -0.95, 1.0, -0.4),)
+PARAMETERS = (Parameter("power", "", -0.95, 1.0, -0.4, aliases=("battery_charge_power_w",)),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -21,6 +22,8 @@ EFFECT = Effect(
     title="Battery accepts more or less",
     equation="P' = P (1+e)",
     injection_points=("battery_charge_power_w",),
+    acts_when=Excitation.MOTORS,
+    baseline_section="battery",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 60 to 100 kW; none above 90 to 95 % charge, less in the cold",

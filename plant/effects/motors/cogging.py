@@ -4,6 +4,7 @@ from math import sin
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
@@ -27,6 +28,8 @@ EFFECT = Effect(
     title="Cogging torque",
     equation="T' = T + T_c sin(28 th)",
     injection_points=("motor.torque",),
+    acts_when=Excitation.ALWAYS,
+    baseline_section="motor",
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: 0.5 to 2 % of the peak, orders 28 to 84",

@@ -3,6 +3,7 @@
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
 from plant.effects.shared import REFERENCE_K
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
@@ -24,6 +25,8 @@ EFFECT = Effect(
     title="Torque per current falls with the temperature",
     equation="T' = T (1 - k (T_w - 293 K))",
     injection_points=("motor.torque",),
+    acts_when=Excitation.MOTORS,
+    baseline_section="motor",
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: magnets lose 0.1 %/K, 8 % at 80 K",

@@ -3,6 +3,7 @@
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, shape, slots
 from plant.effects.shared import clip
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
@@ -28,6 +29,8 @@ EFFECT = Effect(
     title="Motor derates early",
     equation="able' = able (1 - d sat((T_w - T_s)/40 K))",
     injection_points=("motor.available",),
+    acts_when=Excitation.MOTORS,
+    baseline_section="motor",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: -20 to -50 %, time constant 60 s",

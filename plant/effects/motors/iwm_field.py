@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("power", "", -0.95, 0.5, -0.8),)
+PARAMETERS = (Parameter("power", "", -0.95, 0.5, -0.8, aliases=("motor_peak_power_w",)),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -21,6 +22,8 @@ EFFECT = Effect(
     title="Power of the motors off",
     equation="P' = P (1+e)",
     injection_points=("motor_peak_power_w",),
+    acts_when=Excitation.MOTORS,
+    baseline_section="motor",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source=(

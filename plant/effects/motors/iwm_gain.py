@@ -5,10 +5,14 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
-PARAMETERS = (Parameter("gain", "", -0.3, 0.3, -0.05), Parameter("unseen", "", -0.3, 0.3, -0.05))
+PARAMETERS = (
+    Parameter("gain", "", -0.3, 0.3, -0.05, part_to_part=0.005),
+    Parameter("unseen", "", -0.3, 0.3, -0.05, part_to_part=0.005),
+)
 L = slots(Scope.WHEEL, PARAMETERS)
 
 
@@ -26,6 +30,7 @@ EFFECT = Effect(
     title="A motor gives more or less than it is told, or than its current tells",
     equation="T*' = (1+e) T*, T' = (1+e_u) T",
     injection_points=("motor.demand", "motor.torque"),
+    acts_when=Excitation.MOTORS,
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: +-3 to 5 %",

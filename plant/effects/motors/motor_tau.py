@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("time_s", "s", -0.005, 0.06, 0.01),)
+PARAMETERS = (Parameter("time_s", "s", -0.005, 0.06, 0.01, aliases=("motor_time_constant_s",)),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -21,6 +22,8 @@ EFFECT = Effect(
     title="Motors answer later",
     equation="tau' = tau + e",
     injection_points=("motor_time_constant_s",),
+    acts_when=Excitation.MOTORS,
+    baseline_section="motor",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 8 ms of the torque loop and 10 ms of CAN",

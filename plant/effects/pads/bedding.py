@@ -5,6 +5,7 @@ from math import exp
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, shape, slots
 from plant.effects.shared import heat_rates
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
@@ -35,6 +36,7 @@ EFFECT = Effect(
     title="New pads bed in",
     equation="mu' = mu (1 - d exp(-E/E0))",
     injection_points=("friction.mu",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: -15 to +15 % over 20 to 50 stops",

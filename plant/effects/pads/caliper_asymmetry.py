@@ -3,6 +3,7 @@
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
 from plant.effects.shared import clip
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
@@ -25,6 +26,7 @@ EFFECT = Effect(
     title="Caliper grips unlike forward and backward",
     equation="mu' = mu (1 + e sign(omega))",
     injection_points=("friction.mu",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: +-2 %, of the leading end of the pad",

@@ -4,6 +4,7 @@ from math import cos, sin
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
@@ -31,6 +32,7 @@ EFFECT = Effect(
     title="Judder of an uneven disc",
     equation="T' = T (1 + a sin th + b cos th + c sin 2 th)",
     injection_points=("brake.torque",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: thickness off by 10 to 20 um gives 3 to 10 %; S: cold judder has orders 1 and 2",

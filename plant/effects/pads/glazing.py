@@ -3,6 +3,7 @@
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
 from plant.effects.shared import heat_rates
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
@@ -30,6 +31,7 @@ EFFECT = Effect(
     title="Friction drifts with wear, glazing, taper",
     equation="mu' = mu (1 - d E), at least 0.3 mu",
     injection_points=("friction.mu",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: 5 to 10 % over weeks; here over the work of the brake in one log",

@@ -5,6 +5,7 @@ from math import sin
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
 from plant.effects.shared import clip
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
@@ -30,6 +31,8 @@ EFFECT = Effect(
     title="Judder of hot spots",
     equation="T' = T (1 + a sat((T-523 K)/100 K) sin 10 th)",
     injection_points=("brake.torque",),
+    acts_when=Excitation.BRAKES,
+    free_phase=True,
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="S: hot judder has orders 6 to 20; M: above 300 degC",

@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("rate", "", -0.7, 3.0, 1.0),)
+PARAMETERS = (Parameter("rate", "", -0.7, 3.0, 1.0, aliases=("pad_a_1_ks", "pad_b_1_j")),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -22,6 +23,7 @@ EFFECT = Effect(
     title="Pad friction follows faster or slower",
     equation="both rates of equation (3) times 1+e, the same rest value",
     injection_points=("pad_a_1_ks", "pad_b_1_j"),
+    acts_when=Excitation.BRAKES,
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="D: time constants of 8 to 30 s in the published fits",

@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import Y
@@ -27,6 +28,7 @@ EFFECT = Effect(
     title="Friction over the pressure",
     equation="mu' = mu (p / 30 bar)^-n, p at least 1 bar",
     injection_points=("friction.mu",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: n of 0.05 to 0.1",

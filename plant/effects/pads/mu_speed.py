@@ -4,6 +4,7 @@ from math import exp
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import P, X
@@ -33,6 +34,7 @@ EFFECT = Effect(
     title="Friction over the sliding speed (Stribeck)",
     equation="mu' = mu (1 + s exp(-(v/v_s)^2)) (1 + k v), v_s = 1.5 m/s",
     injection_points=("friction.mu",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: -10 to -25 % from 5 to 120 km/h, +20 % in the last half second",

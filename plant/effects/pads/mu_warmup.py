@@ -3,6 +3,7 @@
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
 from plant.effects.shared import clip
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
@@ -28,6 +29,7 @@ EFFECT = Effect(
     title="Cold pads grip less",
     equation="mu' = mu (1 - c sat((423 K - T)/100 K))",
     injection_points=("friction.mu",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: 10 to 25 % gained over the first three stops",

@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
-PARAMETERS = (Parameter("gain", "", -0.6, 0.6, -0.12),)
+PARAMETERS = (Parameter("gain", "", -0.6, 0.6, -0.12, part_to_part=0.01),)
 L = slots(Scope.WHEEL, PARAMETERS)
 
 
@@ -22,6 +23,7 @@ EFFECT = Effect(
     title="Pad friction off by a constant share",
     equation="mu' = mu (1+e)",
     injection_points=("friction.mu",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: batches differ by 15 % (Breuer/Bill, Bremsenhandbuch)",

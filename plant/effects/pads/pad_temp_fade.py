@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, shape, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
@@ -27,6 +28,7 @@ EFFECT = Effect(
     title="Friction falls above a temperature",
     equation="mu' = mu max(1 - k (T - T_f)+, 0.2)",
     injection_points=("friction.mu",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: -20 to -40 % from 350 to 600 degC (Breuer/Bill)",

@@ -3,6 +3,7 @@
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
 from plant.effects.shared import clip
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X, Y
@@ -10,7 +11,7 @@ from plant.vectors import X, Y
 FADE_PA = 2e5
 FOLLOW_S = 0.002
 
-PARAMETERS = (Parameter("half_width_pa", "Pa", 0.0, 400000.0, 100000.0),)
+PARAMETERS = (Parameter("half_width_pa", "Pa", 0.0, 400000.0, 100000.0, difference_step=0.5),)
 L = slots(Scope.WHEEL, PARAMETERS)
 
 
@@ -39,6 +40,7 @@ EFFECT = Effect(
     title="Caliper friction: the clamping pressure lags the pressure",
     equation="play of half width h (Prandtl), faded out below 2 bar",
     injection_points=("brake.pressure",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: 3 to 8 % of p, 1 to 3 bar (Shyrokau 2013); S: loop measured at TU Ilmenau (Tretsiak 2008)",

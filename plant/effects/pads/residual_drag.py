@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
@@ -22,6 +23,7 @@ EFFECT = Effect(
     title="Pads drag with the brake released",
     equation="T' = T + T_d, against the rotation",
     injection_points=("brake.torque",),
+    acts_when=Excitation.ALWAYS,
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="S: limits of 6.9 and 9.8 N m (Mitsubishi Fuso service manual); M: 0.5 to 10 N m; C: 200, where it binds",

@@ -2,13 +2,14 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import Y
 
 PARAMETERS = (
     Parameter("loss", "", 0.0, 1.0, 0.4),
-    Parameter("held_pa", "Pa", 0.0, 4000000.0, 400000.0),
+    Parameter("held_pa", "Pa", 0.0, 4000000.0, 400000.0, difference_step=0.5),
 )
 L = slots(Scope.WHEEL, PARAMETERS)
 
@@ -27,6 +28,7 @@ EFFECT = Effect(
     title="A caliper that gives too little, or does not let go",
     equation="T' = (1-e) T; clamping pressure at least p_s",
     injection_points=("brake.torque", "brake.pressure"),
+    acts_when=Excitation.ALWAYS,
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: one wheel at 20 to 50 % less; a seized piston holds some bar",

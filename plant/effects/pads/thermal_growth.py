@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
@@ -24,6 +25,7 @@ EFFECT = Effect(
     title="Hot disc and pads grow into the gap",
     equation="p' = p + g (T - 423 K)+",
     injection_points=("brake.pressure",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: 0.1 mm, 1 to 2 bar of drag after a hot stop",

@@ -3,6 +3,7 @@
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
 from plant.effects.shared import clip
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X, Y
@@ -36,6 +37,7 @@ EFFECT = Effect(
     title="Threshold pressure off, and a gap to close after knock-back",
     equation="p' = p - p0; no torque until the pressure has acted long enough on the gap",
     injection_points=("brake.pressure", "brake.torque"),
+    acts_when=Excitation.BRAKES,
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: 0.3 to 1 bar (Breuer/Bill); knock-back of 0.2 to 0.5 mm costs 50 to 150 ms",

@@ -5,6 +5,7 @@ from math import exp
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, shape, slots
 from plant.effects.shared import applied_rates
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
@@ -35,6 +36,7 @@ EFFECT = Effect(
     title="Wet or rusty discs at the first application",
     equation="mu' = mu (1 - w exp(-t/tau)), t the time braked so far",
     injection_points=("friction.mu",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: 10 to 50 % less for 0.5 to 2 s; rust grips up to 30 % more",

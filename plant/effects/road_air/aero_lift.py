@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("coefficient", "", -0.4, 0.4, 0.15),)
+PARAMETERS = (Parameter("coefficient", "", -0.4, 0.4, 0.15, aliases=("vehicle_lift_coefficient",)),)
 L = slots(Scope.AXLE, PARAMETERS)
 
 
@@ -22,6 +23,7 @@ EFFECT = Effect(
     title="Aerodynamic lift off",
     equation="cl' = cl + e of an axle",
     injection_points=("vehicle_lift_coefficient",),
+    acts_when=Excitation.MOVING,
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: Hucho; 1 to 3 % of the load at 130 km/h",

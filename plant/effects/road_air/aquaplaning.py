@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
@@ -26,6 +27,7 @@ EFFECT = Effect(
     title="Water film",
     equation="mu' = mu max(1 - k v^2 h, 0.05), k = 0.33 s2/m3",
     injection_points=("road.friction",),
+    acts_when=Excitation.MOVING,
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: begins at 70 km/h with 3 mm",

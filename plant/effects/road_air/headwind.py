@@ -2,13 +2,14 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import P
 
 PARAMETERS = (
-    Parameter("wind_mps", "m/s", -20.0, 20.0, 5.0),
-    Parameter("drag_gain", "", -0.5, 0.6, 0.15),
+    Parameter("wind_mps", "m/s", -20.0, 20.0, 5.0, sign_along_road=True),
+    Parameter("drag_gain", "", -0.5, 0.6, 0.15, aliases=("vehicle_drag_coefficient",)),
 )
 L = slots(Scope.CAR, PARAMETERS)
 
@@ -26,6 +27,7 @@ EFFECT = Effect(
     title="Headwind, and drag area off",
     equation="F = rho/2 cd (1+e) A (v+w)|v+w|",
     injection_points=("air.speed", "vehicle_drag_coefficient"),
+    acts_when=Excitation.ALWAYS,
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 5 m/s of wind at 36 m/s is 29 % of the drag; roof loads to 60 %, weather",

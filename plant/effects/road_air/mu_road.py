@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
@@ -22,6 +23,8 @@ EFFECT = Effect(
     title="Grip of the road off: wet, snow, ice",
     equation="mu' = mu (1+e)",
     injection_points=("road.friction",),
+    acts_when=Excitation.MOVING,
+    baseline_section="tyre",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 0.8 wet, 0.2 snow, 0.05 ice (Burckhardt)",

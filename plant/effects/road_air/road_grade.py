@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
-PARAMETERS = (Parameter("grade", "", -0.2, 0.2, 0.02),)
+PARAMETERS = (Parameter("grade", "", -0.2, 0.2, 0.02, sign_along_road=True),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -21,6 +22,7 @@ EFFECT = Effect(
     title="Road grade",
     equation="grade' = grade + e",
     injection_points=("road.grade",),
+    acts_when=Excitation.ALWAYS,
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: roads have up to 8 %, usually within 2 %",

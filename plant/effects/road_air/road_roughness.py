@@ -4,6 +4,7 @@ from math import pi, sin, sqrt
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import P, X
@@ -36,6 +37,7 @@ EFFECT = Effect(
     title="Uneven road under the tyres",
     equation="dFz = c z(s), dR = -z(s)/3, six waves of 0.9 to 7 m, left and right apart",
     injection_points=("wheel.load", "wheel.radius"),
+    acts_when=Excitation.ALWAYS,
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: ISO 8608 class B to C, rms height of the short waves",

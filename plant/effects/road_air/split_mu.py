@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
@@ -22,6 +23,7 @@ EFFECT = Effect(
     title="Less grip under the right wheels",
     equation="mu' = mu (1+e) on the right",
     injection_points=("road.friction",),
+    acts_when=Excitation.MOVING,
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: 0.2 against 0.9",

@@ -2,6 +2,7 @@
 
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -21,6 +22,7 @@ EFFECT = Effect(
     title="Pedal sensor zero and scale off",
     equation="s' = s (1+e) + o",
     injection_points=("sensor.driver",),
+    acts_when=Excitation.NONE,
     scope=Scope.CAR,
     parameters=(
         Parameter("offset", "", -0.1, 0.1, 0.01),

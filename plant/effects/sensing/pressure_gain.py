@@ -2,6 +2,7 @@
 
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -21,9 +22,10 @@ EFFECT = Effect(
     title="Pressure sensor scale off, drifting",
     equation="p' = p (1 + e + d t)",
     injection_points=("sensor.pressure",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.WHEEL,
     parameters=(
-        Parameter("gain", "", -0.2, 0.2, 0.02),
+        Parameter("gain", "", -0.2, 0.2, 0.02, part_to_part=0.005),
         Parameter("drift_1_s", "1/s", -0.001, 0.001, 0.0002),
     ),
     source="M: +-1 to 2 %",

@@ -2,6 +2,7 @@
 
 from plant.effects.effect import GROUND, Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -21,6 +22,7 @@ EFFECT = Effect(
     title="Speed over ground told too fast or too slow",
     equation="v' = v (1+e)",
     injection_points=("sensor.ground",),
+    acts_when=Excitation.ALWAYS,
     scope=Scope.CAR,
     parameters=(Parameter("gain", "", -0.1, 0.1, 0.01),),
     source="C: an optical sensor mounted askew by 8 degrees tells 1 % too little; a satellite receiver is far better",

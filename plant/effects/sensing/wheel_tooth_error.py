@@ -4,6 +4,7 @@ import numpy as np
 
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -23,6 +24,7 @@ EFFECT = Effect(
     title="Toothed wheel runs out of centre",
     equation="w' = w (1 + a cos th + b sin th), th the integral of w",
     injection_points=("sensor.wheel",),
+    acts_when=Excitation.NONE,
     scope=Scope.WHEEL,
     parameters=(
         Parameter("first_cosine", "", -0.02, 0.02, 0.001),

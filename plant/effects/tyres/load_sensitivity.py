@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("per_load", "", -0.4, 0.4, -0.15),)
+PARAMETERS = (Parameter("per_load", "", -0.4, 0.4, -0.15, aliases=("tyre_pdx2",)),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -21,6 +22,8 @@ EFFECT = Effect(
     title="Grip falls faster or slower with the load",
     equation="p_Dx2' = p_Dx2 + e",
     injection_points=("tyre_pdx2",),
+    acts_when=Excitation.MOVING,
+    baseline_section="tyre",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="S: -0.16 in the PAC2002 sample",

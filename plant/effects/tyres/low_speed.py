@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("damping", "", -0.95, 1.0, -0.6),)
+PARAMETERS = (Parameter("damping", "", -0.95, 1.0, -0.6, aliases=("tyre_low_speed_damping_ns_m",)),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -21,6 +22,8 @@ EFFECT = Effect(
     title="Damping of the contact at walking pace off",
     equation="k' = k (1+e)",
     injection_points=("tyre_low_speed_damping_ns_m",),
+    acts_when=Excitation.MOVING,
+    baseline_section="tyre",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: Pacejka 2006, section 8.6",

@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
@@ -22,6 +23,7 @@ EFFECT = Effect(
     title="Rolling resistance off",
     equation="M' = M (1+e)",
     injection_points=("wheel.rolling_torque",),
+    acts_when=Excitation.MOVING,
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="S: 0.0164 (IPG) against 0.009 of eco tyres; warms up in 15 to 30 min",

@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
@@ -22,6 +23,8 @@ EFFECT = Effect(
     title="Slip stiffness off: temperature, tread, wear",
     equation="C_k' = C_k (1+e)",
     injection_points=("tyre.stiffness",),
+    acts_when=Excitation.MOVING,
+    baseline_section="tyre",
     scope=Scope.AXLE,
     parameters=PARAMETERS,
     source="M: +-25 %; -0.5 %/K of the carcass",

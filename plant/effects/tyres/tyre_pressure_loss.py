@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
@@ -25,6 +26,7 @@ EFFECT = Effect(
     title="Air lost",
     equation="at a share s lost: C_k (1+s/4), f_rr (1+s/3), R (1-s/100)",
     injection_points=("tyre.stiffness", "wheel.rolling_torque", "wheel.radius"),
+    acts_when=Excitation.MOVING,
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="M: -30 % gives C_k +5..10 %, f_rr +10 %, R -0.3 %",

@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
-PARAMETERS = (Parameter("gain", "", -0.05, 0.05, -0.01),)
+PARAMETERS = (Parameter("gain", "", -0.05, 0.05, -0.01, part_to_part=0.0012),)
 L = slots(Scope.WHEEL, PARAMETERS)
 
 
@@ -22,6 +23,7 @@ EFFECT = Effect(
     title="Rolling radius off: wear, inflation",
     equation="R' = R (1+e)",
     injection_points=("wheel.radius",),
+    acts_when=Excitation.MOVING,
     scope=Scope.WHEEL,
     parameters=PARAMETERS,
     source="S: wheel to wheel 0.12 % (comma2k19); M: wear -1.5 %",

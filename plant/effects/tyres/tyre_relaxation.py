@@ -2,10 +2,11 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("gain", "", -0.7, 2.0, 1.0),)
+PARAMETERS = (Parameter("gain", "", -0.7, 2.0, 1.0, aliases=("tyre_lsgkp",)),)
 L = slots(Scope.CAR, PARAMETERS)
 
 
@@ -21,6 +22,8 @@ EFFECT = Effect(
     title="Relaxation length off",
     equation="sigma' = sigma (1+e)",
     injection_points=("tyre_lsgkp",),
+    acts_when=Excitation.MOVING,
+    baseline_section="tyre",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="S: 0.12 m (IPG) against 0.60 m (PAC2002 sample)",

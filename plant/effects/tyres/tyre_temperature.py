@@ -2,6 +2,7 @@
 
 from plant.compiled import equation
 from plant.effects.effect import Effect, Parameter, Scope, slots
+from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X, Y
@@ -40,6 +41,8 @@ EFFECT = Effect(
     title="Tread warms in the contact",
     equation="C_k' = C_k (1 + a dT), mu' = mu (1 + b dT), dT' = |F v_s| / C - dT / tau",
     injection_points=("tyre.stiffness", "road.friction"),
+    acts_when=Excitation.MOVING,
+    baseline_section="tyre",
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="M: -0.5 %/K of the carcass, grip within 5 % over three stops; C: tread of 1 kJ/K, 60 s",
