@@ -1,6 +1,7 @@
 """The plant as a node: demands in, sensor and truth frames out. No I/O."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from dbc.bench_messages import FaultCommand, ManoeuvreState, PhysicalFault, StimulusDriver, StimulusRoad
 from dbc.contract import Message, spec_of
@@ -16,7 +17,7 @@ from plant.injection.sensing_chain import Chain
 from plant.injection.theta import THETA, Theta
 from plant.layout import Vector
 from plant.manoeuvre import Manoeuvre, value_at
-from plant.model import NEUTRAL, STEP_S, advance, healthy, initial_state, pack
+from plant.model import NEUTRAL, STEP_S, Scene, advance, healthy, initial_state, pack
 from plant.parameters.plant import PlantParameters
 from plant.road import road_table
 from plant.sensors import Sensors
@@ -80,15 +81,15 @@ class PlantNode:
         )
         self._start = self._x.copy()
         self._external_nodes = ExternalNodes(play, parameters.motor.torque_constant_nm_a)
-        self._u, self._y, self._cut, self._switch = INPUT.zeros(), OUTPUT.zeros(), self._external_nodes.cut(), healthy()
-        self._own_road = self._road = road_table(manoeuvre.road)
+        self._u, self._y, self._switch = INPUT.zeros(), OUTPUT.zeros(), healthy()
+        self._own_road = road_table(manoeuvre.road)
+        self._scene = Scene(self._external_nodes.cut(), self._switch, self._own_road, theta, terms, plugins)
         first_speed = manoeuvre.initial_speed_mps / parameters.wheel.rolling_radius_m
         self._sensors = Sensors(parameters.sensor, parameters.motor.torque_constant_nm_a, seed, self._x, first_speed)
         self.manoeuvre_start_ns: int | None = None
         self._last_ns: int | None = None
         self._notice_ends_ns = 0
-        self._layout, self._terms, self._plugins = layout, terms, plugins
-        self._theta = self._of_manoeuvre = theta
+        self._layout, self._of_manoeuvre = layout, theta
         self.switch_effects(theta)
         self._receiver = Receiver((*DEMANDS, StimulusDriver, StimulusRoad))
         self._faults = Receiver((FaultCommand,))
@@ -135,18 +136,16 @@ class PlantNode:
         """Change the effects' numbers from this tick on; their times are of the manoeuvre's clock."""
         self._of_manoeuvre = theta
         if self.manoeuvre_start_ns is None:  # what has a time waits for the clock
-            self._theta = self._layout.shifted(theta, 1e9) if self._layout.timed(theta) else theta
+            shifted = self._layout.shifted(theta, 1e9) if self._layout.timed(theta) else theta
         else:
             begun_s = ((self._last_ns or 0) - self.manoeuvre_start_ns) * 1e-9
-            self._theta = self._layout.shifted(theta, float(self._x[X.time_s]) - begun_s)
-        self._sensors.chain = Chain(self._theta, self._layout)
+            shifted = self._layout.shifted(theta, float(self._x[X.time_s]) - begun_s)
+        self._scene = replace(self._scene, theta=shifted)
+        self._sensors.chain = Chain(shifted, self._layout)
 
     def _advance(self, elapsed_ns: int) -> None:
         steps = elapsed_ns // STEP_NS
-        advance(
-            self._x, self._u, self._cut, self._switch, self._p, self._road, self._y, steps, theta=self._theta,
-            terms=self._terms, plugins=self._plugins,
-        )  # fmt: skip
+        advance(self._x, self._u, self._p, self._y, steps, self._scene)
 
     def _take_faults(self, now_ns: int, inbox: Sequence[Received]) -> None:
         """Fault commands one by one: two may come in one tick."""
@@ -229,12 +228,14 @@ class PlantNode:
 
     def _override_road(self, now_ns: int) -> None:
         live = self._stimulus(StimulusRoad, now_ns)
-        self._road = self._own_road
+        road = self._own_road
         if isinstance(live, StimulusRoad) and any(value is not None for value in live):
-            self._road = self._own_road.copy()
+            road = self._own_road.copy()
             for column, value in enumerate(live, start=1):
                 if value is not None:
-                    self._road[:, column] = value
+                    road[:, column] = value
+        if road is not self._scene.road:
+            self._scene = replace(self._scene, road=road)
 
     def _tell(self, now_ns: int) -> list[Message]:
         """Frames of the played nodes, and the truth."""

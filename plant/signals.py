@@ -8,8 +8,9 @@ from plant.injection.plugin import NO_PLUGINS
 from plant.injection.sensing_chain import Chain
 from plant.injection.theta import THETA
 from plant.layout import Vector
-from plant.model import NEUTRAL, replay
+from plant.model import NEUTRAL, Scene, replay
 from plant.open_loop_manoeuvres import Drive
+from plant.road import DRY, road_table
 
 WHEELS = ("fl", "fr", "rl", "rr")
 CHANNELS: dict[str, tuple[str, ...]] = {  # node: its signals
@@ -34,10 +35,9 @@ def simulate(drive: Drive, theta: Vector = NEUTRAL, terms: Vector = NO_TERMS, pl
     """Signals of all cars, shape (cars, samples, len(NAMES)); one car a row of ``theta``."""
     steps = round(drive.row_s * 1e3)
     thetas = theta.reshape(-1, theta.shape[-1])
-    model = replay(
-        drive.start, drive.rows, drive.parameters, _COLUMNS, road=drive.road, steps=steps, theta=thetas, terms=terms,
-        plugins=plugins,
-    )  # fmt: skip
+    road = road_table(DRY) if drive.road is None else drive.road
+    scene = Scene(road=road, theta=thetas, terms=terms, plugins=plugins)
+    model = replay(drive.start, drive.rows, drive.parameters, _COLUMNS, scene, steps=steps)
     time_s: Vector = np.arange(len(drive.rows), dtype=np.float64) * drive.row_s
     table: Vector = np.insert(model, model.shape[2] - 1, drive.pedal, axis=2)
     for k, numbers in enumerate(thetas):

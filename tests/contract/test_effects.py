@@ -18,7 +18,7 @@ from plant.extra_states import EXTRA_STATES
 from plant.injection.theta import THETA
 from plant.injection_points import INJECTION_POINTS
 from plant.integrate import RUNGE_KUTTA_4, SEMI_IMPLICIT
-from plant.model import NEUTRAL, replay
+from plant.model import NEUTRAL, Scene, replay
 from plant.open_loop_manoeuvres import MANOEUVRES, drive
 from plant.parameters import PlantParameters
 from plant.signals import noise, simulate
@@ -220,7 +220,7 @@ def test_dissipative_effects_never_push(name):
         theta = THETA.typical(name)
         for parameter, value in zip(THETA.effect(name).strengths, corner, strict=True):
             theta[THETA.slice(name, parameter.name)] = value
-        table = replay(plan.start, plan.rows, plan.parameters, columns, theta=theta)[0]
+        table = replay(plan.start, plan.rows, plan.parameters, columns, Scene(theta=theta))[0]
         friction, rolling, omega = table[:, :4], table[:, 4:8], table[:, 8:]
         turning = np.abs(omega) > 1.0
         assert (friction * omega)[turning].max() <= 0.0
