@@ -41,8 +41,8 @@ def run(args: argparse.Namespace) -> int:
         raise BrakebenchError("--virtual has no bus and no processes: leave out --bus, --without and --realtime")
     scenario, out = args.scenario, args.out
     if args.extend is not None:
+        from hil.diagnosis.result.extended_scenario import extended_scenario
         from hil.run import new_folder
-        from hil.study.verdict.extended import extended_scenario
 
         folder = Path(out) if out else new_folder(Path(scenario).stem)
         folder.mkdir(parents=True, exist_ok=True)

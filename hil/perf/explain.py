@@ -14,6 +14,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from hil.diagnosis.explain import explain
+from hil.diagnosis.result.answer import Answer
 from hil.errors import BrakebenchError
 from hil.hide.cases import draw
 from hil.hide.files import read_answer, write
@@ -21,8 +23,6 @@ from hil.perf.rivals import NONE, RIVALS, Guess
 from hil.perf.row import Row
 from hil.perf.signatures import problem
 from hil.rt.clock import process_cpu_time_ns
-from hil.study.explain import explain
-from hil.study.verdict.answer import Answer
 
 SEED, SNR = 1, 15.0
 SINGLES = (7, 22, 37, 52)

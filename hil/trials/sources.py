@@ -5,7 +5,7 @@ from functools import cache
 from plant.compiled import PACKAGES, digest
 
 _FLOORS = ("logs", "replay", "likelihood", "fitting", "search", "verdict")
-STUDIED = (*PACKAGES, "hil.study", *(f"hil.study.{floor}" for floor in _FLOORS))
+STUDIED = (*PACKAGES, "hil.diagnosis", *(f"hil.diagnosis.{floor}" for floor in _FLOORS))
 """What an answer depends on."""
 HIDDEN = ("hil.hide",)
 """What a case depends on."""

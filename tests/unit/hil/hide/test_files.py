@@ -6,13 +6,13 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
+from hil.diagnosis.vehicle.load import load_vehicle
 from hil.hide.body import LINKS
 from hil.hide.car import NOMINAL
 from hil.hide.drive import PER_TICK, drive
 from hil.hide.files import vehicle_toml
 from hil.hide.manoeuvres import Manoeuvre
 from hil.hide.strengths import ROWS, S, Y
-from hil.study.replay.vehicle_set import load_vehicle
 from plant.model import Scene, initial_state, replay
 from plant.vectors import CUT, INPUT
 

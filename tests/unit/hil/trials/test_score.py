@@ -14,7 +14,7 @@ CHANNELS = ("ax_mps2", "wheel_speed")
 def _cause(effect: str, joint: str = "", chance: float = 0.9, onset_s: float | None = None) -> dict[str, Any]:
     numbers = {"gain": {"value": 0.11, "unit": "", "ci95": [0.09, 0.12]}}
     return {
-        "effect": effect, "joint": joint, "wheel": "car", "parameters": numbers, "probability": chance,
+        "effect": effect, "injection_point": joint, "location": "car", "parameters": numbers, "probability": chance,
         "onset_s": onset_s,
     }  # fmt: skip
 
@@ -24,9 +24,9 @@ def _record(hidden: str | list[str], named: list[str], **more: Any) -> dict[str,
     record = {
         "family": "single", "index": 0, "size": 15.0, "sources": "abc",
         "reached": True, "noise": "medium", "named": named,
-        "rivals": [], "not_testable": [], "gain": {}, "verdict": "named" if named else "none",
+        "rivals": [], "undetectable_effects": [], "held_out_error": {}, "verdict": "named" if named else "none",
         "hidden": [
-            {"effect": e, "wheel": "car", "joint": "friction.mu", "onset_s": None, "parameters": dict(number)}
+            {"effect": e, "location": "car", "injection_point": "friction.mu", "onset_s": None, "parameters": dict(number)}
             for e in effects
         ],
         "causes": [_cause(effect) for effect in named],
@@ -83,7 +83,7 @@ def test_single_cases_count_the_first_name() -> None:
 def test_the_first_name_is_asked_for_only_where_causes_can_be_told_apart() -> None:
     """A rolling resistance of the front axle and a drag of it leave a d' of 2 to 3 at a ratio of 15."""
     tied = _record("rolling_resistance", ["residual_drag"], rivals=["rolling_resistance"], noise="low")
-    tied["hidden"][0]["wheel"] = "front"
+    tied["hidden"][0]["location"] = "front"
     entry = table_of("single", [tied, _record("mass_offset", ["mass_offset"])])
     assert entry["metrics"]["top1_snr15"]["value"] == 1.0
     assert entry["metrics"]["top1_of_all_snr15"]["value"] == 0.5

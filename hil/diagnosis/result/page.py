@@ -1,0 +1,330 @@
+"""The report of a diagnosis: measured against simulated, residual patterns, candidates, held-out error, limits."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from hil.diagnosis.data.log import Floats
+from hil.diagnosis.detection.profile_fit import FittedHypothesis, delta_chi2
+from hil.diagnosis.detection.result import INDISTINGUISHABLE
+from hil.diagnosis.estimation.gauss_newton import Model
+from hil.diagnosis.result.answer import Answer
+from hil.diagnosis.result.cross_validation import HeldOutError, probabilities
+from hil.diagnosis.result.residual_patterns import UNITS, WORDS
+from hil.report.report import Chart, Curve, Number, Panel, Report, Section, Table, Trace, Verdict
+from hil.report.units import BAR, Display, Unit
+from plant.injection_points import INJECTION_POINTS
+
+_SENTENCE = {
+    "none": "Nothing beyond noise and the stated tolerances.",
+    "named": "A listed cause explains what the simulation missed.",
+    "cannot_tell_apart": "Several causes explain these data equally well.",
+    "unlisted": "No listed cause explains the data; a nonparametric term shows where it acts.",
+    "not_testable": "These manoeuvres excite too little to conclude anything.",
+}
+_SHOWN: dict[str, Unit] = {"wheel": Display("km/h", 3.6), "pressure": BAR, "motor": "N m"}
+_VARIABLES: dict[str, Unit] = {
+    "speed": Display("km/h", 3.6), "wheel_speed": "rad/s", "pressure": BAR, "disc_temperature": "K",
+    "time_since_on": "s", "time": "s", "motor_torque": "N m", "acceleration": "m/s²", "yaw_rate": "rad/s",
+    "distance": "m", "slip": "",
+}  # fmt: skip
+_PANELS = (
+    ("wheel", "Wheel speed, mean of all wheels"),
+    ("ax", "Longitudinal acceleration"),
+    ("pressure", "Pressure, mean"),
+)
+
+
+def build_report(answer: Answer, sources: Sequence[str]) -> Report:
+    """Build the report."""
+    content, diagnosis = answer.json, answer.diagnosis
+    verdict = content["verdict"]
+    return Report(
+        title="Measured data against the simulation",
+        verdict={"none": Verdict.PASSED, "named": None}.get(verdict, Verdict.INCOMPLETE),
+        reason=_headline(content),
+        numbers=tuple(_numbers(answer)),
+        sections=(
+            _comparison(answer), _missed(answer), *_curves(answer), _candidates(answer), _held_out(answer), _limits(answer),
+        ),
+        provenance={
+            "logs": list(sources), "segments": len(diagnosis.dataset.segments), "replays": diagnosis.fitter.simulator.runs,
+            "extension": content["extension"] or "not written", "remarks": content["remarks"],
+        },
+    )  # fmt: skip
+
+
+def _headline(content: dict[str, object]) -> str:
+    causes = content["causes"]
+    text = _SENTENCE[str(content["verdict"])]
+    if isinstance(causes, list) and causes:
+        named = "; ".join(f"{c['title'] if c['curve'] else c['effect']} ({c['location']})" for c in causes)
+        text = f"{named}: {text[0].lower()}{text[1:]}"
+    return text
+
+
+def _numbers(answer: Answer) -> list[Number]:
+    numbers = [Number("Verdict", answer.json["verdict"].replace("_", " "))]
+    for cause in answer.json["causes"]:
+        for name, entry in cause["parameters"].items():
+            low, high = entry["ci95"]
+            which = f" {name}" if len(cause["parameters"]) > 1 else ""
+            label = f"{cause['effect']}{which}, {cause['location']}"
+            numbers.append(Number(label, entry["value"], entry["unit"], note=f"95 %: {low:.4g} to {high:.4g}"))
+        numbers.append(Number("its probability", 100.0 * cause["probability"], "%"))
+    best = _best_reduced(answer.held_out)
+    if best is not None and best.before > 0.0:
+        note = f"{WORDS[best.channel]}, on manoeuvres no fit saw"
+        numbers.append(Number("Held-out error removed", 100.0 * (1.0 - best.after / best.before), "%", note=note))
+    return numbers
+
+
+def _best_reduced(errors: Sequence[HeldOutError]) -> HeldOutError | None:
+    shown = [g for g in errors if g.channel in ("wheel.mean", "ax", "gps", "pressure.mean", "motor.mean")]
+    return max(shown, key=lambda g: 1.0 - g.after / max(g.before, 1e-12), default=None)
+
+
+def _joined_time(answer: Answer) -> tuple[Floats, Floats]:
+    """Time over all logs, one after the other, (samples,), and where each log begins."""
+    times, gaps, begin = [], [], 0.0
+    for recording in answer.diagnosis.dataset.recordings:
+        times.append(begin + np.arange(recording.samples) * answer.diagnosis.dataset.sample_s)
+        gap = np.zeros(recording.samples, bool)
+        gap[0] = True
+        gaps.append(gap)
+        begin = float(times[-1][-1]) + 1.0
+    return np.concatenate(times), np.concatenate(gaps)
+
+
+def _mean(values: Floats) -> Floats:
+    """Mean of the known channels of each row; NaN where none is known."""
+    known = np.isfinite(values).sum(axis=1)
+    return np.asarray(np.where(known > 0, np.nansum(values, axis=1) / np.maximum(known, 1), np.nan))
+
+
+def _comparison(answer: Answer) -> Section:
+    """Measured, nominal and extended over all logs, the residuals below."""
+    diagnosis = answer.diagnosis
+    t, gaps = _joined_time(answer)
+    measured = diagnosis.fitter.simulator.measured()
+    panels = []
+    for group, title in _PANELS:
+        if group not in diagnosis.dataset.groups:
+            continue
+        factor = diagnosis.fitter.radius if group == "wheel" else 1.0
+        unit: Unit = _SHOWN.get(group, "m/s²")
+        known = _mean(measured[group]) * factor
+        shown = ~gaps & (diagnosis.fitter.masks.present.get("ax", ~gaps) > 0.5) if group == "ax" else ~gaps
+        traces = []
+        for name, model in _models(answer):
+            simulated = _mean(model.channels[group]) * factor
+            traces.append(Trace(name, t, np.where(shown, simulated, np.nan), group="rl" if name == "nominal" else "fl"))
+        traces.append(Trace("measured", t, np.where(shown, known, np.nan), "demand"))
+        panels.append(Panel(title, unit, tuple(traces)))
+        residuals = []
+        for name, model in _models(answer):
+            left = known - _mean(model.channels[group]) * factor
+            residuals.append(Trace(name, t, np.where(shown, left, np.nan), group="rl" if name == "nominal" else "fl"))
+        panels.append(Panel(f"{title.split(',')[0]}: measured less simulated", unit, tuple(residuals)))
+    return Section(
+        "Measured against simulated", panels=tuple(panels),
+        text="All logs, one after the other, simulated open loop from measured inputs; every segment restarts the speed.",
+    )  # fmt: skip
+
+
+def _models(answer: Answer) -> list[tuple[str, Model]]:
+    diagnosis = answer.diagnosis
+    extended = diagnosis.final if diagnosis.final.terms else diagnosis.base
+    return [("nominal", diagnosis.nominal), ("extended" if diagnosis.final.terms else "nuisances fitted", extended)]
+
+
+def _missed(answer: Answer) -> Section:
+    rows = tuple(
+        (
+            w.channel,
+            *_scaled(w.rms, w.track),
+            *_scaled(w.noise, w.track)[:1],
+            round(w.rms / max(w.noise, 1e-12), 1),
+            w.pattern,
+        )
+        for w in sorted(answer.patterns, key=lambda w: -w.rms / max(w.noise, 1e-12))
+    )
+    table = Table(
+        "What the nominal simulation misses", ("channel", "rms", "unit", "noise", "rms/noise", "correlates with"), rows
+    )
+    return Section("What is wrong", tables=(table,), charts=tuple(_residual_charts(answer)))
+
+
+def _scaled(value: float, track: str) -> tuple[float, str]:
+    group = track.split(".")[0]
+    if group == "pressure":
+        return float(f"{value * 1e-5:.3g}"), "bar"
+    return float(f"{value:.3g}"), UNITS[group]
+
+
+def _residual_charts(answer: Answer) -> list[Chart]:
+    """Binned residual of the acceleration over pressure and speed, nominal and extended."""
+    diagnosis = answer.diagnosis
+    if "ax" not in diagnosis.dataset.groups:
+        return []
+    pressure = np.concatenate([d.pressure_pa for d in diagnosis.dataset.recordings])
+    speed = np.concatenate([d.speed_mps for d in diagnosis.dataset.recordings])
+    known = diagnosis.fitter.masks.present["ax"] > 0.5
+    charts = []
+    for title, x, mask, label, unit in (
+        ("Acceleration residual over pressure", pressure, known, "pressure", BAR),
+        ("Acceleration residual over speed, braking", speed, known & (pressure > 3e5), "speed", Display("km/h", 3.6)),
+    ):
+        curves = []
+        for name, model in _models(answer):
+            left = model.residual["ax"][:, 0]
+            curve = _binned(x[mask], left[mask], name)
+            if curve is not None:
+                curves.append(curve)
+        if curves:
+            charts.append(Chart(title, label, unit, "measured less simulated", "m/s²", tuple(curves)))
+    return charts
+
+
+def _binned(x: Floats, y: Floats, name: str) -> Curve | None:
+    if len(x) < 100 or np.ptp(x) <= 0.0:
+        return None
+    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, 13)))
+    at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
+    rows = [
+        (x[at == k].mean(), y[at == k].mean(), y[at == k].std()) for k in range(len(edges) - 1) if (at == k).sum() > 10
+    ]
+    if len(rows) < 3:
+        return None
+    centre, mean, spread = (np.array(v) for v in zip(*rows, strict=True))
+    return Curve(name, centre, mean, mean - spread, mean + spread, group="rl" if name == "nominal" else "fl")
+
+
+def _curves(answer: Answer) -> list[Section]:
+    """The curve of a nonparametric term with its 95 % band."""
+    sections = []
+    for cause in answer.json["causes"]:
+        if not cause["curve"]:
+            continue
+        x, y, low, high = (np.array([point[key] for point in cause["curve"]]) for key in ("x", "y", "low", "high"))
+        (variable,) = cause["variables"]
+        unit = _VARIABLES.get(variable, "")
+        curve = Curve("estimate", x, y, low, high, group="fl")
+        added = INJECTION_POINTS[cause["injection_point"]][1] if cause["adds"] else ""
+        label = (
+            f"added to {cause['injection_point']}" if cause["adds"] else f"change of {cause['injection_point']}, share"
+        )
+        chart = Chart(
+            f"{cause['title']}, {cause['location']}", variable.replace("_", " "), unit, label, added, (curve,)
+        )
+        sections.append(Section("Nonparametric term", charts=(chart,), text="The band is its 95 % interval."))
+    return sections
+
+
+def _candidates(answer: Answer) -> Section:
+    """The fitted hypotheses for each cause, and the score test of all candidates."""
+    diagnosis = answer.diagnosis
+    tables, charts = [], []
+    for k, listed in enumerate(diagnosis.selections):
+        charts += _differences(f"Cause {k + 1}: Δχ² of each fitted candidate to the best", listed)
+        chances = probabilities(listed)
+        rows = tuple(
+            (
+                c.term.candidate.effect.title, c.term.candidate.name, float(f"{c.term.value:.4g}"),
+                c.term.candidate.parameter.unit, round(delta_chi2(c, listed[0]), 1), round(100.0 * p, 1),
+            )
+            for c, p in zip(listed, chances, strict=True)
+        )  # fmt: skip
+        tables.append(
+            Table(
+                f"Cause {k + 1}: profile fits",
+                ("candidate", "name", "value", "unit", "Δχ² to the best", "probability %"),
+                rows,
+                note=f"Below Δχ² {INDISTINGUISHABLE} a candidate is a rival. Δχ² is divided by the Birge ratio.",
+            )
+        )
+    top = sorted(diagnosis.scores, key=lambda s: -s.gain)[:15]
+    screened = tuple(
+        (s.candidate.name, round(s.gain, 1), float(f"{s.value:.4g}"), s.candidate.parameter.unit) for s in top
+    )
+    tables.append(
+        Table(
+            "Score test: one linear step each, nuisance parameters marginalised",
+            ("candidate", "Δχ²", "value", "unit"),
+            screened,
+            note=f"Detection threshold: Δχ² {diagnosis.detection_threshold:.0f}.",
+        )
+    )
+    bars = Curve("gain", np.arange(1.0, len(top) + 1.0), np.array([s.gain for s in top]), style="points")
+    limit = Curve(
+        "detection threshold",
+        np.array([0.5, len(top) + 0.5]),
+        np.full(2, diagnosis.detection_threshold),
+        style="demand",
+    )
+    names = tuple(s.candidate.name for s in top)
+    alone = Chart("Score test: gain of each candidate alone", "candidate", "", "Δχ²", "", (bars, limit), names)
+    return Section("Candidates", tables=tuple(tables), charts=(*charts, alone) if top else ())
+
+
+def _differences(title: str, listed: Sequence[FittedHypothesis]) -> list[Chart]:
+    """Fitted candidates for one cause, and the line below which they are rivals."""
+    if len(listed) < 2:
+        return []
+    rows = np.arange(1.0, len(listed) + 1.0)
+    fitted = Curve("fitted", rows, np.array([delta_chi2(c, listed[0]) for c in listed]), style="points", group="fl")
+    rivals = Curve("rivals below", np.array([0.5, len(listed) + 0.5]), np.full(2, INDISTINGUISHABLE), style="demand")
+    names = tuple(c.term.candidate.name for c in listed)
+    return [Chart(title, "candidate", "", "Δχ² to the best", "", (fitted, rivals), names)]
+
+
+def _held_out(answer: Answer) -> Section:
+    rows = tuple(
+        (
+            WORDS[g.channel], *_scaled(g.before, g.channel)[:1], *_scaled(g.tuned, g.channel)[:1],
+            None if g.best_wrong is None else _scaled(g.best_wrong, g.channel)[0], _scaled(g.after, g.channel)[0],
+            f"{_scaled(g.low, g.channel)[0]:.3g} to {_scaled(g.high, g.channel)[0]:.3g}",
+            _scaled(g.after, g.channel)[1],
+        )
+        for g in answer.held_out
+    )  # fmt: skip
+    table = Table(
+        "Open-loop error on manoeuvres that no fit saw (root mean square)",
+        ("channel", "nominal", "nuisances alone", "best wrong effect", "extended", "95 %", "unit"), rows,
+    )  # fmt: skip
+    return Section("Held-out error", tables=(table,), charts=_held_out_charts(answer))
+
+
+def _held_out_charts(answer: Answer) -> tuple[Chart, ...]:
+    """Held-out error of each channel as a share of the nominal error."""
+    errors = [g for g in answer.held_out if g.before > 0.0]
+    if not errors:
+        return ()
+    x = np.arange(1.0, len(errors) + 1.0)
+    before = np.array([g.before for g in errors])
+    own = np.array([g.after for g in errors]) / before
+    low, high = np.array([g.low for g in errors]) / before, np.array([g.high for g in errors]) / before
+    curves = [Curve("extended", x, own, low, high, "points", "fl")]
+    curves.append(Curve("nuisances alone", x, np.array([g.tuned for g in errors]) / before, style="points", group="rr"))
+    if all(g.best_wrong is not None for g in errors):
+        wrong = np.array([g.best_wrong for g in errors], np.float64) / before
+        curves.append(Curve("best wrong effect", x, wrong, style="points", group="rl"))
+    curves.append(Curve("nominal", np.array([0.5, len(errors) + 0.5]), np.ones(2), style="demand"))
+    title, names = "Held-out error against the nominal simulation", tuple(WORDS[g.channel] for g in errors)
+    return (Chart(title, "channel", "", "error / nominal error", "", tuple(curves), names),)
+
+
+def _limits(answer: Answer) -> Section:
+    content = answer.json
+    rows = [("undetectable in these manoeuvres", ", ".join(content["undetectable_effects"]) or "-")]
+    rows += [("missing channel", text) for text in content["missing"]]
+    rows += [("remark", text) for text in content["remarks"]]
+    if content["discriminating_manoeuvres"]:
+        rows.append(
+            (
+                "drive this to decide",
+                ", ".join(Path(one["scenario"]).stem for one in content["discriminating_manoeuvres"]),
+            )
+        )
+    return Section("What these data cannot show", tables=(Table("Limits", ("what", "which"), tuple(rows)),))
