@@ -52,7 +52,8 @@ def windup_held(windup_rad: float, speed_rad_s: float, time_s: float, limit_rad:
     """Wind-up that acts now, rad: z + tau omega, at most the sliding limit either way.
 
     The torque is -K times it and z follows with time constant tau: Coulomb friction while the wheel turns, a damped
-    spring at rest. So the brake holds on a grade without creeping, and the equations stay smooth (decision 0011).
+    spring at rest. So the brake holds on a grade without creeping, and the equations stay smooth
+    (docs/decisions/vehicle-model-and-effects.md).
     """
     return min(max(windup_rad + time_s * speed_rad_s, -limit_rad), limit_rad)
 

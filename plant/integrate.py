@@ -24,7 +24,10 @@ WORK_SHAPE = (5, max(STATE.size, OUTPUT.size))
 
 @equation
 def hold_pressure_rates(x: Vector, p: Vector) -> None:
-    """Bring rates of pressure back to their limits: one passes its limit within a step (docs/decisions/0091)."""
+    """Bring rates of pressure back to their limits: one passes its limit within a step.
+
+    See docs/decisions/simulation-speed.md.
+    """
     build, release = p[P.ehb_build_rate_pa_s], p[P.ehb_release_rate_pa_s]
     for i in range(4):
         x[X.pressure_rate_pa_s + i] = min(max(x[X.pressure_rate_pa_s + i], -release), build)
