@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from hil.errors import BrakebenchError
-from plant.effects.apply import SIZE
-from plant.effects.bank import NO_TERMS, Shape, Variable, term
 from plant.effects.effect import NODES, Effect, Scope
-from plant.effects.joints import J
-from plant.effects.places import JOINTS
-from plant.effects.places import field as place
-from plant.effects.plugin import NO_PLUGINS, table
-from plant.effects.theta import THETA, Theta
+from plant.inject import J
+from plant.injection.apply import SIZE
+from plant.injection.bank import NO_TERMS, Shape, Variable, term
+from plant.injection.plugin import NO_PLUGINS, table
+from plant.injection.theta import THETA, Theta
+from plant.injection_points import INJECTION_POINTS
+from plant.injection_points import field as place
 from plant.layout import Vector
 from plant.vectors import INPUT, OUTPUT, STATE
 
@@ -73,15 +73,15 @@ class Effects:
         """Values of a parameter of an effect, one for each of its members."""
         return self.theta[self.layout.slice(effect, parameter)]
 
-    def without(self, *joints: str) -> "Effects":
-        """The others, where those that act at some of these joints are taken out, laws of one variable included."""
+    def without(self, *injection_points: str) -> "Effects":
+        """Without those that act at some of these injection points, laws of one variable included."""
         theta, neutral = self.theta.copy(), self.layout.neutral()
-        out = [effect for effect in self.layout.effects if set(effect.joints) & set(joints)]
+        out = [effect for effect in self.layout.effects if set(effect.injection_points) & set(injection_points)]
         for effect in out:
             for name in ("onset_s", "until_s", *(parameter.name for parameter in effect.parameters)):
                 where = self.layout.slice(effect.name, name)
                 theta[where] = neutral[where]
-        at = {int(getattr(J, place(joint))) for joint in joints}
+        at = {int(getattr(J, place(point))) for point in injection_points}
         kept = [row for row in self.terms if int(row[0]) - (int(row[1]) if row[2] > 0.5 else 0) not in at]
         on = tuple(name for name in self.on if name not in {effect.name for effect in out})
         return replace(self, on=on, theta=theta, terms=np.array(kept) if kept else NO_TERMS.copy())
@@ -110,7 +110,7 @@ def read_effects(tables: Mapping[str, Any], where: str) -> Effects:
 
     In it each parameter is a number, a list (one for each member) or a table by member (``{fl = 0.2}``); ``onset_s``
     and ``until_s`` are of the manoeuvre's clock; ``at`` names the members it is to act on. Without any strength it acts
-    at its typical size. The list ``laws`` has curves of one variable at a joint, see `read_laws`.
+    at its typical size. The list ``laws`` has curves of one variable at an injection point, see `read_laws`.
 
     Raises
     ------
@@ -159,15 +159,15 @@ def _refuse_unseen(gain: float, where: str) -> None:
 
 
 def read_laws(laws: Any, where: str) -> Vector:
-    """Rows of the basis bank out of a list of tables: hats of one variable at a joint.
+    """Rows of the basis bank out of a list of tables: hats of one variable at an injection point.
 
-    Each has ``joint``, ``variable`` (of `plant.effects.bank.Variable`, lower case), ``centre``, ``width``, ``value``,
-    ``adds`` (to the joint, else a share of it) and, at joints of the wheels, ``at``, the wheels.
+    Each has ``injection_point``, ``variable`` (of `plant.injection.bank.Variable`, lower case), ``centre``, ``width``,
+    ``value``, ``adds`` (to the point, else a share of it) and, at points of the wheels, ``at``, the wheels.
 
     Raises
     ------
     EffectError
-        No such joint or variable, a number missing or no number.
+        No such injection point or variable, a number missing or no number.
     """
     rows = []
     for k, law in enumerate(laws if isinstance(laws, list) else [laws]):
@@ -178,7 +178,7 @@ def read_laws(laws: Any, where: str) -> Vector:
             value = float(law["value"])
             coefficient = [value if i in members else 0.0 for i in range(4)] if "at" in law else value
             shaped = (Variable[str(law["variable"]).upper()], Shape.HAT, float(law["centre"]), float(law["width"]))
-            rows.append(term(law["joint"], coefficient, shaped, add=bool(law.get("adds", False))))
+            rows.append(term(law["injection_point"], coefficient, shaped, add=bool(law.get("adds", False))))
         except KeyError as error:
             raise EffectError(f"{where}[{k}]: {error.args[0]!r} is missing or unknown") from error
         except (ValueError, TypeError) as error:
@@ -187,20 +187,20 @@ def read_laws(laws: Any, where: str) -> Vector:
 
 
 def written_laws(terms: Vector) -> list[dict[str, Any]]:
-    """Tables that `read_laws` makes the same rows of; for hats at joints of `plant.effects.places`.
+    """Tables that `read_laws` makes the same rows of; for hats at the points of `plant.injection_points`.
 
     Raises
     ------
     EffectError
         A row that acts on a number of the parameter set.
     """
-    begins = {int(getattr(J, place(joint))): joint for joint in JOINTS}
+    begins = {int(getattr(J, place(point))): point for point in INJECTION_POINTS}
     laws = []
     for row in terms:
         target, size, adds = int(row[0]), int(row[1]), bool(row[2] > 0.5)
         if target < 0:
-            raise EffectError("a law at a number of the parameter set; expected one at a joint")
-        law: dict[str, Any] = {"joint": begins[target - (size if adds else 0)]}
+            raise EffectError("a law at a number of the parameter set; expected one at an injection point")
+        law: dict[str, Any] = {"injection_point": begins[target - (size if adds else 0)]}
         law |= {"variable": Variable(int(row[7])).name.lower(), "adds": adds}
         law |= {"centre": float(row[9]), "width": float(row[10]), "value": float(row[3])}
         if size == len(Scope.WHEEL.members):

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from typing import Any
 
 from plant.effects.effect import Effect
-from plant.effects.manoeuvres import MANOEUVRES
-from plant.effects.places import JOINTS
+from plant.injection_points import INJECTION_POINTS
+from plant.open_loop_manoeuvres import MANOEUVRES
 
 NOT_HERE = {
     67: ("jitter", "random latency of frames: `late` of a scenario's `[[frame_faults]]`"),
@@ -13,14 +13,17 @@ NOT_HERE = {
 }
 """Rows of the catalogue that are no effect of the plant, and where they are."""
 
-PARTS = (
-    (range(1, 13), "Environment and vehicle body"),
-    (range(13, 22), "Tyre"),
-    (range(22, 41), "Friction brake"),
-    (range(41, 55), "Electro-hydraulic brake and motors"),
-    (range(55, 72), "Sensors, clocks, bus"),
-    (range(76, 77), "Beyond the catalogue"),
-)
+SUBSYSTEMS = {
+    "road_air": "Road and air",
+    "chassis": "Chassis",
+    "tyres": "Tyres",
+    "pads": "Pads, discs and calipers",
+    "hydraulics": "Pressure control and lines",
+    "motors": "Motors and battery",
+    "sensing": "Sensors and clocks",
+    "": "From outside",
+}
+"""Headings of the page, by `plant.effects.effect.Effect.subsystem`."""
 
 
 def described(effect: Effect) -> dict[str, Any]:
@@ -28,9 +31,10 @@ def described(effect: Effect) -> dict[str, Any]:
     return {
         "name": effect.name,
         "row": effect.row,
+        "subsystem": effect.subsystem,
         "title": effect.title,
         "equation": effect.equation,
-        "joints": list(effect.joints),
+        "injection_points": list(effect.injection_points),
         "scope": effect.scope.value,
         "members": list(effect.scope.members),
         "parameters": [
@@ -69,7 +73,7 @@ def text(effect: dict[str, Any]) -> str:
     lines = [
         f"{effect['name']} (row {effect['row']}): {effect['title']}",
         f"  equation    {effect['equation']}",
-        f"  joints      {', '.join(effect['joints'])}",
+        f"  injected at {', '.join(effect['injection_points'])}",
         f"  scope       {effect['scope']} ({', '.join(effect['members'])})",
         *[f"  parameter   {_number(p).replace('`', '')}" for p in effect["parameters"]],
         f"  source      {effect['source']}",
@@ -105,14 +109,18 @@ def page(effects: Iterable[Effect]) -> str:
         + "; ".join(f"{row} `{name}`: {why}" for row, (name, why) in NOT_HERE.items())
         + ".",
     ]
-    for rows, title in PARTS:
-        lines += ["", f"## {title}"]
-        for effect in sorted(known, key=lambda effect: effect["row"]):
-            if effect["row"] in rows:
-                lines += _section(effect)
-    lines += ["", "## Joints", "", "| joint | unit | what |", "|---|---|---|"]
-    lines += [f"| `{name}` | {unit} | {what} |" for name, (_, unit, what) in JOINTS.items()]
-    lines += ["", "Every number of the parameter set is a joint too, by its own name (`vehicle_mass_kg`).", ""]
+    for subsystem, title in SUBSYSTEMS.items():
+        own = sorted((one for one in known if one["subsystem"] == subsystem), key=lambda one: one["row"])
+        lines += ["", f"## {title}"] if own else []
+        for effect in own:
+            lines += _section(effect)
+    lines += ["", "## Injection points", "", "| injection point | unit | what |", "|---|---|---|"]
+    lines += [f"| `{name}` | {unit} | {what} |" for name, (_, unit, what) in INJECTION_POINTS.items()]
+    lines += [
+        "",
+        "Every number of the parameter set is an injection point too, by its own name (`vehicle_mass_kg`).",
+        "",
+    ]
     lines += ["## Manoeuvres", "", "| name | what |", "|---|---|"]
     lines += [f"| `{name}` | {show.what} |" for name, show in MANOEUVRES.items()]
     return "\n".join(lines) + "\n"
@@ -123,8 +131,8 @@ def _section(effect: dict[str, Any]) -> list[str]:
         "",
         f"### {effect['row']}. `{effect['name']}`",
         "",
-        f"{effect['title']}. `{effect['equation']}` at {', '.join(f'`{j}`' for j in effect['joints'])}; one for each "
-        f"{effect['scope']}.",
+        f"{effect['title']}. `{effect['equation']}` at {', '.join(f'`{p}`' for p in effect['injection_points'])}; "
+        f"one for each {effect['scope']}.",
         "",
         *[f"- {_number(p)}" for p in effect["parameters"]],
         f"- shows as: {effect['signature']}; in `{effect['manoeuvre']}`",

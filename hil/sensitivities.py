@@ -13,13 +13,13 @@ from hil.scenario import Scenario
 from hil.virtual import simulate as run
 from plant.effects.catalogue import BUILT_IN
 from plant.effects.effect import NODES, Effect, Scope
-from plant.effects.manoeuvres import Drive
-from plant.effects.plugin import NO_PLUGINS
-from plant.effects.signals import NAMES, noise, simulate
+from plant.injection.plugin import NO_PLUGINS
 from plant.layout import Vector
 from plant.model import pack
 from plant.node import PlantNode
+from plant.open_loop_manoeuvres import Drive
 from plant.road import road_table
+from plant.signals import NAMES, noise, simulate
 
 SHOWN = 3.0  # times the noise, over the whole manoeuvre: below, nothing is to be seen
 ALIKE = 0.995  # of the cosine between two signatures

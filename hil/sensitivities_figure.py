@@ -7,11 +7,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from hil.effects_page import PARTS
+from hil.effects_page import SUBSYSTEMS
 from hil.report.palette import INK, NEUTRAL
 from hil.sensitivities import SHOWN, Signature
-from plant.effects.catalogue import BUILT_IN
-from plant.effects.signals import CHANNELS, NAMES
+from plant.signals import CHANNELS, NAMES
 
 LEAST, MOST = 0.1, 100.0  # sigma; smaller is left white, larger saturates
 GROUPS = {
@@ -23,8 +22,7 @@ _SHORT = ("fl", "fr", "rl", "rr", "ax", "ay", "yaw rate", *("fl", "fr", "rl", "r
 
 def draw(title: str, found: list[Signature], path: Path) -> None:
     """Write the figure as PNG."""
-    parts = [([s for s in found if s.effect in BUILT_IN and s.effect.row in rows], part) for rows, part in PARTS]
-    parts.append(([s for s in found if s.effect not in BUILT_IN], "From outside"))
+    parts = [([s for s in found if s.effect.subsystem == name], title) for name, title in SUBSYSTEMS.items()]
     order = [s for signatures, _ in parts for s in signatures]
     sizes = np.array([s.sizes for s in order])
     height = 1.9 + 0.172 * len(order)

@@ -3,11 +3,10 @@
 import math
 from typing import NamedTuple
 
+from ecu.law.gravity import GRAVITY_MPS2
 from ecu.law.types import Four, Inputs
 from ecu.parameters.control import PedalParameters
 from ecu.parameters.vehicle import VehicleParameters
-
-GRAVITY_MPS2 = 9.80665
 
 
 class PedalReading(NamedTuple):

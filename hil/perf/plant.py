@@ -23,10 +23,9 @@ from hil.rt.clock import monotonic_ns
 from hil.verify.car import paper_car
 from hil.verify.right_hand_side import RightHandSide
 from plant.integrate import RUNGE_KUTTA_4, SEMI_IMPLICIT
-from plant.model import STEP_S, advance, healthy, initial_state, pack, replay
+from plant.model import STEP_S, Scene, advance, initial_state, pack, replay
 from plant.parameters import PlantParameters
-from plant.road import DRY, road_table
-from plant.vectors import BASE_RATES, CUT, INPUT, OUTPUT, RATES
+from plant.vectors import BASE_RATES, INPUT, OUTPUT, RATES
 
 Vector = NDArray[np.float64]
 DURATION_S = 2.0
@@ -59,7 +58,7 @@ def start() -> Vector:
 def run(method: int, steps: int = STEPS) -> Vector:
     """State at the end of the bend."""
     x = start()
-    advance(x, bend(), CUT.zeros(), healthy(), pack(car()), road_table(DRY), OUTPUT.zeros(), steps, STEP_S, method)
+    advance(x, bend(), pack(car()), OUTPUT.zeros(), steps, Scene(), STEP_S, method)
     return x
 
 

@@ -19,7 +19,7 @@ from hil.hide.catalogue import Hideable, find
 from hil.hide.noise import LEVELS
 from hil.hide.snr import WHEELS, difference, signal_to_noise, whitened
 from plant.effects.effect import Scope
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 _SIZES = (8.0, 15.0)
 """Signal-to-noise ratios at which the first name is asked for."""

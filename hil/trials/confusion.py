@@ -11,14 +11,14 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from hil.effects_page import PARTS
+from hil.effects_page import SUBSYSTEMS
 from hil.report.palette import INK, NEUTRAL, SEVERITY_COLOURS
 from hil.trials.metrics import Record
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 NONE = "none"
-_ROWS = {effect.name: effect.row for effect in THETA.effects}
-_PART = {row: part for rows, part in PARTS for row in rows}
+_PLACES = {effect.name: ([*SUBSYSTEMS].index(effect.subsystem), effect.row) for effect in THETA.effects}
+_TITLES = {effect.name: SUBSYSTEMS[effect.subsystem] for effect in THETA.effects}
 _OTHER = "In no list"
 _RULE = "#9AA3AC"
 _RIGHT, _WRONG = (
@@ -54,8 +54,8 @@ def draw(records: Sequence[Record], path: Path, least: float = 8.0) -> bool:
 
 
 def _ordered(names: Iterable[str]) -> list[str]:
-    """Once each, in the order of the catalogue; what is in no list comes last."""
-    return sorted(set(names), key=lambda name: (_ROWS.get(name, 10**6), name))
+    """Once each, by subsystem and row of the catalogue; what is in no list comes last."""
+    return sorted(set(names), key=lambda name: (_PLACES.get(name, (len(SUBSYSTEMS), 0)), name))
 
 
 def _cells(axes: Axes, counts: Counter[tuple[str, str]], rows: list[str], columns: list[str]) -> None:
@@ -100,7 +100,7 @@ def _labels(axes: Axes, rows: list[str], columns: list[str]) -> None:
 
 def _blocks(names: list[str]) -> list[tuple[int, int, str]]:
     """First, one after the last, and title of each part of the catalogue that occurs."""
-    parts = ["" if name == NONE else _PART.get(_ROWS.get(name, 0), _OTHER) for name in names]
+    parts = ["" if name == NONE else _TITLES.get(name, _OTHER) for name in names]
     starts = [k for k in range(len(parts)) if k == 0 or parts[k] != parts[k - 1]]
     return [(a, b, parts[a]) for a, b in zip(starts, [*starts[1:], len(parts)], strict=True)]
 

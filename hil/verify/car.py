@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from hil.parameters import load_set
 from plant.integrate import SEMI_IMPLICIT
 from plant.layout import Vector
-from plant.model import initial_state, pack, replay
+from plant.model import Scene, initial_state, pack, replay
 from plant.parameters import PlantParameters
 from plant.road import DRY, RoadSegment, road_table
-from plant.vectors import INPUT
+from plant.vectors import CUT, INPUT
 
 ROW_S = 0.01
 WHEELS = ("fl", "fr", "rl", "rr")
@@ -72,9 +72,8 @@ def drive(
     names = [n.replace("*", w) for n in columns for w in (WHEELS if n.endswith("*") else ("",))]
     start = initial_state(car, speed_mps, disc_temperature_k, state_of_charge)
     steps = round(ROW_S / step_s)
-    result = replay(
-        start, table, pack(car), names, road=road_table(road), step_s=step_s, steps=steps, method=method, cut=cut
-    )
+    scene = Scene(cut=CUT.zeros() if cut is None else cut, road=road_table(road))
+    result = replay(start, table, pack(car), names, scene, step_s=step_s, steps=steps, method=method)
     return Run(names, result[0])
 
 

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.law.compiled import entry
+from ecu.law.gravity import GRAVITY_MPS2
 from ecu.law.joint.kalman import keep_in_bounds, predict, start
 from ecu.law.joint.layout import (
     AX,
     AY,
     BIAS,
     FORCE_LAG,
-    G0,
     GRADE,
     LAST_WHEEL,
     LOAD_ACCELERATION,
@@ -105,8 +105,8 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     else:
         ax, uncertainty = expected_acceleration(s, p, force, side_n) + s[BIAS], EXPECTED_MPS2
         s[LOAD_ACCELERATION] += min(dt / 0.05, 1.0) * (ax - s[BIAS] - s[LOAD_ACCELERATION])
-    lateral = rear_m * yaw_rate - s[SPEED] * ay / (G0 * p[P_CORNER])
-    acceleration = ax - s[BIAS] - G0 * s[GRADE] + yaw_rate * lateral
+    lateral = rear_m * yaw_rate - s[SPEED] * ay / (GRAVITY_MPS2 * p[P_CORNER])
+    acceleration = ax - s[BIAS] - GRAVITY_MPS2 * s[GRADE] + yaw_rate * lateral
     predict(s, p, acceleration, uncertainty, dt)
     speed = s[SPEED]
     loads, along, spin = np.empty(4), np.empty(4), np.zeros(4)

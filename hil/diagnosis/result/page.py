@@ -14,7 +14,7 @@ from hil.diagnosis.result.cross_validation import HeldOutError, probabilities
 from hil.diagnosis.result.residual_patterns import UNITS, WORDS
 from hil.report.report import Chart, Curve, Number, Panel, Report, Section, Table, Trace, Verdict
 from hil.report.units import BAR, Display, Unit
-from plant.effects.places import JOINTS
+from plant.injection_points import INJECTION_POINTS
 
 _SENTENCE = {
     "none": "Nothing beyond noise and the stated tolerances.",
@@ -211,7 +211,7 @@ def _curves(answer: Answer) -> list[Section]:
         (variable,) = cause["variables"]
         unit = _VARIABLES.get(variable, "")
         curve = Curve("estimate", x, y, low, high, group="fl")
-        added = JOINTS[cause["injection_point"]][1] if cause["adds"] else ""
+        added = INJECTION_POINTS[cause["injection_point"]][1] if cause["adds"] else ""
         label = (
             f"added to {cause['injection_point']}" if cause["adds"] else f"change of {cause['injection_point']}, share"
         )

@@ -11,7 +11,7 @@ from hil.scenario import load_scenario
 from hil.sensitivities import alike, recorded, signatures
 from hil.virtual import simulate
 from plant.effects.catalogue import BUILT_IN
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 ROOT = Path(__file__).parents[3]
 WHERE = "a.toml: effects"
@@ -43,9 +43,16 @@ def test_at_names_the_members():
     assert effects.theta[THETA.slice("stuck_corner", "held_pa")].tolist() == [0.0] * 4
 
 
-def test_what_acts_at_a_joint_is_taken_out_and_all_else_left():
-    law = {"joint": "friction.mu", "variable": "speed", "centre": 10.0, "width": 5.0, "value": 0.1, "at": ["rl"]}
-    drag = law | {"joint": "body.force", "value": -50.0, "adds": True}
+def test_what_acts_at_an_injection_point_is_taken_out_and_all_else_left():
+    law = {
+        "injection_point": "friction.mu",
+        "variable": "speed",
+        "centre": 10.0,
+        "width": 5.0,
+        "value": 0.1,
+        "at": ["rl"],
+    }
+    drag = law | {"injection_point": "body.force", "value": -50.0, "adds": True}
     del drag["at"]
     weak = {"pad_mu_gain": {"gain": -0.3, "onset_s": 2.0}, "mass_offset": {"mass_kg": 90.0}}
     all_of_it = read_effects({**weak, "laws": [law, drag]}, WHERE)

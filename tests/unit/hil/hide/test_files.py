@@ -13,7 +13,7 @@ from hil.hide.drive import PER_TICK, drive
 from hil.hide.files import vehicle_toml
 from hil.hide.manoeuvres import Manoeuvre
 from hil.hide.strengths import ROWS, S, Y
-from plant.model import initial_state, replay
+from plant.model import Scene, initial_state, replay
 from plant.vectors import CUT, INPUT
 
 
@@ -84,7 +84,7 @@ def test_a_body_as_told_moves_as_the_hidden_one(told, pressure_pa, motor_nm):
     vehicle = load_vehicle(told)
     start = initial_state(vehicle.parameters, 30.0, 350.0, 0.6)
     columns = ["wheel_load_n_fl", "wheel_load_n_rl", "pitch_rad"]
-    simulated = replay(start, inputs, vehicle.p, columns, cut=cut)[0][begins - 5 :]
+    simulated = replay(start, inputs, vehicle.p, columns, Scene(cut=cut))[0][begins - 5 :]
     true = np.column_stack((outputs[:, Y.load_n], outputs[:, Y.load_n + 2], hidden[:, S.pitch_rad]))[begins - 5 :]
     apart = simulated - true
     apart[:, 2] -= apart[0, 2]  # what lift pitches, the hidden sensor has beside this state
