@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dbc.lean_cantools import cantools
-from dbc.sieve import Sieved, sieve
+from dbc.supported_subset import Sieved, sieve
 
 MAX_TEXT_BYTES = 16 * 1024 * 1024
 

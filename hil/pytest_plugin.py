@@ -23,8 +23,8 @@ import pytest
 if TYPE_CHECKING:
     from dbc.contract import Message
     from dbc.frame import Frame
-    from hil.result import Floats, Signals
-    from hil.session import Session
+    from hil.bench.result import Floats, Signals
+    from hil.bench.session import Session
 
 STOPPED_MPS = 0.05
 _SESSION: "pytest.StashKey[Session]" = pytest.StashKey()
@@ -83,7 +83,7 @@ class FaultAccess:
     @property
     def names(self) -> tuple[str, ...]:
         """Faults by name."""
-        from hil.scenario import FAULT_NAMES
+        from hil.scenario.scenario import FAULT_NAMES
 
         return FAULT_NAMES
 
@@ -156,8 +156,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture
 def bench(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> "Iterator[Session]":
-    """A bench of the test's own: see `hil.session.Session`."""
-    from hil.session import Session, real_rig, virtual_rig
+    """A bench of the test's own: see `hil.bench.session.Session`."""
+    from hil.bench.session import Session, real_rig, virtual_rig
 
     options = request.config.option
     bus, no_ecu = options.brakebench_bus, options.brakebench_no_ecu

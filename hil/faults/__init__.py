@@ -1,1 +1,1 @@
-"""Faults of signals and frames, one family a file, deterministic by seed."""
+"""Takes frames and gives them with faults, deterministic by seed: one family a file."""

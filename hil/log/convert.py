@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from hil.log.atomic_write import written_whole
 from hil.log.frames import FrameFlag, FrameTable, LogError, Recording
 from hil.log.read import read_log
-from hil.log.whole import written_whole
 from hil.log.write import FORMATS, NAMELESS, channel_numbers, write_log
 
 TOLERANCE_NS = 1000  # text formats keep microseconds

@@ -9,9 +9,9 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
+from hil.log.atomic_write import written_whole
 from hil.log.decode import DecodedLog
 from hil.log.frames import LogError
-from hil.log.whole import written_whole
 
 SUFFIXES = (".parquet", ".csv")
 CELLS_PER_BATCH = 4_000_000

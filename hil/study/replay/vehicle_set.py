@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hil.parameters import ParameterError, is_number, load_set, override
+from hil.scenario.parameters import ParameterError, is_number, load_set, override
 from hil.study.logs.table import UnusableError
 from hil.study.replay.nuisances import Nuisance, guessed, listed
 from hil.study.replay.scatter import lagging, scattered

@@ -18,7 +18,7 @@ import numpy as np
 
 from dbc.bench_messages import ManoeuvreState
 from hil.errors import BrakebenchError
-from hil.scenario import Scenario, find_scenario, load_scenario, scenario_names
+from hil.scenario.scenario import Scenario, find_scenario, load_scenario, scenario_names
 from hil.study.fitting.candidates import Candidate, Column, candidates, columns
 from hil.study.fitting.linear import project, sums, track_columns
 from hil.study.likelihood.estimate import first_guess

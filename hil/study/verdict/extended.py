@@ -7,7 +7,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
-from hil.scenario import find_scenario
+from hil.scenario.scenario import find_scenario
 from hil.study.logs.table import UnusableError
 from hil.study.verdict.extension import load_extension
 
@@ -25,7 +25,7 @@ def extended_scenario(name: str, extension: Path, folder: Path) -> Path:
 
     Raises
     ------
-    UnusableError, hil.scenario_table.ScenarioError
+    UnusableError, hil.scenario.table.ScenarioError
         An extension file or a scenario that cannot be used, or nothing in the extension that a simulation can have.
     """
     load_extension(extension)  # refuses what no car can have

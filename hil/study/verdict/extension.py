@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hil.effects import EffectError, read_laws, written_laws
+from hil.scenario.effects import EffectError, read_laws, written_laws
 from hil.study.logs.table import Floats, UnusableError
 from hil.study.replay.world import World
 from plant.effects.bank import NO_TERMS

@@ -7,7 +7,7 @@ import pytest
 
 from hil.cli import trials
 from hil.errors import BrakebenchError
-from hil.trials.run import plan
+from hil.validation.blind_trials.run import plan
 
 
 def run(*words):
@@ -54,8 +54,8 @@ def test_a_file_that_cannot_be_written_is_refused_before_anything_is_measured(op
     def never(*_):
         raise AssertionError("measured")
 
-    monkeypatch.setattr("hil.trials.own_error.measure", never)
-    monkeypatch.setattr("hil.trials.apart.measure", never)
+    monkeypatch.setattr("hil.validation.blind_trials.discrepancy_table.measure", never)
+    monkeypatch.setattr("hil.validation.blind_trials.separability.measure", never)
     path = tmp_path / "nowhere" / "measured.toml"
     with pytest.raises(BrakebenchError, match=r"measured.toml.*cannot be written"):
         run(option, path)
@@ -65,7 +65,7 @@ def test_a_measurement_that_breaks_leaves_the_file_as_it_was(tmp_path, monkeypat
     def breaks(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hil.trials.apart.measure", breaks)
+    monkeypatch.setattr("hil.validation.blind_trials.separability.measure", breaks)
     path = tmp_path / "measured.toml"
     path.write_text("before")
     with pytest.raises(KeyboardInterrupt):

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil.effects import EffectError, read_laws, written_laws
-from hil.scenario import load_scenario
+from hil.scenario.effects import EffectError, read_laws, written_laws
+from hil.scenario.scenario import load_scenario
 from hil.study.replay.vehicle_set import paper_car
 from hil.study.replay.world import nominal
 from hil.study.search.basis import LAWS, PIECES, Curve, curve_of, places, shown

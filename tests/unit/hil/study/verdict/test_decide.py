@@ -4,12 +4,12 @@ import json
 
 import pytest
 
+from hil.bench.result import measure
+from hil.bench.virtual import simulate
 from hil.errors import BrakebenchError
-from hil.result import measure
-from hil.scenario import load_scenario, scenario_names
+from hil.scenario.scenario import load_scenario, scenario_names
 from hil.study.verdict.decide import FOLDER, MOST, STRAIGHT_STOP, decide_with, separation, write
 from hil.study.verdict.tied import APART
-from hil.virtual import simulate
 
 pytestmark = pytest.mark.slow
 TIED = [

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from hil.scenario import load_scenario
+from hil.scenario.scenario import load_scenario
 from hil.study.logs.table import UnusableError
 from hil.study.verdict.extended import extended_scenario
 from plant.effects.theta import THETA
