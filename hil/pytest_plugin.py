@@ -83,7 +83,7 @@ class FaultAccess:
     @property
     def names(self) -> tuple[str, ...]:
         """Faults by name."""
-        from hil.scenario.scenario import FAULT_NAMES
+        from hil.faults.physical import FAULT_NAMES
 
         return FAULT_NAMES
 

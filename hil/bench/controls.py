@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterable
 
 from dbc.bench_messages import PhysicalFault
 from dbc.frame import Frame
-from hil.bench.stimulus import ALL_WHEELS, WHEELS, Channel, Director, FaultEvent
+from hil.bench.stimulus import Channel, Director
 from hil.errors import BrakebenchError
-from hil.scenario.scenario import FAULT_NAMES
+from hil.faults.physical import ALL_WHEELS, FAULT_NAMES, WHEELS, FaultEvent
 
 SPEED_UNITS = {"km/h": 1.0 / 3.6, "m/s": 1.0}
 

@@ -1,7 +1,6 @@
 """The bench as a node: sends the stimulus on the manoeuvre's clock, and follows the truth."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from threading import Lock
 
@@ -17,10 +16,9 @@ from dbc.bench_messages import (
 from dbc.contract import Message, spec_of
 from dbc.exchange import Receiver, Transmitter
 from dbc.frame import Frame, Received
+from hil.faults.physical import FaultEvent
 from plant.manoeuvre import Trace, value_at
 
-WHEELS = ("fl", "fr", "rl", "rr")
-ALL_WHEELS = 0b1111
 BENCH_PHASE_NS = 2_500_000  # after the plant, before the controller: each hears the stimulus at its next tick
 _OPENING_FRAMES = 3  # fault commands without a fault: the receiver's sequence stands before one counts
 
@@ -39,16 +37,6 @@ class Channel(StrEnum):
 
 _DRIVER = (Channel.PEDAL, Channel.SPEED, Channel.STEERING)
 _ROAD = (Channel.FRICTION_LEFT, Channel.FRICTION_RIGHT, Channel.GRADE)
-
-
-@dataclass(frozen=True, slots=True)
-class FaultEvent:
-    """A physical fault that is switched on (or off) at a time of the manoeuvre; ``wheels`` has bit 0 for fl."""
-
-    at_s: float
-    fault: PhysicalFault
-    wheels: int = ALL_WHEELS
-    active: bool = True
 
 
 class Director:

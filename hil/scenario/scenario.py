@@ -14,8 +14,8 @@ from dbc.bench_messages import PhysicalFault
 from dbc.contract import contract
 from dbc.frame import BusName
 from ecu.parameters.ecu import EcuParameters
-from hil.bench.stimulus import ALL_WHEELS, WHEELS, FaultEvent
 from hil.faults.frames import FrameFaults
+from hil.faults.physical import ALL_WHEELS, FAULT_NAMES, WHEELS, FaultEvent
 from hil.scenario.effects import Effects, read_effects
 from hil.scenario.parameters import load_set, override
 from hil.scenario.table import Files, ScenarioError, Table, as_number
@@ -26,7 +26,6 @@ from plant.road import DRY, RoadSegment
 
 DEFAULT_SCENARIO = "stop72"
 LONGEST_S = 3600.0
-FAULT_NAMES = tuple(fault.name.lower() for fault in PhysicalFault if fault is not PhysicalFault.NONE)
 EXPECTABLE = (
     "stop_distance_m",
     "stop_time_s",
