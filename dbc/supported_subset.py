@@ -29,7 +29,7 @@ class Block:
 
 
 @dataclass(slots=True)
-class Sieved:
+class SupportedText:
     """Text whose unsound statements are blanked out, its messages, and what was wrong."""
 
     text: str
@@ -41,7 +41,7 @@ class Sieved:
         return "\n".join(self.text[a:b] for a, b in block.spans) + "\n"
 
 
-def sieve(text: str) -> Sieved:
+def supported_subset(text: str) -> SupportedText:
     """Find the messages of a DBC and blank out what no CAN frame can carry.
 
     Taken out: identifiers beyond 11 or 29 bits, messages longer than a CAN FD frame, signals of no bit, of more
@@ -106,7 +106,7 @@ def sieve(text: str) -> Sieved:
             owner.spans.append(match.span())
             continue
         _blank(letters, match)
-    return Sieved("".join(letters), blocks, warnings)
+    return SupportedText("".join(letters), blocks, warnings)
 
 
 def _message_problem(block: Block) -> str | None:

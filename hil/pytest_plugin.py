@@ -157,12 +157,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture
 def bench(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> "Iterator[Session]":
     """A bench of the test's own: see `hil.bench.session.Session`."""
-    from hil.bench.session import Session, real_rig, virtual_rig
+    from hil.bench.session import Session, real_run, virtual_run
 
     options = request.config.option
     bus, no_ecu = options.brakebench_bus, options.brakebench_no_ecu
     real = bool(bus or options.brakebench_realtime or no_ecu)
-    make = real_rig(bus or "auto", ("ecu",) if no_ecu else ()) if real else virtual_rig
+    make = real_run(bus or "auto", ("ecu",) if no_ecu else ()) if real else virtual_run
     session = Session(make, _folder(request, tmp_path_factory), f"Test {request.node.nodeid}", options.brakebench_limit)
     request.node.stash[_SESSION] = session
     running = request.config.stash[_OPEN]

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.law.compiled import entry, helper
+from ecu.law.constants import GRAVITY_MPS2
 
 Vector = NDArray[np.float64]
 
@@ -51,7 +52,6 @@ P_THRESHOLD, P_MU, P_C1, P_C2, P_C3, P_CORNER = range(13, 19)
 Q_RATE, Q_FORCE, Q_TORQUE, R_OMEGA, R_FORCE = range(19, 24)
 P_K_WINDOW, P_K_LIMIT, P_FORCE_MIN, P_MU_WINDOW, P_DELAY, P_PRESSURE_MIN, P_SPEED_MIN, ROAD, P_DIVE = range(24, 33)
 
-G0 = 9.80665
 SPEED_GAIN, OFFSET_GAIN = 5.0, 5.0  # reference speed while the wheels roll free: 1/s, 1/s2
 
 
@@ -178,7 +178,7 @@ def paper_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
 
     # reference speed: the wheels while they roll free, the acceleration while they slip
     braking = z[DEMAND] > 0.0
-    level = ax / (1.0 + G0 * p[P_DIVE])
+    level = ax / (1.0 + GRAVITY_MPS2 * p[P_DIVE])
     s[SPEED] += dt * (level - s[OFFSET])
     if braking:
         s[SPEED] = max(s[SPEED], fastest * radius)
@@ -192,7 +192,7 @@ def paper_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     s[LOAD_ACCELERATION] += min(dt / 0.05, 1.0) * (ax - s[LOAD_ACCELERATION])
     base = p[P_BASE]
     rear_m = base - p[P_FRONT]
-    lateral = rear_m * yaw_rate - speed * ay / (G0 * p[P_CORNER])
+    lateral = rear_m * yaw_rate - speed * ay / (GRAVITY_MPS2 * p[P_CORNER])
     model = np.empty(4)
     along_x = np.empty(4)
     body_x = 0.0
@@ -202,7 +202,7 @@ def paper_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
         left = 1.0 if i % 2 == 0 else -1.0
         arm = rear_m if axle == 0 else p[P_FRONT]
         end = 1.0 if axle == 0 else -1.0
-        load = 0.5 * p[P_MASS] * (G0 * arm / base - end * s[LOAD_ACCELERATION] * p[P_HEIGHT] / base)
+        load = 0.5 * p[P_MASS] * (GRAVITY_MPS2 * arm / base - end * s[LOAD_ACCELERATION] * p[P_HEIGHT] / base)
         load -= left * arm / base * p[P_MASS] * ay * p[P_HEIGHT] / p[P_TRACK + axle]
         angle = steer if axle == 0 else 0.0
         ground = speed - yaw_rate * left * 0.5 * p[P_TRACK + axle]
@@ -218,7 +218,7 @@ def paper_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
         body_y += fl * np.sin(angle) + fs * np.cos(angle)
 
     # correction factor (12), over a window, held where it cannot be told
-    resistance = 0.5 * p[P_DRAG] * speed * speed + p[P_MASS] * G0 * p[P_ROLL]
+    resistance = 0.5 * p[P_DRAG] * speed * speed + p[P_MASS] * GRAVITY_MPS2 * p[P_ROLL]
     sensed_x = p[P_MASS] * ax + resistance
     sensed_y = p[P_MASS] * ay
     sensed = sqrt(sensed_x * sensed_x + sensed_y * sensed_y)

@@ -1,4 +1,4 @@
-"""A run of one scenario as transitions between named states; a broken rig stays broken.
+"""A run of one scenario as transitions between named states; a broken run stays broken.
 
 What carries it is left to `hil.bench.real` (processes on buses) and `hil.bench.virtual` (nodes in one process, in
 virtual time); all else is the same.
@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Self
 
 from dbc.bench_messages import ManoeuvreState
-from hil.bench.stimulus import Director
+from hil.bench.stimulus import StimulusNode
 from hil.errors import BrakebenchError
 from hil.rt.process import Child, StopSignal
 from hil.scenario.scenario import Scenario
@@ -44,7 +44,7 @@ class BenchError(BrakebenchError):
     exit_code = 3
 
 
-class Rig(ABC):
+class BenchRun(ABC):
     """One run of one scenario.
 
     Parameters
@@ -57,7 +57,7 @@ class Rig(ABC):
 
     Attributes
     ----------
-    director : the bench's own node.
+    stimulus_node : the bench's own node.
     state, reason : where the run is, and why it is broken.
     spec, note : what carries it, and why that.
     real_time : whether time passes by itself; else only in `tick`.
@@ -76,7 +76,7 @@ class Rig(ABC):
         self.out = out
         self.log = out / "recording.log"
         self.alive_at_end = 0
-        self.director = Director(scenario.blending, scenario.faults)
+        self.stimulus_node = StimulusNode(scenario.blending, scenario.faults)
         self.hold_timeout_ns = HOLD_TIMEOUT_NS
         self._seed = seed
         self._say = say
@@ -99,7 +99,7 @@ class Rig(ABC):
 
     @abstractmethod
     def _pass_period(self) -> int:
-        """Let one period of the director pass; its time, ns. Raises `BenchError` where the bench broke."""
+        """Let one period of the stimulus node pass; its time, ns. Raises `BenchError` where the bench broke."""
 
     @abstractmethod
     def _end(self) -> None:
@@ -148,12 +148,12 @@ class Rig(ABC):
         if self._stop_signal is not None and self._stop_signal.asked:
             self.state = BenchState.INTERRUPTED
             return
-        motion = self.director.motion
+        motion = self.stimulus_node.motion
         if motion is None or motion.manoeuvre is ManoeuvreState.HOLDING:
             if now_ns > self.hold_timeout_ns:
                 raise BenchError("the manoeuvre did not start: the plant never saw valid demands of an ECU")
             return
-        self.state = BenchState.FINISHED if self.director.finished else BenchState.DRIVING
+        self.state = BenchState.FINISHED if self.stimulus_node.finished else BenchState.DRIVING
         if now_ns // 1_000_000_000 != self._second:
             self._second = now_ns // 1_000_000_000
             self._say(f"driving: {(motion.speed_mps or 0.0) * 3.6:5.1f} km/h, {motion.distance_m or 0.0:6.1f} m")

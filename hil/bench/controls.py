@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 
 from dbc.bench_messages import PhysicalFault
 from dbc.frame import Frame
-from hil.bench.stimulus import Channel, Director
+from hil.bench.stimulus import Channel, StimulusNode
 from hil.errors import BrakebenchError
 from hil.faults.physical import ALL_WHEELS, FAULT_NAMES, WHEELS, FaultEvent
 
@@ -37,8 +37,8 @@ def wheels_of(wheel: str | Iterable[str] | None) -> int:
     return sum(1 << WHEELS.index(name) for name in set(names))
 
 
-class Commands:
-    """Commands to a director; those given before there is one wait for it.
+class RunControls:
+    """Commands to a stimulus node; those given before there is one wait for it.
 
     Attributes
     ----------
@@ -48,13 +48,13 @@ class Commands:
     def __init__(self) -> None:
         self.fault_s: float | None = None
         self._first_speed_mps = 20.0
-        self._director: Director | None = None
-        self._early: list[Callable[[Director], None]] = []
+        self._stimulus_node: StimulusNode | None = None
+        self._early: list[Callable[[StimulusNode], None]] = []
 
     def drive(self, speed: str | float) -> None:
         """Hold a speed while the pedal is free; before the start also the speed the car starts with."""
         mps = speed_of(speed)
-        if self._director is None:
+        if self._stimulus_node is None:
             self._first_speed_mps = mps
         self._command(lambda d: d.move(Channel.SPEED, mps))
 
@@ -87,10 +87,10 @@ class Commands:
             Channel.GRADE: grade,
         }
 
-        def change(director: Director) -> None:
+        def change(stimulus_node: StimulusNode) -> None:
             for channel, value in new.items():
                 if value is not None:
-                    director.move(channel, value)
+                    stimulus_node.move(channel, value)
 
         self._command(change)
 
@@ -112,7 +112,7 @@ class Commands:
         if fault not in FAULT_NAMES:
             raise SessionError(f"fault {fault!r}: expected one of {', '.join(FAULT_NAMES)}")
         kind, wheels = PhysicalFault[fault.upper()], wheels_of(wheel)
-        at_s = (0.0 if self._director is None else self._director.next_s) + after
+        at_s = (0.0 if self._stimulus_node is None else self._stimulus_node.next_s) + after
         self._command(lambda d: d.plan(FaultEvent(at_s, kind, wheels, active)))
         return at_s
 
@@ -120,21 +120,21 @@ class Commands:
         """Send frames of anybody, as they are, on the bus they name."""
         self._command(lambda d: d.also_send(frames))
 
-    def _command(self, command: Callable[[Director], None]) -> None:
-        if self._director is None:
+    def _command(self, command: Callable[[StimulusNode], None]) -> None:
+        if self._stimulus_node is None:
             self._early.append(command)
         else:
-            command(self._director)
+            command(self._stimulus_node)
 
-    def _take(self, director: Director) -> None:
-        """Give the director what waited for it; it takes all later commands at once."""
+    def _take(self, stimulus_node: StimulusNode) -> None:
+        """Give the stimulus node what waited for it; it takes all later commands at once."""
         for command in self._early:
-            command(director)
-        self._director = director
+            command(stimulus_node)
+        self._stimulus_node = stimulus_node
 
 
-def _move_from_rest(director: Director, channel: Channel, value: float, within_s: float) -> None:
+def _move_from_rest(stimulus_node: StimulusNode, channel: Channel, value: float, within_s: float) -> None:
     """Ramp from 0 where the channel was not stimulated before."""
-    if director.value(channel) is None:
-        director.move(channel, 0.0)
-    director.move(channel, value, within_s)
+    if stimulus_node.value(channel) is None:
+        stimulus_node.move(channel, 0.0)
+    stimulus_node.move(channel, value, within_s)

@@ -7,34 +7,34 @@ import numpy as np
 
 from dbc.contract import Message, spec_of
 from dbc.frame import BusName, Frame
-from hil.bench.bench_run import Rig
-from hil.bench.controls import Commands, SessionError
+from hil.bench.bench_run import BenchRun
+from hil.bench.controls import RunControls, SessionError
 from hil.bench.result import RunResult, Signals, measure
 
 M = TypeVar("M", bound=Message)
 CRAWL_MPS = 1.0  # below it a stop ends: motors fade out, the car comes to rest
 
 
-class Findings(Commands):
-    """What the rig's director hears, and what its recorder writes."""
+class RunMonitor(RunControls):
+    """What a run's stimulus node hears, and what its recorder writes."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._rig: Rig | None = None
+        self._bench_run: BenchRun | None = None
         self._last: dict[tuple[BusName, int], bytes] = {}
         self._counts: dict[tuple[BusName, int], int] = {}
 
     @property
     def started(self) -> bool:
         """Whether the bench was brought to life."""
-        return self._rig is not None
+        return self._bench_run is not None
 
     @property
     def log(self) -> Path:
         """The recording so far."""
-        rig = self._started()
-        rig.flush()
-        return rig.log
+        bench_run = self._started()
+        bench_run.flush()
+        return bench_run.log
 
     @property
     def signals(self) -> Signals:
@@ -49,7 +49,7 @@ class Findings(Commands):
     @property
     def speed_mps(self) -> float:
         """True speed of the car now."""
-        motion = self._started().director.motion
+        motion = self._started().stimulus_node.motion
         return 0.0 if motion is None else motion.speed_mps or 0.0
 
     def latest(self, message_type: type[M]) -> M | None:
@@ -81,15 +81,15 @@ class Findings(Commands):
         held = demand[np.clip(np.searchsorted(t_demand, t_s[inside], "right") - 1, 0, None)]
         return float(np.max(held + acceleration[inside]))
 
-    def _listen(self, rig: Rig) -> None:
-        """Keep what the director heard in its last step."""
-        for item in rig.director.inbox:
+    def _listen(self, bench_run: BenchRun) -> None:
+        """Keep what the stimulus node heard in its last step."""
+        for item in bench_run.stimulus_node.inbox:
             if isinstance(item, Frame) and not item.extended:
                 key = (item.bus, item.can_id)
                 self._last[key] = item.data
                 self._counts[key] = self._counts.get(key, 0) + 1
 
-    def _started(self) -> Rig:
-        if self._rig is None:
+    def _started(self) -> BenchRun:
+        if self._bench_run is None:
             raise SessionError("the bench has not run yet; call run() or run_until() first")
-        return self._rig
+        return self._bench_run

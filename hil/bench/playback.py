@@ -68,7 +68,7 @@ class Selection:
     time_ns : int64 (n,), their stamps counted from the first, ns.
     identities : the identifiers that occur.
     code : int32 (n,), which of ``identities`` each frame has.
-    phase_ns : where in the rig's cycle the first one leaves, ns.
+    phase_ns : where in the bench's cycle the first one leaves, ns.
     left_out : frames of the log that are not sent, by reason.
     """
 

@@ -1,11 +1,11 @@
-"""The rig in real time: recorder, plant and ECU as processes on their buses."""
+"""The bench in real time: recorder, plant and ECU as processes on their buses."""
 
 import contextlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from dbc.frame import BusName, Frame, Received
-from hil.bench.bench_run import BenchError, BenchState, Rig, Say, silent
+from hil.bench.bench_run import BenchError, BenchRun, BenchState, Say, silent
 from hil.bench.node_process import NODE_PERIOD_NS, grants_in
 from hil.bench.stimulus import BENCH_PHASE_NS
 from hil.bus.bus import Bus
@@ -22,16 +22,16 @@ SETTLE_NS = 500_000_000  # how long a bench keeps recording after a process died
 NODES = ("plant", "ecu")
 
 
-class Bench(Rig):
+class RealBench(BenchRun):
     """Starts, watches and stops recorder, plant and ECU for one scenario.
 
     Parameters
     ----------
-    scenario, out, seed, say, stop : as of `Rig`.
+    scenario, out, seed, say, stop : as of `BenchRun`.
     bus : vehicle bus, or ``auto``.
     realtime : as of the commands ``plant`` and ``ecu``.
     without : nodes that somebody else puts on the bus: ``plant``, ``ecu``.
-    whole : the director hears the vehicle bus too, and may send there.
+    whole : the stimulus node hears the vehicle bus too, and may send there.
     """
 
     def __init__(
@@ -125,11 +125,11 @@ class Bench(Rig):
         return now_ns
 
     def _direct(self) -> int:
-        """One tick of the director; its time, ns."""
+        """One tick of the stimulus node; its time, ns."""
         tick = next(self._ticks)
         self._release(tick.now_ns)
         received: list[Received] = [item for bus in self._buses.values() for item in bus.receive(0.0)]
-        frames: list[Frame] = self.director.step(tick.now_ns, received)
+        frames: list[Frame] = self.stimulus_node.step(tick.now_ns, received)
         for name, bus in self._buses.items():
             mine = [frame for frame in frames if frame.bus is name]
             if mine:

@@ -1,4 +1,4 @@
-"""One run from start to report: rig, measurement, expectations, files. Only the rig knows real from virtual time."""
+"""One run from start to report: bench, measurement, expectations, files; in real or virtual time alike."""
 
 import json
 import math
@@ -11,8 +11,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TextIO
 
-from hil.bench.bench_run import BenchState, Rig
-from hil.bench.real import Bench
+from hil.bench.bench_run import BenchRun, BenchState
+from hil.bench.real import RealBench
 from hil.bench.result import RunResult, Signals, measure
 from hil.bench.run_report import build_report
 from hil.bench.virtual import VirtualBench
@@ -82,20 +82,20 @@ def run_scenario(
     started_ns = wall_time_ns()
     folder = Path(out) if out else new_folder(scenario.name)
     stop = StopSignal()
-    rig: Rig
+    bench_run: BenchRun
     if virtual:
-        rig = VirtualBench(scenario, folder, seed, say, stop)
+        bench_run = VirtualBench(scenario, folder, seed, say, stop)
     else:
-        rig = Bench(scenario, bus, folder, seed, realtime, say, stop, without)
-    with rig:
-        say(f"bus {rig.spec}" + (f" ({rig.note})" if rig.note else ""))
-        rig.run()
+        bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without)
+    with bench_run:
+        say(f"bus {bench_run.spec}" + (f" ({bench_run.note})" if bench_run.note else ""))
+        bench_run.run()
     say("measuring")
     provenance = {"realtime asked for": realtime, "command line": command_line, "started": started_ns // 1_000_000_000}
-    return finish(rig, seed, provenance)
+    return finish(bench_run, seed, provenance)
 
 
-def finish(rig: Rig, seed: int, provenance: Mapping[str, object], failure: str = "") -> Outcome:
+def finish(bench_run: BenchRun, seed: int, provenance: Mapping[str, object], failure: str = "") -> Outcome:
     """Measure a run that has ended, judge it, and write its files.
 
     Parameters
@@ -103,28 +103,28 @@ def finish(rig: Rig, seed: int, provenance: Mapping[str, object], failure: str =
     provenance : what the caller knows of how it came about.
     failure : why a test on this bench failed; empty where the scenario's expectations decide.
     """
-    scenario = rig.scenario
-    signals = Signals(rig.log)
+    scenario = bench_run.scenario
+    signals = Signals(bench_run.log)
     result = measure(signals)
     met = list(expected(scenario, result, signals))
-    verdict, reason = _judge(rig, met, failure)
+    verdict, reason = _judge(bench_run, met, failure)
     report = build_report(
-        scenario.title, signals, result, verdict, reason, _provenance(scenario, rig, seed) | dict(provenance)
+        scenario.title, signals, result, verdict, reason, _provenance(scenario, bench_run, seed) | dict(provenance)
     )
     report = replace(report, numbers=report.numbers + tuple(met))
     facts = {
         "scenario": scenario.name,
         "verdict": verdict.value,
         "reason": reason,
-        "bus": rig.spec,
-        "processes": rig.alive_at_end,
-        "share_of_core": _shares(rig),
+        "bus": bench_run.spec,
+        "processes": bench_run.alive_at_end,
+        "share_of_core": _shares(bench_run),
         "seed": seed,
     }
-    facts |= _write(rig.out, report, signals)
-    code = INTERRUPTED_EXIT_CODE if rig.state is BenchState.INTERRUPTED else EXIT_CODES[verdict]
+    facts |= _write(bench_run.out, report, signals)
+    code = INTERRUPTED_EXIT_CODE if bench_run.state is BenchState.INTERRUPTED else EXIT_CODES[verdict]
     outcome = Outcome(result, report, facts, code)
-    (rig.out / "result.json").write_text(outcome.json_text() + "\n")
+    (bench_run.out / "result.json").write_text(outcome.json_text() + "\n")
     return outcome
 
 
@@ -157,10 +157,10 @@ def expected(scenario: Scenario, result: RunResult, signals: Signals) -> Iterato
         yield Number(f"{EXPECTED}{x.name}", shown, limit=f"{x.minimum:g} to {x.maximum:g}", met=met)
 
 
-def _judge(rig: Rig, expected: Sequence[Number], failure: str) -> tuple[Verdict, str]:
-    if rig.state is BenchState.BROKEN:
-        return Verdict.INCOMPLETE, rig.reason
-    if rig.state is BenchState.INTERRUPTED:
+def _judge(bench_run: BenchRun, expected: Sequence[Number], failure: str) -> tuple[Verdict, str]:
+    if bench_run.state is BenchState.BROKEN:
+        return Verdict.INCOMPLETE, bench_run.reason
+    if bench_run.state is BenchState.INTERRUPTED:
         return Verdict.INCOMPLETE, "interrupted"
     if failure:
         return Verdict.FAILED, failure
@@ -170,24 +170,26 @@ def _judge(rig: Rig, expected: Sequence[Number], failure: str) -> tuple[Verdict,
     return Verdict.PASSED, ""
 
 
-def _provenance(scenario: Scenario, rig: Rig, seed: int) -> dict[str, object]:
+def _provenance(scenario: Scenario, bench_run: BenchRun, seed: int) -> dict[str, object]:
     packages = ("brakebench", "numpy", "numba", "python-can", "cantools", "pyarrow")
     return {
         "scenario": {"name": scenario.name, "file": scenario.source, "sha256": scenario.sha256},
         "parameter sets": {"plant": scenario.plant_set, "ecu": scenario.ecu_set},
         "seed": seed,
-        "bus": rig.spec,
-        "processes": {child.name: child.error_path.read_text(errors="replace").strip() for child in rig.processes},
-        "share of a core": _shares(rig),
+        "bus": bench_run.spec,
+        "processes": {
+            child.name: child.error_path.read_text(errors="replace").strip() for child in bench_run.processes
+        },
+        "share of a core": _shares(bench_run),
         "versions": {"python": platform.python_version()} | {name: version(name) for name in packages},
         "host": {"kernel": platform.release(), "machine": platform.machine(), "processors": os.cpu_count()},
         "executable": Path(sys.executable).name,
     }
 
 
-def _shares(rig: Rig) -> dict[str, float]:
+def _shares(bench_run: BenchRun) -> dict[str, float]:
     """Processor time over time of each process, where it is known."""
-    return {c.name: round(c.share_of_core, 4) for c in rig.processes if c.share_of_core is not None}
+    return {c.name: round(c.share_of_core, 4) for c in bench_run.processes if c.share_of_core is not None}
 
 
 def _write(out: Path, report: Report, signals: Signals) -> dict[str, str]:

@@ -7,17 +7,17 @@ from threading import Condition, Thread
 from typing import Any
 
 from dbc.frame import Node
-from hil.bench.bench_run import BenchError, BenchState, Rig
+from hil.bench.bench_run import BenchError, BenchRun, BenchState
 from hil.bench.controls import SessionError
-from hil.bench.monitor import Findings
-from hil.bench.real import Bench
+from hil.bench.monitor import RunMonitor
+from hil.bench.real import RealBench
 from hil.bench.run import Outcome, finish
 from hil.bench.virtual import VirtualBench
 from hil.rt.clock import WallClock
 from hil.rt.process import interrupts_held
 from hil.scenario.scenario import Scenario, load_scenario
 
-MakeRig = Callable[[Scenario, Path, int, Mapping[str, Node]], Rig]
+MakeBenchRun = Callable[[Scenario, Path, int, Mapping[str, Node]], BenchRun]
 _SESSION = """title = {title}
 
 [start]
@@ -29,23 +29,23 @@ after_standstill_s = false
 """
 
 
-def virtual_rig(scenario: Scenario, folder: Path, seed: int, nodes: Mapping[str, Node]) -> Rig:
-    """A rig in virtual time."""
+def virtual_run(scenario: Scenario, folder: Path, seed: int, nodes: Mapping[str, Node]) -> BenchRun:
+    """A run in virtual time."""
     return VirtualBench(scenario, folder, seed, plant=nodes.get("plant"), ecu=nodes.get("ecu"))
 
 
-def real_rig(bus: str, without: Sequence[str] = ()) -> MakeRig:
+def real_run(bus: str, without: Sequence[str] = ()) -> MakeBenchRun:
     """Rigs in real time on a bus; the nodes in ``without`` are somebody else's."""
 
-    def make(scenario: Scenario, folder: Path, seed: int, nodes: Mapping[str, Node]) -> Rig:
+    def make(scenario: Scenario, folder: Path, seed: int, nodes: Mapping[str, Node]) -> BenchRun:
         if nodes:
             raise SessionError("use: a node as an object runs in virtual time only; put a process on the bus instead")
-        return Bench(scenario, bus, folder, seed, without=without, whole=True)
+        return RealBench(scenario, bus, folder, seed, without=without, whole=True)
 
     return make
 
 
-class Session(Findings):
+class Session(RunMonitor):
     """One run under command.
 
     Commands given before the first `run` act at the start of the manoeuvre, later ones at once (after, at the next tick
@@ -53,7 +53,7 @@ class Session(Findings):
 
     Parameters
     ----------
-    make_rig : builds the rig of a scenario: folder, seed, and objects in the places of nodes.
+    make_run : builds the run of a scenario: folder, seed, and objects in the places of nodes.
     folder : takes all files of the run.
     title : what the run is called in its report.
     limit_s : wall time that the session may take in all.
@@ -63,11 +63,11 @@ class Session(Findings):
     seed : of all noise; to be set before the first `run`.
     """
 
-    def __init__(self, make_rig: MakeRig, folder: Path, title: str, limit_s: float = 120.0) -> None:
+    def __init__(self, make_run: MakeBenchRun, folder: Path, title: str, limit_s: float = 120.0) -> None:
         super().__init__()
         self.seed = 1
         self.folder = folder
-        self._make_rig = make_rig
+        self._make_run = make_run
         self._title = "".join(c if c.isprintable() else "?" for c in title)
         self._limit_s = limit_s
         self._deadline_ns = 0
@@ -98,7 +98,7 @@ class Session(Findings):
     @property
     def time_s(self) -> float:
         """Manoeuvre time, s; 0 before the start."""
-        return 0.0 if self._rig is None else self._rig.director.time_s or 0.0
+        return 0.0 if self._bench_run is None else self._bench_run.stimulus_node.time_s or 0.0
 
     def run(self, seconds: float) -> None:
         """Let time pass."""
@@ -110,7 +110,7 @@ class Session(Findings):
         end = self.time_s + timeout
 
         def over() -> bool:
-            if self._rig is not None and self._rig.director.time_s is not None and condition(self):
+            if self._bench_run is not None and self._bench_run.stimulus_node.time_s is not None and condition(self):
                 return True
             if self.time_s >= end:
                 name = getattr(condition, "__name__", "the condition")
@@ -120,7 +120,7 @@ class Session(Findings):
         self._advance(over)
 
     def _advance(self, over: Callable[[], bool]) -> None:
-        rig = self._begin()
+        bench_run = self._begin()
         while not over():
             if WallClock().now_ns() > self._deadline_ns:
                 raise SessionError(
@@ -129,39 +129,41 @@ class Session(Findings):
                 )
             if self._thread is None:
                 with interrupts_held():  # a run ends between two ticks
-                    self._tick(rig)
+                    self._tick(bench_run)
             else:
                 with self._ticked:
                     self._ticked.wait(0.1)
             if self._error is not None:
                 raise self._error
-            if rig.state is BenchState.BROKEN:
-                raise BenchError(rig.reason)
-            if rig.state is BenchState.FINISHED and not over():
+            if bench_run.state is BenchState.BROKEN:
+                raise BenchError(bench_run.reason)
+            if bench_run.state is BenchState.FINISHED and not over():
                 raise SessionError(f"the scenario ended at {self.time_s:.2f} s, before what was waited for")
 
-    def _tick(self, rig: Rig) -> bool:
-        going = rig.tick()
-        self._listen(rig)
+    def _tick(self, bench_run: BenchRun) -> bool:
+        going = bench_run.tick()
+        self._listen(bench_run)
         return going
 
     # the start
 
-    def _begin(self) -> Rig:
-        if self._rig is not None:
-            return self._rig
+    def _begin(self) -> BenchRun:
+        if self._bench_run is not None:
+            return self._bench_run
         self._deadline_ns = WallClock().now_ns() + round(self._limit_s * 1e9)
         self.folder.mkdir(parents=True, exist_ok=True)
-        rig = self._make_rig(load_scenario(self._scenario or self._own_scenario()), self.folder, self.seed, self._nodes)
-        self._take(rig.director)
-        self._rig = rig
-        rig.start()
-        if rig.state is BenchState.BROKEN:
-            raise BenchError(rig.reason)
-        if rig.real_time:
-            self._thread = Thread(target=self._keep_ticking, args=(rig,), name="brakebench", daemon=True)
+        bench_run = self._make_run(
+            load_scenario(self._scenario or self._own_scenario()), self.folder, self.seed, self._nodes
+        )
+        self._take(bench_run.stimulus_node)
+        self._bench_run = bench_run
+        bench_run.start()
+        if bench_run.state is BenchState.BROKEN:
+            raise BenchError(bench_run.reason)
+        if bench_run.real_time:
+            self._thread = Thread(target=self._keep_ticking, args=(bench_run,), name="brakebench", daemon=True)
             self._thread.start()
-        return rig
+        return bench_run
 
     def _own_scenario(self) -> str:
         """File of a scenario in which nothing happens but what is commanded."""
@@ -170,11 +172,11 @@ class Session(Findings):
         path.write_text(_SESSION.format(title=title, speed=self._first_speed_mps), encoding="utf-8")
         return str(path)
 
-    def _keep_ticking(self, rig: Rig) -> None:
+    def _keep_ticking(self, bench_run: BenchRun) -> None:
         try:
             going = True
             while going:
-                going = self._tick(rig)
+                going = self._tick(bench_run)
                 with self._ticked:
                     self._ticked.notify_all()
         except BaseException as error:
@@ -184,14 +186,14 @@ class Session(Findings):
 
     def stop(self) -> None:
         """End nodes and recorder; harmless when called again."""
-        if self._rig is not None:
-            rig = self._rig
+        if self._bench_run is not None:
+            bench_run = self._bench_run
             if self._thread is not None:
-                rig.leave()
+                bench_run.leave()
                 self._thread.join()
-            rig.stop()
+            bench_run.stop()
 
     def conclude(self, provenance: dict[str, Any], failure: str = "") -> Outcome | None:
         """Stop, measure, and write figure and report; None where nothing was started."""
         self.stop()
-        return None if self._rig is None else finish(self._rig, self.seed, provenance, failure)
+        return None if self._bench_run is None else finish(self._bench_run, self.seed, provenance, failure)

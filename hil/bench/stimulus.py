@@ -39,7 +39,7 @@ _DRIVER = (Channel.PEDAL, Channel.SPEED, Channel.STEERING)
 _ROAD = (Channel.FRICTION_LEFT, Channel.FRICTION_RIGHT, Channel.GRADE)
 
 
-class Director:
+class StimulusNode:
     """The bench's own node. A step and a command may come from two threads.
 
     Parameters

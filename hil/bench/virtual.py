@@ -1,4 +1,4 @@
-"""The rig in virtual time: the same nodes, codec and protection in one process, as fast as the machine goes."""
+"""The bench in virtual time: the same nodes, codec and protection in one process, as fast as the machine goes."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -8,12 +8,12 @@ import numpy as np
 from dbc.exchange import Transmitter
 from dbc.frame import BusName, Frame, Node, Received
 from ecu.node import EcuNode
-from hil.bench.bench_run import HOLD_TIMEOUT_NS, BenchError, BenchState, Rig, Say, silent
+from hil.bench.bench_run import HOLD_TIMEOUT_NS, BenchError, BenchRun, BenchState, Say, silent
 from hil.bench.node_process import ECU, NODE_PERIOD_NS, PLANT, Role
 from hil.bench.port import check_owned, owned_by
 from hil.bench.recorder import Recorder
 from hil.bench.result import Signals
-from hil.bench.stimulus import BENCH_PHASE_NS, Director
+from hil.bench.stimulus import BENCH_PHASE_NS, StimulusNode
 from hil.faults.frames import on_faulty_line
 from hil.log.frames import FrameTable, Recording
 from hil.rt.lockstep import Member, Step, lockstep
@@ -22,7 +22,7 @@ from hil.scenario.scenario import Scenario
 from plant.node import PlantNode
 
 SPEC = "virtual"
-_DIRECTOR = 2
+_STIMULUS_NODE = 2
 _FLUSH_TICKS = 500
 
 
@@ -32,14 +32,14 @@ def own_nodes(scenario: Scenario, seed: int) -> tuple[Node, Node]:
     return plant, EcuNode(scenario.ecu, NODE_PERIOD_NS)
 
 
-def members(scenario: Scenario, plant: Node, ecu: Node, director: Director, seed: int = 1) -> list[Member]:
+def members(scenario: Scenario, plant: Node, ecu: Node, stimulus_node: StimulusNode, seed: int = 1) -> list[Member]:
     """Plant, controller and bench, each at the phase it has in real time; their frames meet the scenario's faults."""
     order = scenario.start_order
     plant, ecu = (on_faulty_line(node, scenario.frame_faults, seed) for node in (plant, ecu))
     return [
         Member(plant, NODE_PERIOD_NS, PLANT.phase_ns + round(order.plant_s * 1e9)),
         Member(ecu, NODE_PERIOD_NS, ECU.phase_ns + round(order.ecu_s * 1e9)),
-        Member(director, NODE_PERIOD_NS, BENCH_PHASE_NS),
+        Member(stimulus_node, NODE_PERIOD_NS, BENCH_PHASE_NS),
     ]
 
 
@@ -65,18 +65,18 @@ def simulate(
         The manoeuvre did not start within 15 s of virtual time.
     """
     own_plant, own_ecu = own_nodes(scenario, seed)
-    director = Director(scenario.blending, scenario.faults)
+    stimulus_node = StimulusNode(scenario.blending, scenario.faults)
     frames: list[Frame] = []
     times: list[int] = []
-    for step in lockstep(members(scenario, plant or own_plant, ecu or own_ecu, director, seed)):
+    for step in lockstep(members(scenario, plant or own_plant, ecu or own_ecu, stimulus_node, seed)):
         frames += step.frames
         times += [step.now_ns] * len(step.frames)
         if each_tick is not None:
             each_tick(step)
-        if step.member == _DIRECTOR:
-            if director.finished:
+        if step.member == _STIMULUS_NODE:
+            if stimulus_node.finished:
                 break
-            if director.time_s is None and step.now_ns > HOLD_TIMEOUT_NS:
+            if stimulus_node.time_s is None and step.now_ns > HOLD_TIMEOUT_NS:
                 raise BenchError("the manoeuvre did not start: the plant never saw valid demands of an ECU")
     return Signals(Recording(Path(scenario.name), SPEC, frame_table(frames, times)))
 
@@ -129,12 +129,12 @@ class _Tap:
         return heard
 
 
-class VirtualBench(Rig):
+class VirtualBench(BenchRun):
     """Steps recorder, plant, ECU and bench in one process; its recording is the same, byte for byte, each time.
 
     Parameters
     ----------
-    scenario, out, seed, say, stop : as of `Rig`.
+    scenario, out, seed, say, stop : as of `BenchRun`.
     plant, ecu : nodes in the places of our own.
     """
 
@@ -166,14 +166,14 @@ class VirtualBench(Rig):
             given or own for given, own in zip(self._nodes, own_nodes(self.scenario, self._seed), strict=True)
         )
         self._steps = lockstep(
-            members(self.scenario, _Process(PLANT, plant), _Process(ECU, ecu), self.director, self._seed)
+            members(self.scenario, _Process(PLANT, plant), _Process(ECU, ecu), self.stimulus_node, self._seed)
         )
         self.alive_at_end = 2
 
     def _pass_period(self) -> int:
         for step in self._steps:
             self._tap.heard += step.stamped()
-            if step.member == _DIRECTOR:
+            if step.member == _STIMULUS_NODE:
                 break
         self._ticks += 1
         if self._ticks % _FLUSH_TICKS == 0:

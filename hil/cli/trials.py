@@ -47,7 +47,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--apart",
         type=Path,
         metavar="FILE",
-        help="instead: measure how far apart (d') the hidden car holds all effects into FILE",
+        help="instead: measure how far apart (d') the reference car holds all effects into FILE",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("trials"), metavar="DIR", help="cases, table and figure (default: trials)"
@@ -75,9 +75,9 @@ def run(args: argparse.Namespace) -> int:
             args.own_error, lambda: as_toml(tables(*measure(args.count, args.seed, _say)), args.count, args.seed)
         )
     if args.apart is not None:
-        from hil.validation.blind_trials import separability as apart
+        from hil.validation.blind_trials import separability
 
-        return _measured(args.apart, lambda: apart.as_toml(apart.measure(args.seed, _say), args.seed))
+        return _measured(args.apart, lambda: separability.as_toml(separability.measure(args.seed, _say), args.seed))
     families = FAMILIES if args.family is None else (args.family,)
     scored: dict[str, Any] = {}
     singles: dict[tuple[int, float], Any] = {}
@@ -97,9 +97,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _measured(path: Path, text: Callable[[], str]) -> int:
     """Write what takes long to measure; a path that cannot be written is refused before."""
-    from hil.log.atomic_write import written_whole
+    from hil.log.atomic_write import atomic_write
 
-    with written_whole(path, overwrite=True) as part:
+    with atomic_write(path, overwrite=True) as part:
         part.touch()
         part.write_text(text(), encoding="utf-8")
     return 0

@@ -9,7 +9,7 @@ from hil.log.frames import LogError
 
 
 @contextmanager
-def written_whole(path: Path, overwrite: bool = False) -> Iterator[Path]:
+def atomic_write(path: Path, overwrite: bool = False) -> Iterator[Path]:
     """Yield a temporary path beside ``path``; put it in place when the block ends without an error.
 
     Raises

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hil.validation.blind_trials.run import run_case
-from hil.validation.blind_trials.separable import told_apart
+from hil.validation.blind_trials.separable import effect_separable
 from hil.validation.blind_trials.sources import SOURCES, STUDIED
 from hil.validation.reference_car.case import Case
 from hil.validation.reference_car.cases import SEPARABLE, draw
@@ -38,7 +38,7 @@ def _singles(seed: int) -> Iterator[Case]:
     for index in np.random.default_rng(seed).permutation(len(SEPARABLE)):
         case = draw("single", int(index), seed, SNR)
         (hidden,) = case.hidden
-        if case.reached and told_apart(hidden.effect, hidden.wheel, case.noise_level, SNR):
+        if case.reached and effect_separable(hidden.effect, hidden.wheel, case.noise_level, SNR):
             yield case
 
 

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.law.compiled import entry
+from ecu.law.constants import GRAVITY_MPS2
 from ecu.law.joint.kalman import keep_in_bounds, predict, start
 from ecu.law.joint.layout import (
     AX,
     AY,
     BIAS,
     FORCE_LAG,
-    G0,
     GRADE,
     LAST_WHEEL,
     LOAD_ACCELERATION,
@@ -42,14 +42,14 @@ from ecu.law.joint.layout import (
 )
 from ecu.law.joint.measurements import balance_forces, compare_wheel_speed
 from ecu.law.joint.motion import (
+    apply_standstill,
     expected_acceleration,
     level_acceleration,
     median_wheel,
-    stand,
     watch_accelerometer,
     wheel_states,
 )
-from ecu.law.joint.sliding import LOST_S, find_speed_again, torque_of_standing_wheels, watch_wheel
+from ecu.law.joint.sliding import LOST_S, reinitialise_speed, torque_of_standing_wheels, watch_wheel
 from ecu.law.joint.torque import track_pressure_zero, update_torques, wheel_force
 
 Vector = NDArray[np.float64]
@@ -95,7 +95,7 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     force_rate = (force - s[FORCE_LAG]) / dt
     s[FORCE_LAG] = force
     if fastest <= 0.0 and s[SPEED] < 1.0:
-        stand(s, p)
+        apply_standstill(s, p)
         return s
 
     rear_m = p[P_BASE] - p[P_FRONT]
@@ -105,8 +105,8 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     else:
         ax, uncertainty = expected_acceleration(s, p, force, side_n) + s[BIAS], EXPECTED_MPS2
         s[LOAD_ACCELERATION] += min(dt / 0.05, 1.0) * (ax - s[BIAS] - s[LOAD_ACCELERATION])
-    lateral = rear_m * yaw_rate - s[SPEED] * ay / (G0 * p[P_CORNER])
-    acceleration = ax - s[BIAS] - G0 * s[GRADE] + yaw_rate * lateral
+    lateral = rear_m * yaw_rate - s[SPEED] * ay / (GRAVITY_MPS2 * p[P_CORNER])
+    acceleration = ax - s[BIAS] - GRAVITY_MPS2 * s[GRADE] + yaw_rate * lateral
     predict(s, p, acceleration, uncertainty, dt)
     speed = s[SPEED]
     loads, along, spin = np.empty(4), np.empty(4), np.zeros(4)
@@ -126,7 +126,7 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
         sliding = sliding or s[SLIDING + i] > 0.0
 
     if min(min(s[SLID_S], s[SLID_S + 1]), min(s[SLID_S + 2], s[SLID_S + 3])) > LOST_S:
-        find_speed_again(s, z, p)
+        reinitialise_speed(s, z, p)
     fast = speed > p[P_SPEED_MIN]
     learning = body and s[REPEATED_S] < FRESH_S
     if learning and pressures and fast and not sliding:

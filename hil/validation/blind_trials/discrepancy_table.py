@@ -1,4 +1,4 @@
-"""The model's own error: what candidates seem to explain on drives of the hidden car with nothing hidden."""
+"""The model's own error: what candidates seem to explain on drives of the reference car with nothing hidden."""
 
 import tomllib
 from collections import defaultdict
@@ -52,7 +52,7 @@ def measure(count: int, seed: int, say: Callable[[str], None]) -> tuple[Gains, G
             without = {name: value for name, value in vehicle.items() if not name.startswith(_SELDOM_TOLD)}
             for found, stated in ((sprung, vehicle), (unsprung, without)):
                 answer = explain(logs, stated)
-                assert isinstance(answer, Answer)  # the hidden car's logs tell forces
+                assert isinstance(answer, Answer)  # the reference car's logs tell forces
                 for key, gain in (*_of_numbers(answer.found.screened), *_of_laws(answer.found)):
                     found[key].append(gain)
         say(f"null {index}")

@@ -1,4 +1,4 @@
-"""Numbers that the hidden car and the plant call differently, and effects that only one of them has."""
+"""Numbers that the reference car and the plant call differently, and effects that only one of them has."""
 
 from collections.abc import Mapping
 from typing import Any

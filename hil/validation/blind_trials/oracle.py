@@ -31,7 +31,7 @@ def told(found: Diagnosis, hidden: Mapping[str, Any]) -> Errors | None:
 
     Returns
     -------
-    None where the plant has no such number (an amplitude at a phase, an effect that only the hidden car has).
+    None where the plant has no such number (an amplitude at a phase, an effect that only the reference car has).
     """
     places = {(c.effect.name, c.parameter.name, c.place): c for c in candidates(columns())}
     base = found.fitter.base
@@ -54,5 +54,5 @@ def untouched(case: Case) -> Errors:
         logs = Path(folder) / "logs"
         write(replace(case, hidden=()), logs)
         answered = explain(logs, logs / "vehicle.toml", settings=Settings(most_causes=0))
-    assert isinstance(answered, Answer)  # the hidden car's logs tell forces
+    assert isinstance(answered, Answer)  # the reference car's logs tell forces
     return {WORDS[gain.channel]: gain.after for gain in answered.gains}

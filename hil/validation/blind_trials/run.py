@@ -111,7 +111,7 @@ def _explained(case: Case, folder: Path, settings: Settings | None) -> tuple[Ans
             "verdict": "unusable", "why": str(error), "named": [], "causes": [], "rivals": [], "not_testable": [],
             "gain": {},
         }  # fmt: skip
-    assert isinstance(answered, Answer)  # the hidden car's logs tell forces
+    assert isinstance(answered, Answer)  # the reference car's logs tell forces
     found = answered.json
     return answered, {
         "verdict": found["verdict"], "named": [cause["effect"] for cause in found["causes"]],

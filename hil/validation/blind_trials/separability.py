@@ -1,4 +1,4 @@
-"""How far apart causes are: d' of an effect and the listed one that comes nearest, by the hidden car's own equations.
+"""How far apart causes are: d' of an effect and the listed one that comes nearest, by the reference car's equations.
 
 ``separability.toml`` holds d' for one car and drive of the full set (``brakebench trials --apart``), by effect, place,
 noise level and signal-to-noise ratio: the distance of two whitened signatures where the other effect, at any place the
@@ -27,7 +27,7 @@ _SIZES = (8.0, 15.0)
 _NOTHING = 1e-6
 _ROUNDS, _NEAR = 6, 0.7
 _ALIKE = {"pad_mu_gain": "caliper_asymmetry"}
-"""Effects of a wheel, and what the plant lists and the hidden car has not: the same but for the sign of the speed."""
+"""Effects of a wheel, and what the plant lists and the reference car lacks: the same but for the sign of the speed."""
 Vector = NDArray[np.float64]
 
 

@@ -24,10 +24,10 @@ def _table() -> Mapping[str, Mapping[str, Mapping[str, Mapping[str, tuple[float,
 def separable(record: Record) -> bool:
     """Whether the one cause a record hides can be told from every other, at the ratio it was asked for."""
     (hidden,) = record["hidden"]
-    return told_apart(hidden["effect"], hidden["wheel"], record["noise"], record["size"])
+    return effect_separable(hidden["effect"], hidden["wheel"], record["noise"], record["size"])
 
 
-def told_apart(effect: str, wheel: str, noise_level: str, size: float) -> bool:
+def effect_separable(effect: str, wheel: str, noise_level: str, size: float) -> bool:
     """Whether an effect at a place can be told from every other at a signal-to-noise ratio.
 
     True where nobody measured it: below a ratio of 8.

@@ -113,7 +113,7 @@ def _answers(of: Sequence[Path], logs: Path) -> dict[str, tuple[Guess, float]]:
     vehicle = logs / "vehicle.toml"
     begin = process_cpu_time_ns()
     answered = explain(list(of), vehicle)
-    assert isinstance(answered, Answer)  # the hidden car's logs tell forces
+    assert isinstance(answered, Answer)  # the reference car's logs tell forces
     answers = {OURS: (told(answered.json), _since_s(begin))}
     begin = process_cpu_time_ns()
     given = problem(of, vehicle)

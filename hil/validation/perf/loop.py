@@ -15,7 +15,7 @@ import can
 import ecu.node
 from dbc.exchange import Receiver, Transmitter
 from dbc.frame import BusName, Frame, Received
-from hil.bench.stimulus import Director
+from hil.bench.stimulus import StimulusNode
 from hil.bench.virtual import members, own_nodes
 from hil.rt.clock import cpu_time_ns, monotonic_ns
 from hil.rt.lockstep import Member, lockstep
@@ -71,7 +71,7 @@ def other_loop(until_ns: int) -> Iterator[Frame]:
 def _members() -> list[Member]:
     scenario = load_scenario(SCENARIO)
     scenario = replace(scenario, manoeuvre=replace(scenario.manoeuvre, wait_for_demands=False))
-    return members(scenario, *own_nodes(scenario, 1), Director(scenario.blending, scenario.faults))
+    return members(scenario, *own_nodes(scenario, 1), StimulusNode(scenario.blending, scenario.faults))
 
 
 def _ticks(member: Member, until_ns: int) -> int:

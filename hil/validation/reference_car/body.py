@@ -1,6 +1,7 @@
+"""Motion of the reference car: two tracks, load transfer with pitch, relaxed tyres, drag, road."""
+
 # mypy: disable-error-code=no-any-return
 # (elements of a vector are Any to the type checker)
-"""Motion of the hidden car: two tracks, load transfer with pitch, relaxed tyres, drag, road."""
 
 from math import atan, atan2, cos, exp, sin, sqrt, tanh
 
@@ -8,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.validation.reference_car.brake import brake_pressure_rates, friction_brake
-from hil.validation.reference_car.car import Car
+from hil.validation.reference_car.car import GRAVITY_MPS2, Car
 from hil.validation.reference_car.compiled import equation
 from hil.validation.reference_car.motors import motors
 from hil.validation.reference_car.strengths import LAW_STEER_DRAG, LAW_STEP_DRAG, LAW_WAVE_ROLLING, E, S, Y
 
 Vector = NDArray[np.float64]
-GRAVITY_MPS2, NOMINAL_LOAD_N, RELAXATION_LOAD_N = 9.81, 4000.0, 3590.0
+NOMINAL_LOAD_N, RELAXATION_LOAD_N = 4000.0, 3590.0
 SHAPE_X, SHAPE_Y, SIDE_FRICTION = 1.64, 1.35, 0.9
 FILM_S2_M3 = 0.33
 SHORTEST_S = 1.25e-3  # a tyre about to lift follows no faster: half a step

@@ -1,6 +1,7 @@
+"""Friction brakes of the reference car: pressure, clamping, pad friction, disc; with what may be hidden in them."""
+
 # mypy: disable-error-code=no-any-return
 # (elements of a vector are Any to the type checker)
-"""Friction brakes of the hidden car: pressure, clamping, pad friction, disc; with what may be hidden in them."""
 
 from math import exp, sin, tanh
 

@@ -1,9 +1,11 @@
-"""The hidden car's numbers: what an engineer would be told, and how far off the true ones may be."""
+"""The reference car's numbers: what an engineer would be told, and how far off the true ones may be."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+GRAVITY_MPS2 = 9.81
 
 REFERENCE_MU = 0.39832
 """Pad friction for which ``brake_gain_*`` is stated: at rest at 423.15 K with the nominal ``pad_*``."""
@@ -136,5 +138,5 @@ def true_car(rng: np.random.Generator) -> Car:
 
 def static_loads(car: Car) -> NDArray[np.float64]:
     """Wheel loads at rest, N: fl, fr, rl, rr."""
-    front = 0.5 * car.mass_kg * 9.81 * (car.wheelbase_m - car.cog_to_front_axle_m) / car.wheelbase_m
-    return np.array([front, front, 0.5 * car.mass_kg * 9.81 - front, 0.5 * car.mass_kg * 9.81 - front])
+    front = 0.5 * car.mass_kg * GRAVITY_MPS2 * (car.wheelbase_m - car.cog_to_front_axle_m) / car.wheelbase_m
+    return np.array([front, front, 0.5 * car.mass_kg * GRAVITY_MPS2 - front, 0.5 * car.mass_kg * GRAVITY_MPS2 - front])

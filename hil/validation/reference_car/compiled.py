@@ -1,4 +1,4 @@
-"""How the hidden car is compiled: equations inlined into one cached entry point."""
+"""How the reference car is compiled: equations inlined into one cached entry point."""
 
 import hashlib
 from collections.abc import Callable

@@ -1,6 +1,7 @@
+"""Drive the reference car through one manoeuvre: fourth-order Runge-Kutta, 2.5 ms."""
+
 # mypy: disable-error-code=no-any-return
 # (elements of a vector are Any to the type checker)
-"""Drive the hidden car through one manoeuvre: fourth-order Runge-Kutta, 2.5 ms."""
 
 from dataclasses import dataclass
 from math import floor

@@ -1,6 +1,7 @@
+"""In-wheel motors and battery of the reference car."""
+
 # mypy: disable-error-code=no-any-return
 # (elements of a vector are Any to the type checker)
-"""In-wheel motors and battery of the hidden car."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -16,6 +16,7 @@ from hil.validation.reproduce.conditions import BRAKE, Condition
 from hil.validation.reproduce.runs import Fault, Run, Vector, drive, ecu_parameters, plant_parameters
 from plant.manoeuvre import Manoeuvre
 from plant.parameters.plant import PlantParameters
+from plant.vehicle import GRAVITY_MPS2
 
 ALPHAS = (0.0, 0.3, 0.5, 0.7)
 ESTIMATION_ALPHAS = (0.0, 0.5, 0.7)
@@ -25,7 +26,6 @@ SHIFT_ALPHA = 0.5
 SLOWEST_MPS = 1.5
 SETTLED_S = 0.8
 ADAPTED = 0.10
-GRAVITY_MPS2 = 9.81
 Numbers = dict[str, float]
 
 

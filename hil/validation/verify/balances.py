@@ -8,6 +8,7 @@ from hil.validation.verify.car import ROW_S, drive, inputs, paper_car
 from hil.validation.verify.topic import Topic, below
 from plant.integrate import RUNGE_KUTTA_4
 from plant.layout import Vector
+from plant.vehicle import GRAVITY_MPS2
 
 COLUMNS = [
     "speed_mps", "lateral_speed_mps", "yaw_rate_rad_s", "yaw_rad", "wheel_speed_rad_s_*", "friction_torque_nm_*",
@@ -95,7 +96,7 @@ def topic() -> Topic:
             100.0 * float((inertia * (omega[last] - omega[0])).sum() - spin[last]) / float((inertia * omega[0]).sum()),
             0.3, "%", "of the wheels' at the start",
         ),
-        below("Weight on the wheels", 100.0 * float(weight / (mass * 9.81) - 1.0), 0.01, "%", "at the start"),
+        below("Weight on the wheels", 100.0 * float(weight / (mass * GRAVITY_MPS2) - 1.0), 0.01, "%", "at the start"),
     )  # fmt: skip
     t = run.time_s
     traces = [Trace(name, t, values) for name, values in sinks.items()]

@@ -11,8 +11,7 @@ from hil.validation.verify.car import changed, drive, inputs, paper_car
 from hil.validation.verify.topic import Topic, below
 from plant.layout import Vector
 from plant.parameters import PlantParameters
-
-GRAVITY = 9.81
+from plant.vehicle import GRAVITY_MPS2
 
 
 def effective_mass_kg(car: PlantParameters) -> float:
@@ -26,9 +25,9 @@ def coast_down_mps(car: PlantParameters, speed_mps: float, time_s: Vector) -> Ve
     A is rolling resistance over effective mass, B drag over it; lift changes the load and is left out here.
     """
     mass, v = effective_mass_kg(car), car.vehicle
-    a = v.rolling_resistance * v.mass_kg * GRAVITY / mass
+    a = v.rolling_resistance * v.mass_kg * GRAVITY_MPS2 / mass
     drag = 0.5 * v.air_density_kg_m3 * v.frontal_area_m2 * v.drag_coefficient
-    b = (drag + v.rolling_resistance_speed_s2_m2 * v.mass_kg * GRAVITY) / mass
+    b = (drag + v.rolling_resistance_speed_s2_m2 * v.mass_kg * GRAVITY_MPS2) / mass
     ratio, root = math.sqrt(b / a), math.sqrt(a * b)
     speed: Vector = np.tan(np.arctan(speed_mps * ratio) - root * time_s) / ratio
     return speed
@@ -77,7 +76,7 @@ def topic() -> Topic:
     stop = drive(table, 30.0, ["wheel_load_n_*", "acceleration_mps2", "pitch_rad"], free)
     late = slice(250, 350)
     axle = stop.four("wheel_load_n")[late][:, :2].sum(axis=1)
-    transferred = axle - v.mass_kg * GRAVITY * v.cog_to_axle_m[1] / base
+    transferred = axle - v.mass_kg * GRAVITY_MPS2 * v.cog_to_axle_m[1] / base
     lever = -v.mass_kg * stop["acceleration_mps2"][late] * v.cog_height_m / base
     numbers.append(
         below("Load transfer", 100.0 * (float(np.mean(transferred / lever)) - 1.0), 0.5, "%", "against m h a / L")

@@ -14,11 +14,11 @@ from plant.layout import Vector
 from plant.model import pack
 from plant.parameters import PlantParameters
 from plant.tyre import cornering_stiffness
+from plant.vehicle import GRAVITY_MPS2
 
 SPEEDS_MPS = (10.0, 15.0, 20.0, 25.0, 30.0)
 STEER_RAD = 0.08  # at the steering wheel: small, tyres in their linear range
 SINE_RAD, SINE_HZ = 0.25, 0.5
-GRAVITY = 9.81
 DEG_S = Display("deg/s", math.degrees(1.0))
 
 
@@ -31,7 +31,7 @@ def axle_stiffness_n_rad(car: PlantParameters) -> tuple[float, float]:
     """Cornering stiffness of both tyres of each axle at the static load, N/rad."""
     v, p = car.vehicle, pack(car)
     base = sum(v.cog_to_axle_m)
-    front, rear = (v.mass_kg * GRAVITY * other / base / 2.0 for other in (v.cog_to_axle_m[1], v.cog_to_axle_m[0]))
+    front, rear = (v.mass_kg * GRAVITY_MPS2 * other / base / 2.0 for other in (v.cog_to_axle_m[1], v.cog_to_axle_m[0]))
     return -2.0 * cornering_stiffness(front, p), -2.0 * cornering_stiffness(rear, p)
 
 
@@ -55,7 +55,7 @@ def commonroad_sine(car: PlantParameters, speed_mps: float, time_s: Vector) -> V
 
     front, rear = axle_stiffness_n_rad(car)
     v = car.vehicle
-    stiffness = (front + rear) / (v.mass_kg * GRAVITY)
+    stiffness = (front + rear) / (v.mass_kg * GRAVITY_MPS2)
     p = SimpleNamespace(
         a=v.cog_to_axle_m[0], b=v.cog_to_axle_m[1], h_s=v.cog_height_m, m=v.mass_kg, I_z=v.yaw_inertia_kg_m2,
         tire=SimpleNamespace(p_dy1=1.0, p_ky1=-stiffness),
@@ -105,8 +105,8 @@ def topic() -> Topic:
     numbers = (
         below("Yaw gain", 100.0 * worst, 1.0, "%", "largest difference from v / (L + K v2), 36 to 108 km/h"),
         below(
-            "Understeer gradient", math.degrees(slope - gradient) * GRAVITY, 0.03, "deg/g",
-            f"{math.degrees(slope) * GRAVITY:.3f} against {math.degrees(gradient) * GRAVITY:.3f} deg/g",
+            "Understeer gradient", math.degrees(slope - gradient) * GRAVITY_MPS2, 0.03, "deg/g",
+            f"{math.degrees(slope) * GRAVITY_MPS2:.3f} against {math.degrees(gradient) * GRAVITY_MPS2:.3f} deg/g",
         ),
         below("Sine amplitude", 100.0 * (amplitude - 1.0), 5.0, "%", "against CommonRoad ST"),
         below("Sine delay", delay_ms, 10.0, "ms", "ours less CommonRoad ST"),

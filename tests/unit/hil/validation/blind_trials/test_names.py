@@ -1,4 +1,4 @@
-"""Numbers of the hidden car by the plant's name: every one that can be, and the oracle's candidates with them."""
+"""Numbers of the reference car by the plant's name: every one that can be, and the oracle's candidates with them."""
 
 from hil.study.fitting.candidates import candidates, columns
 from hil.validation.blind_trials.names import numbers

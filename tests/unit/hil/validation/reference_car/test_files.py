@@ -1,4 +1,4 @@
-"""What the hidden car's set tells of its suspension: a car that dives, pitches and rolls as the hidden one."""
+"""What the reference car's set tells of its suspension: a car that dives, pitches and rolls as the hidden one."""
 
 import tomllib
 from math import pi, sqrt

@@ -22,7 +22,7 @@ def confidence_of(s: Vector, i: int, full: float) -> float:
 
 
 @entry
-def believed(
+def read_estimates(
     s: Vector, full: float
 ) -> tuple[bool, float, Four, Four, Four, float, tuple[bool, bool, bool, bool], bool]:
     """Whether it has started, speed, wheel torques, pad friction and its confidence, mass, wheels that do not turn as
