@@ -38,7 +38,7 @@ def wheels_of(wheel: str | Iterable[str] | None) -> int:
 
 
 class RunControls:
-    """Commands to a stimulus node; those given before there is one wait for it.
+    """What is asked of a stimulus node; what was asked before there is one waits for it.
 
     Attributes
     ----------
