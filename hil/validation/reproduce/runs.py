@@ -1,5 +1,6 @@
-"""One closed-loop run in virtual time, as arrays: truth, what was demanded, what the controller believed."""
+"""One closed-loop run in virtual time, as arrays: truth, what was demanded, what the controller estimated."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 
@@ -115,6 +116,76 @@ def plant_parameters() -> PlantParameters:
     return load_set(resources.files("plant.parameters") / "paper_car.toml", PlantParameters)
 
 
+class _Samples:
+    """Samples of a run as they come: what the plant said, and what the controller made of it."""
+
+    def __init__(self) -> None:
+        self._specs = {(s.bus, s.can_id): (k, s.decode) for k, s in enumerate(map(spec_of, _RECORDED))}
+        self._times_ns: list[int] = []
+        self._truth: list[list[float]] = []
+        self._estimates: list[list[float]] = []
+        self._observer: list[Vector] = []
+
+    def add_truth(self, time_ns: int, frames: Sequence[Frame]) -> None:
+        """Keep what the plant's frames hold, in the order of `_RECORDED`."""
+        row: list[list[float]] = [[] for _ in _RECORDED]
+        for frame in frames:
+            spec = self._specs.get((frame.bus, frame.can_id))
+            if spec is not None:
+                k, decode = spec
+                row[k] = [float("nan") if v is None else float(v) for v in decode(frame.data)]
+        self._truth.append([v for part in row for v in part])
+        self._times_ns.append(time_ns)
+
+    def add_estimates(self, controller: EcuNode) -> None:
+        """Keep what the controller demands and estimates after its step."""
+        m, o = controller.memory, controller.outputs
+        assert o is not None  # stepped just now
+        e = m.estimates
+        self._estimates.append(
+            [
+                o.demanded_deceleration_mps2,
+                *o.motor_demand_nm,
+                *o.pressure_demand_pa,
+                *e.wheel_torque_nm,
+                *e.pad_friction,
+                *e.confidence,
+                *m.friction,
+                e.speed_mps,
+                float(o.mode),
+            ]
+        )
+        self._observer.append(m.observer)
+
+    def as_run(self) -> Run:
+        """The samples that both have, as arrays."""
+        n = min(len(self._truth), len(self._estimates))
+        t, e = np.array(self._truth[:n]), np.array(self._estimates[:n])
+        return Run(
+            time_s=np.array(self._times_ns[:n]) * 1e-9,
+            speed_mps=t[:, 0],
+            acceleration_mps2=t[:, 1],
+            wheel_torque_nm=t[:, 4:8],
+            friction_torque_nm=t[:, 8:12],
+            pad_friction=t[:, 12:16],
+            pressure_pa=t[:, [16, 17, 19, 20]],
+            force_n=t[:, 22:26],
+            disc_temperature_k=t[:, 26:30],
+            recuperated_j=t[:, 30],
+            friction_heat_j=t[:, 31],
+            demanded_mps2=e[:, 0],
+            motor_demand_nm=e[:, 1:5],
+            pressure_demand_pa=e[:, 5:9],
+            estimated_torque_nm=e[:, 9:13],
+            estimated_friction=e[:, 13:17],
+            confidence=e[:, 17:21],
+            used_friction=e[:, 21:25],
+            estimated_speed_mps=e[:, 25],
+            observer=np.array(self._observer[:n]),
+            mode=e[:, 26],
+        )
+
+
 def drive(
     manoeuvre: Manoeuvre,
     plant: PlantParameters,
@@ -137,65 +208,15 @@ def drive(
         Member(controller, TICK_NS),
         Member(_Stimulus(blending, vehicle, faults), TICK_NS),
     ]
-    specs = {(s.bus, s.can_id): (k, s.decode) for k, s in enumerate(map(spec_of, _RECORDED))}
-    truth: list[list[float]] = []
-    belief: list[list[float]] = []
-    observer: list[Vector] = []
-    times: list[int] = []
+    samples = _Samples()
     for step in lockstep(members):
-        if vehicle.manoeuvre_start_ns is None:
+        start_ns = vehicle.manoeuvre_start_ns
+        if start_ns is None:
             continue
         if step.member == 0:
             if vehicle.state is ManoeuvreState.FINISHED:
                 break
-            row: list[list[float]] = [[] for _ in _RECORDED]
-            for frame in step.frames:
-                found = specs.get((frame.bus, frame.can_id))
-                if found is not None:
-                    k, decode = found
-                    row[k] = [float("nan") if v is None else float(v) for v in decode(frame.data)]
-            truth.append([v for part in row for v in part])
-            times.append(step.now_ns - vehicle.manoeuvre_start_ns)
-        elif step.member == 1 and step.now_ns > vehicle.manoeuvre_start_ns:
-            m, o = controller.memory, controller.outputs
-            assert o is not None  # stepped just now
-            e = m.estimates
-            belief.append(
-                [
-                    o.demanded_deceleration_mps2,
-                    *o.motor_demand_nm,
-                    *o.pressure_demand_pa,
-                    *e.wheel_torque_nm,
-                    *e.pad_friction,
-                    *e.confidence,
-                    *m.friction,
-                    e.speed_mps,
-                    float(o.mode),
-                ]
-            )
-            observer.append(m.observer)
-    n = min(len(truth), len(belief))
-    t, b = np.array(truth[:n]), np.array(belief[:n])
-    return Run(
-        time_s=np.array(times[:n]) * 1e-9,
-        speed_mps=t[:, 0],
-        acceleration_mps2=t[:, 1],
-        wheel_torque_nm=t[:, 4:8],
-        friction_torque_nm=t[:, 8:12],
-        pad_friction=t[:, 12:16],
-        pressure_pa=t[:, [16, 17, 19, 20]],
-        force_n=t[:, 22:26],
-        disc_temperature_k=t[:, 26:30],
-        recuperated_j=t[:, 30],
-        friction_heat_j=t[:, 31],
-        demanded_mps2=b[:, 0],
-        motor_demand_nm=b[:, 1:5],
-        pressure_demand_pa=b[:, 5:9],
-        estimated_torque_nm=b[:, 9:13],
-        estimated_friction=b[:, 13:17],
-        confidence=b[:, 17:21],
-        used_friction=b[:, 21:25],
-        estimated_speed_mps=b[:, 25],
-        observer=np.array(observer[:n]),
-        mode=b[:, 26],
-    )
+            samples.add_truth(step.now_ns - start_ns, step.frames)
+        elif step.member == 1 and step.now_ns > start_ns:
+            samples.add_estimates(controller)
+    return samples.as_run()
