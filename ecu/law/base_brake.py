@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from ecu.law.constants import GRAVITY_MPS2
+from ecu.law.gravity import GRAVITY_MPS2
 from ecu.law.types import Four, Inputs
 from ecu.parameters.control import PedalParameters
 from ecu.parameters.vehicle import VehicleParameters

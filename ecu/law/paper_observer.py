@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.law.compiled import entry, helper
-from ecu.law.constants import GRAVITY_MPS2
+from ecu.law.gravity import GRAVITY_MPS2
 
 Vector = NDArray[np.float64]
 

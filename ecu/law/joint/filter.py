@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.law.compiled import entry, helper
-from ecu.law.constants import GRAVITY_MPS2
+from ecu.law.gravity import GRAVITY_MPS2
 from ecu.law.joint.kalman import keep_in_bounds, predict, start
 from ecu.law.joint.layout import (
     AX,

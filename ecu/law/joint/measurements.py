@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.law.compiled import helper
-from ecu.law.constants import GRAVITY_MPS2
+from ecu.law.gravity import GRAVITY_MPS2
 from ecu.law.joint.kalman import correct
 from ecu.law.joint.layout import (
     AXLE,

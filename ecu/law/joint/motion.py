@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.law.compiled import helper
-from ecu.law.constants import GRAVITY_MPS2
+from ecu.law.gravity import GRAVITY_MPS2
 from ecu.law.joint.layout import (
     AX,
     BIAS,
