@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from hil.cli.options import add_json
-from hil.study.logs.table import UnusableError
+from hil.diagnosis.data.log import UnusableError
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -40,10 +40,10 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Explain and print."""
-    from hil.study.consistency.check import Consistency
-    from hil.study.consistency.summary import build_report as sensor_report
-    from hil.study.explain import explain
-    from hil.study.verdict.summary import build_report
+    from hil.diagnosis.explain import explain
+    from hil.diagnosis.result.page import build_report
+    from hil.diagnosis.sensor_consistency.check import Consistency
+    from hil.diagnosis.sensor_consistency.page import build_report as sensor_report
 
     def say(text: str) -> None:
         print(f"  {text} ...", file=sys.stderr)
@@ -78,6 +78,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _unusable(why: str) -> dict[str, object]:
     return {
-        "verdict": "unusable", "why": why, "causes": [], "rivals": [], "not_testable": [], "decide_with": [],
-        "wrong": [], "gain": {}, "extension": None,
+        "verdict": "unusable", "why": why, "causes": [], "rivals": [], "undetectable_effects": [], "discriminating_manoeuvres": [],
+        "residual_patterns": [], "held_out_error": {}, "extension": None,
     }  # fmt: skip

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     scenario, out = args.scenario, args.out
     if args.extend is not None:
         from hil.bench.run import new_folder
-        from hil.study.verdict.extended import extended_scenario
+        from hil.diagnosis.result.extended_scenario import extended_scenario
 
         folder = Path(out) if out else new_folder(Path(scenario).stem)
         folder.mkdir(parents=True, exist_ok=True)

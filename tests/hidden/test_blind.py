@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hil.study.search.diagnosis import Settings
+from hil.diagnosis.detection.result import Settings
 from hil.validation.blind_trials.reading import in_set
 from hil.validation.blind_trials.run import run_case
 from hil.validation.reference_car.case import Hidden, make_case
@@ -41,7 +41,7 @@ def test_a_calliper_that_grips_less_in_reverse_is_named_where_it_is_driven_so() 
     case = make_case((Hidden("caliper_asymmetry", "fr", 0.06),), SEED, "medium", "decide")
     record = run_case(case, SEED, None)
     assert record["named"][:1] == ["caliper_asymmetry"]
-    assert record["causes"][0]["wheel"] == "fr"
+    assert record["causes"][0]["location"] == "fr"
     assert record["causes"][0]["parameters"]["gain"]["value"] == pytest.approx(0.06, rel=0.2)
 
 
@@ -126,7 +126,7 @@ def test_what_is_too_large_to_overlook_is_named(effect: str, wheel: str, size: f
     record = run_case(make_case((Hidden(effect, wheel, size),), 1), 1, None)
     (cause,) = record["causes"]
     (value,) = cause["parameters"].values()
-    assert (cause["effect"], cause["wheel"]) == (effect, wheel)
+    assert (cause["effect"], cause["location"]) == (effect, wheel)
     assert value["value"] == pytest.approx(size, rel=rel)
 
 
@@ -150,7 +150,7 @@ def test_a_law_that_no_listed_effect_resembles_is_told() -> None:
     """It was answered ``none``: the best listed cause explained a third of what is asked, and no law was looked at."""
     record = run_case(draw("unlisted", 6, 68), 68, None)
     first, *_ = record["causes"]
-    assert (first["effect"], first["joint"], first["variables"]) == ("unlisted", "body.force", ["yaw_rate"])
+    assert (first["effect"], first["injection_point"], first["variables"]) == ("unlisted", "body.force", ["yaw_rate"])
 
 
 def test_a_wrong_speed_over_ground_is_no_tyre() -> None:
@@ -181,7 +181,7 @@ def test_without_the_noise_model_nothing_hidden_raises_an_alarm() -> None:
 
 def test_the_sealed_answer_is_never_opened(tmp_path: Path) -> None:
     """With the answer gone the verdict is the same."""
-    from hil.study.explain import explain
+    from hil.diagnosis.explain import explain
     from hil.validation.reference_car.files import sealed_folder, write
 
     write(draw("null", 0, SEED), tmp_path / "logs")

@@ -8,10 +8,10 @@ import one_log
 import pytest
 from outsider import STEP_S, VEHICLE, drive, logs
 
-from hil.study.explain import explain
-from hil.study.logs.table import make_log
-from hil.study.search.diagnosis import Settings
-from hil.study.verdict.extension import load_extension
+from hil.diagnosis.data.log import make_log
+from hil.diagnosis.detection.result import Settings
+from hil.diagnosis.explain import explain
+from hil.diagnosis.vehicle.extension_file import load_extension
 from plant.effects.theta import THETA
 
 
@@ -37,7 +37,7 @@ def test_a_car_that_only_rolls_says_too_little() -> None:
     """Neither brakes nor motors act: most effects would not show, so that nothing was found is no clean bill."""
     answer = explain([drive("coast", 7, _plain)], vehicle=VEHICLE).json
     assert answer["verdict"] == "not_testable"
-    assert {"pad_mu_gain", "iwm_gain"} <= set(answer["not_testable"])
+    assert {"pad_mu_gain", "iwm_gain"} <= set(answer["undetectable_effects"])
     assert not answer["causes"]
 
 
@@ -56,13 +56,13 @@ def test_a_law_in_no_list_is_shown_with_joint_variable_and_curve(tmp_path: Path)
     found = explain(logs(_bump), vehicle=VEHICLE, out=tmp_path).json
     assert found["verdict"] == "unlisted"
     cause = found["causes"][0]
-    assert (cause["effect"], cause["joint"], cause["variables"]) == ("unlisted", "friction.mu", ["speed"])
+    assert (cause["effect"], cause["injection_point"], cause["variables"]) == ("unlisted", "friction.mu", ["speed"])
     curve = cause["curve"]
     lowest = min(curve, key=lambda point: point["y"])
     assert 10.0 < lowest["x"] < 20.0
     assert -0.45 < lowest["y"] < -0.12
     assert all(point["low"] <= point["y"] <= point["high"] for point in curve)
-    assert len(load_extension(tmp_path / "extension.toml").terms) == 5
+    assert len(load_extension(tmp_path / "extension.toml").nonparametric_rows) == 5
 
 
 @pytest.mark.slow
@@ -86,7 +86,7 @@ def test_a_listed_cause_at_its_end_gives_way_to_a_law_that_explains_more() -> No
     found = explain(logs(_step), vehicle=VEHICLE).json
     assert found["verdict"] == "unlisted"
     (cause,) = found["causes"]
-    assert (cause["joint"], cause["wheel"], cause["variables"]) == ("friction.mu", "rear", ["speed"])
+    assert (cause["injection_point"], cause["location"], cause["variables"]) == ("friction.mu", "rear", ["speed"])
     slow, fast = ([p["y"] for p in cause["curve"] if low < p["x"] < low + 5.0] for low in (8.0, 19.0))
     assert np.mean(slow) == pytest.approx(0.0, abs=0.12)
     assert np.mean(fast) == pytest.approx(-0.3, abs=0.12)
@@ -120,7 +120,7 @@ def test_a_fade_that_begins_elsewhere_has_its_name_and_says_where(tmp_path: Path
     found = explain(tables, vehicle=VEHICLE, out=tmp_path).json
     assert found["verdict"] == "named"
     (cause,) = found["causes"]
-    assert (cause["effect"], cause["wheel"]) == ("pad_temp_fade", "front")
+    assert (cause["effect"], cause["location"]) == ("pad_temp_fade", "front")
     begins_k = load_extension(Path(found["extension"])).theta[THETA.slice("pad_temp_fade", "start_k")]
     assert begins_k == pytest.approx(cause["parameters"]["start_k"]["value"])
     assert cause["parameters"]["fade_1_k"]["value"] == pytest.approx(2e-3, rel=0.2)
@@ -147,7 +147,7 @@ def test_a_law_of_one_wheel_is_shown_from_one_csv(tmp_path: Path) -> None:
     found = explain(csv, vehicle=car).json
     assert found["verdict"] == "unlisted"
     (cause,) = found["causes"]
-    assert (cause["joint"], cause["wheel"], cause["variables"]) == ("friction.mu", "rl", ["speed"])
+    assert (cause["injection_point"], cause["location"], cause["variables"]) == ("friction.mu", "rl", ["speed"])
     lowest = min(cause["curve"], key=lambda point: point["y"])
     assert lowest["x"] == pytest.approx(15.0, abs=3.0)
     assert lowest["y"] == pytest.approx(-0.35, abs=0.07)
@@ -164,7 +164,7 @@ def test_pads_of_one_wheel_that_fail_in_the_middle_of_one_log_are_told_with_whee
     assert {"pad_mu_gain", "stuck_corner"} <= set(told)
     assert told["pad_mu_gain"] == pytest.approx(80.0, abs=0.1)
     assert told["stuck_corner"] == pytest.approx(80.0, abs=0.1)
-    assert cause["wheel"] == "rr"
+    assert cause["location"] == "rr"
     assert cause["onset_s"] == pytest.approx(80.0, abs=0.1)
     (value,) = (number["value"] for number in cause["parameters"].values())
     assert abs(value) == pytest.approx(0.3, abs=0.05)

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from hil.study.explain import explain, shipped
-from hil.study.logs.channel_map import load_map
-from hil.study.logs.read import read_logs
-from hil.study.logs.table import PRESSURE_DEMAND, Log
+from hil.diagnosis.data.channel_map import load_map
+from hil.diagnosis.data.log import PRESSURE_DEMAND, Log
+from hil.diagnosis.data.read import read_logs
+from hil.diagnosis.explain import explain, shipped
 
 pytestmark = [pytest.mark.slow, pytest.mark.long, pytest.mark.timeout(1800)]
 
@@ -24,7 +24,7 @@ def answer(log, tmp_path_factory):
 
 
 def _cause(answer: dict, effect: str, wheel: str) -> dict:
-    found = [c for c in answer["causes"] if c["effect"] == effect and c["wheel"] == wheel]
+    found = [c for c in answer["causes"] if c["effect"] == effect and c["location"] == wheel]
     assert found, f"{effect} of {wheel} not among {[(c['effect'], c['wheel']) for c in answer['causes']]}"
     return found[0]
 
@@ -37,14 +37,14 @@ def test_the_channels_that_lie(answer):
     ahead = _cause(answer, "imu_position", "imu")["parameters"]["x_m"]
     assert -1.2 < ahead["ci95"][0] < ahead["ci95"][1] < -0.8
     assert any("feels no road" in text for text in answer["remarks"])
-    gain = answer["gain"]["ax_mps2"]
+    gain = answer["held_out_error"]["ax_mps2"]
     assert gain["ci95"][1] < 0.05 * gain["before"]
 
 
 def test_what_the_stops_support(answer):
     gain = answer["estimates"]["deceleration_per_pressure"]
     assert 2e-6 < gain["ci95"][0] < gain["ci95"][1] < 4e-6
-    assert {"pad_temp_fade", "threshold", "valve_leak"} <= set(answer["not_testable"])
+    assert {"pad_temp_fade", "threshold", "valve_leak"} <= set(answer["undetectable_effects"])
 
 
 def test_faults_put_into_the_recording_have_their_names(log, answer):

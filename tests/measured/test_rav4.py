@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from dbc.database import parse_database
-from hil.study.explain import explain, shipped
-from hil.study.logs.channel_map import load_map
-from hil.study.logs.read import read_logs
-from hil.study.logs.table import WHEEL_SPEED, Log
+from hil.diagnosis.data.channel_map import load_map
+from hil.diagnosis.data.log import WHEEL_SPEED, Log
+from hil.diagnosis.data.read import read_logs
+from hil.diagnosis.explain import explain, shipped
 
 pytestmark = pytest.mark.slow
 
@@ -61,13 +61,13 @@ def test_the_wheels_slip_and_the_gyro_has_a_zero(answer):
 
 
 def test_held_out_the_error_falls_to_the_roads_slope(answer):
-    gain = answer["gain"]["ax_mps2"]
+    gain = answer["held_out_error"]["ax_mps2"]
     assert gain["ci95"][1] < 0.4 * gain["before"]
     assert gain["after"] < 0.5 * gain["best_wrong"]
 
 
 def test_what_needs_forces_is_refused_with_what_it_takes(answer):
-    assert {"pad_mu_gain", "mass_offset", "pad_temp_fade", "iwm_gain"} <= set(answer["not_testable"])
+    assert {"pad_mu_gain", "mass_offset", "pad_temp_fade", "iwm_gain"} <= set(answer["undetectable_effects"])
     assert "pressure" in answer["needs"]["pad_mu_gain"]
     assert json.loads(json.dumps(answer, allow_nan=False)) == answer
 
@@ -101,7 +101,7 @@ def test_a_late_accelerometer_is_named(log, answer):
     felt = np.concatenate((np.full(late, ax[0]), ax[:-late]))
     found = _again(_with(log, ax_mps2=felt), Path(answer["extension"]))
     delay = _cause(found, "timestamp_offset", "ax_mps2")
-    assert delay["wheel"] == "imu"
+    assert delay["location"] == "imu"
     assert delay["parameters"]["delay_s"]["value"] == pytest.approx(0.2, abs=0.06)
 
 
@@ -109,7 +109,7 @@ def test_a_larger_wheel_is_named(log, answer):
     name = WHEEL_SPEED[2]
     found = _again(_with(log, **{name: 0.98 * log.channels[name]}), Path(answer["extension"]))
     wheel = _cause(found, "tyre_radius", "wheel_speed_rl_rad_s")
-    assert wheel["wheel"] == "rl"
+    assert wheel["location"] == "rl"
     assert wheel["parameters"]["gain"]["value"] == pytest.approx(0.02, abs=0.004)
 
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from hil.study.logs.prepare import prepare
-from hil.study.logs.table import Log, make_log
-from hil.study.replay.rig import Rig
-from hil.study.replay.vehicle import Vehicle
-from hil.study.replay.world import nominal
+from hil.diagnosis.data.log import Log, make_log
+from hil.diagnosis.data.prepare import prepare
+from hil.diagnosis.simulation.parameter_set import nominal
+from hil.diagnosis.simulation.simulator import Simulator
+from hil.diagnosis.vehicle.spec import Vehicle
 
 WHEELS = ("fl", "fr", "rl", "rr")
 FOLLOWED = (("pressure", "pa"), ("motor_torque", "nm"))
@@ -28,7 +28,7 @@ def log_of_pulses() -> Log:
 def log_as_driven(vehicle: Vehicle, radius_m: float) -> Log:
     """The same pulses as brakes and motors follow them, so that what drives the car is what was measured."""
     log = log_of_pulses()
-    rig = Rig(prepare([log], radius_m), vehicle)
+    rig = Simulator(prepare([log], radius_m), vehicle)
     followed = [(quantity, unit, wheel) for quantity, unit in FOLLOWED for wheel in WHEELS]
     values = rig.states(nominal(vehicle), [f"state.{quantity}_{unit}_{wheel}" for quantity, unit, wheel in followed])
     told = [f"{quantity}_{wheel}_{unit}" for quantity, unit, wheel in followed]

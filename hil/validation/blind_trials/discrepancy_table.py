@@ -6,14 +6,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from hil.study.explain import explain
-from hil.study.fitting.candidates import kind_of
-from hil.study.fitting.own_error import UNLISTED, USUAL
-from hil.study.search.basis import PIECES
-from hil.study.search.diagnosis import Diagnosis
-from hil.study.search.race import LawRace
-from hil.study.search.screen import Score
-from hil.study.verdict.answer import Answer
+from hil.diagnosis.detection.group_score_test import GroupScoreTest
+from hil.diagnosis.detection.nonparametric import BASIS_SIZE
+from hil.diagnosis.detection.result import Diagnosis
+from hil.diagnosis.detection.score_test import ScoreTest
+from hil.diagnosis.estimation.model_discrepancy import UNLISTED, UNMEASURED_RATIO
+from hil.diagnosis.estimation.terms import location_kind
+from hil.diagnosis.explain import explain
+from hil.diagnosis.result.answer import Answer
 from hil.validation.reference_car.cases import draw
 from hil.validation.reference_car.files import write
 
@@ -37,10 +37,10 @@ def measure(count: int, seed: int, say: Callable[[str], None]) -> tuple[Gains, G
     Once with all that the car's set states, and once without its suspension, discs and latencies.
 
     All places count, not the better ones: the best of nine explains twice what one does by chance alone, and how many
-    looks are taken is the threshold's business (`hil.study.search.screen.threshold`). What may be on one side of
-    nothing only counts where it is there: else half its looks would be zeros, and its error seem smaller than that of
-    the same law by another name. They are taken where the whole search ends, which may have begun again from numbers
-    that explain more.
+    tests are made is the threshold's business (`hil.diagnosis.detection.score_test.detection_threshold`). What may be
+    on one side of nothing only counts where it is there: else half its tests would be zeros, and its error seem smaller
+    than that of the same term by another name. They are made where the whole search ends, which may have restarted from
+    numbers that explain more.
     """
     sprung: Gains = defaultdict(list)
     unsprung: Gains = defaultdict(list)
@@ -53,25 +53,25 @@ def measure(count: int, seed: int, say: Callable[[str], None]) -> tuple[Gains, G
             for found, stated in ((sprung, vehicle), (unsprung, without)):
                 answer = explain(logs, stated)
                 assert isinstance(answer, Answer)  # the reference car's logs tell forces
-                for key, gain in (*_of_numbers(answer.found.screened), *_of_laws(answer.found)):
+                for key, gain in (*_of_numbers(answer.diagnosis.scores), *_of_laws(answer.diagnosis)):
                     found[key].append(gain)
         say(f"null {index}")
     return sprung, unsprung
 
 
-def _of_numbers(screened: Iterable[Score]) -> Iterator[tuple[Key, float]]:
+def _of_numbers(screened: Iterable[ScoreTest]) -> Iterator[tuple[Key, float]]:
     for item in screened:
-        if item.usual > _LEAST_USUAL and item.value != 0.0:
+        if item.typical_snr > _LEAST_USUAL and item.value != 0.0:
             candidate = item.candidate
-            key = candidate.effect.name, candidate.parameter.name, kind_of(candidate.place)
-            yield key, max(item.raw - item.paid, 0.0)
+            key = candidate.effect.name, candidate.parameter.name, location_kind(candidate.location)
+            yield key, max(item.raw_gain - item.total_penalty, 0.0)
 
 
 def _of_laws(found: Diagnosis) -> Iterator[tuple[Key, float]]:
     """Gains of the laws in no list, by coefficient."""
     fitter, model = found.fitter, found.base
-    for entry in LawRace(fitter, fitter.world(model.z, ())).entries(fitter, model, found.first_noise):
-        yield (UNLISTED, entry.curve.law.name, kind_of(entry.curve.place)), entry.gain / PIECES
+    for entry in GroupScoreTest(fitter, fitter.parameter_set(model.z, ())).scores(fitter, model, found.first_noise):
+        yield (UNLISTED, entry.expansion.term.name, location_kind(entry.expansion.location)), entry.gain / BASIS_SIZE
 
 
 def ratios(gains: Gains) -> Ratios:
@@ -81,7 +81,7 @@ def ratios(gains: Gains) -> Ratios:
     """
     table: Ratios = {}
     for (effect, number, kind), values in sorted(gains.items()):
-        mean = (sum(values) + _PRIOR_CASES * USUAL**2) / (len(values) + _PRIOR_CASES)
+        mean = (sum(values) + _PRIOR_CASES * UNMEASURED_RATIO**2) / (len(values) + _PRIOR_CASES)
         table.setdefault(effect, {}).setdefault(number, {})[kind] = max(round(mean**0.5, 2), 1.0)
     return table
 
@@ -93,7 +93,7 @@ def tables(sprung: Gains, unsprung: Gains) -> dict[str, Ratios]:
     for effect, numbers in ratios(unsprung).items():
         for name, kinds in numbers.items():
             known = stated.get(effect, {}).get(name, {})
-            more = {kind: value for kind, value in kinds.items() if value > known.get(kind, USUAL)}
+            more = {kind: value for kind, value in kinds.items() if value > known.get(kind, UNMEASURED_RATIO)}
             if more:
                 larger.setdefault(effect, {})[name] = more
     return {"ratio": stated, "unsprung": larger}

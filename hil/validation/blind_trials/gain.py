@@ -32,7 +32,7 @@ def gain_of_oracle(records: Sequence[Record], mark: float | None) -> Metric:
 
 def _of_oracle(record: Record) -> float | None:
     """Errors taken away over those that the oracle takes away, each in units of what the oracle leaves."""
-    oracle, gains = record.get("oracle"), record["gain"]
+    oracle, gains = record.get("oracle"), record["held_out_error"]
     if not oracle or not gains:
         return None
     channels = [name for name in gains if oracle.get(name, 0.0) > 0.0]
@@ -44,17 +44,17 @@ def _of_oracle(record: Record) -> float | None:
 
 
 def _no_worse(record: Record) -> bool:
-    return all(g["after"] <= 1.01 * g["before"] for g in record["gain"].values())
+    return all(g["after"] <= 1.01 * g["before"] for g in record["held_out_error"].values())
 
 
 def _together_no_worse(record: Record) -> bool:
-    shares = [g["after"] / g["before"] for g in record["gain"].values() if g["before"] > 0.0]
+    shares = [g["after"] / g["before"] for g in record["held_out_error"].values() if g["before"] > 0.0]
     return float(sum(shares)) <= 1.01 * len(shares)
 
 
 def _beats_wrong(record: Record) -> bool:
     """Over all channels together, each against its own error as handed in."""
-    gains = [g for g in record["gain"].values() if g["best_wrong"] is not None and g["before"] > 0.0]
+    gains = [g for g in record["held_out_error"].values() if g["best_wrong"] is not None and g["before"] > 0.0]
     own = sum((g["after"] / g["before"]) ** 2 for g in gains)
     other = sum((g["best_wrong"] / g["before"]) ** 2 for g in gains)
     return bool(gains) and own < other

@@ -48,7 +48,7 @@ def _told(record: Record) -> str:
 
 
 def _causes(causes: Sequence[Mapping[str, Any]]) -> str:
-    return " and ".join(f"{cause['effect']}@{cause['wheel']}{_size(cause)}" for cause in causes) or "nothing hidden"
+    return " and ".join(f"{cause['effect']}@{cause['location']}{_size(cause)}" for cause in causes) or "nothing hidden"
 
 
 def _size(cause: Mapping[str, Any]) -> str:

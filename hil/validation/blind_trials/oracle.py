@@ -6,13 +6,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from hil.study.explain import explain
-from hil.study.fitting.candidates import candidates, columns
-from hil.study.fitting.fit import Fitter
-from hil.study.search.diagnosis import Diagnosis, Settings
-from hil.study.verdict.answer import Answer
-from hil.study.verdict.measure import gains
-from hil.study.verdict.patterns import WORDS
+from hil.diagnosis.detection.result import Diagnosis, Settings
+from hil.diagnosis.estimation.gauss_newton import Fitter
+from hil.diagnosis.estimation.terms import candidates, columns
+from hil.diagnosis.explain import explain
+from hil.diagnosis.result.answer import Answer
+from hil.diagnosis.result.cross_validation import held_out_error
+from hil.diagnosis.result.residual_patterns import WORDS
 from hil.validation.blind_trials.names import numbers
 from hil.validation.reference_car.case import Case
 from hil.validation.reference_car.files import write
@@ -33,19 +33,19 @@ def told(found: Diagnosis, hidden: Mapping[str, Any]) -> Errors | None:
     -------
     None where the plant has no such number (an amplitude at a phase, an effect that only the reference car has).
     """
-    places = {(c.effect.name, c.parameter.name, c.place): c for c in candidates(columns())}
+    places = {(c.effect.name, c.parameter.name, c.location): c for c in candidates(columns())}
     base = found.fitter.base
     for name, value in numbers(hidden).items():
-        candidate = places.get((hidden["effect"], name, hidden["wheel"]))
+        candidate = places.get((hidden["effect"], name, hidden["location"]))
         if candidate is None:
             return None
         base = candidate.applied(base, value)
     own = found.fitter
-    fitter = Fitter(own.rig, own.frame, base, own.nuisances, own.nuisance_columns)
+    fitter = Fitter(own.simulator, own.masks, base, own.nuisances, own.nuisance_jacobian)
     model = fitter.fit(fitter.at(found.base.z, (), found.noise), found.noise, 3)
-    model, noise = fitter.settle(model, found.noise, 1)
-    known = replace(found, fitter=fitter, noise=noise, base=model, final=model, contenders=[])
-    return {WORDS[gain.channel]: gain.after for gain in gains(known)}
+    model, noise = fitter.alternate_noise_and_fit(model, found.noise, 1)
+    known = replace(found, fitter=fitter, noise=noise, base=model, final=model, hypotheses=[])
+    return {WORDS[gain.channel]: gain.after for gain in held_out_error(known)}
 
 
 def untouched(case: Case) -> Errors:
@@ -55,4 +55,4 @@ def untouched(case: Case) -> Errors:
         write(replace(case, hidden=()), logs)
         answered = explain(logs, logs / "vehicle.toml", settings=Settings(most_causes=0))
     assert isinstance(answered, Answer)  # the reference car's logs tell forces
-    return {WORDS[gain.channel]: gain.after for gain in answered.gains}
+    return {WORDS[gain.channel]: gain.after for gain in answered.held_out}

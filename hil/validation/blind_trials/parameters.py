@@ -19,7 +19,7 @@ def parameters(records: Sequence[Record]) -> Metrics:
                 covered.append(named[name]["ci95"][0] <= true <= named[name]["ci95"][1])
     return {
         "median_error": median(errors, 0.1, at_most=True), "coverage95": _coverage(covered),
-        "right_place": share(right, lambda r: r["causes"][0]["wheel"] == r["hidden"][0]["wheel"]),
+        "right_place": share(right, lambda r: r["causes"][0]["location"] == r["hidden"][0]["location"]),
     }  # fmt: skip
 
 

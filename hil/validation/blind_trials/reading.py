@@ -43,13 +43,13 @@ def claims(record: Record) -> bool:
 
 def right_joint(record: Record) -> bool:
     """Whether the first cause acts where the hidden law does."""
-    return bool(record["causes"]) and record["causes"][0]["joint"] == record["hidden"][0]["joint"]
+    return bool(record["causes"]) and record["causes"][0]["injection_point"] == record["hidden"][0]["injection_point"]
 
 
 def names_listed_elsewhere(record: Record) -> bool:
     """Whether an effect of the list is claimed that does not act where the hidden law does."""
-    joint = record["hidden"][0]["joint"]
-    return claims(record) and any(c["effect"] in _LISTED and c["joint"] != joint for c in record["causes"])
+    joint = record["hidden"][0]["injection_point"]
+    return claims(record) and any(c["effect"] in _LISTED and c["injection_point"] != joint for c in record["causes"])
 
 
 def right_law(record: Record) -> bool:
@@ -66,4 +66,4 @@ def decided(record: Record) -> bool:
 def called_not_testable(record: Record) -> bool:
     """Whether the hidden effect is called not testable, and not a cause."""
     effect = record["hidden"][0]["effect"]
-    return effect in record["not_testable"] and effect not in record["named"]
+    return effect in record["undetectable_effects"] and effect not in record["named"]

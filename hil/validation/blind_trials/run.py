@@ -6,11 +6,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from hil.diagnosis.data.log import UnusableError
+from hil.diagnosis.detection.result import Settings
+from hil.diagnosis.explain import explain
+from hil.diagnosis.result.answer import Answer
 from hil.errors import BrakebenchError
-from hil.study.explain import explain
-from hil.study.logs.table import UnusableError
-from hil.study.search.diagnosis import Settings
-from hil.study.verdict.answer import Answer
 from hil.validation.blind_trials import oracle
 from hil.validation.blind_trials.sources import state
 from hil.validation.reference_car.case import Case
@@ -91,7 +91,7 @@ def run_case(case: Case, seed: int, size: float | None, settings: Settings | Non
         "hidden": truth["causes"], **said,
     }  # fmt: skip
     if case.family == "single" and size in SURE and answered is not None:
-        record["oracle"] = oracle.told(answered.found, truth["causes"][0])
+        record["oracle"] = oracle.told(answered.diagnosis, truth["causes"][0])
     if case.family == "unlisted":
         record["oracle"] = oracle.untouched(case)
     if case.family == "confounded":
@@ -108,13 +108,13 @@ def _explained(case: Case, folder: Path, settings: Settings | None) -> tuple[Ans
         answered = explain(logs, logs / "vehicle.toml", out=folder / "out", settings=settings)
     except UnusableError as error:
         return None, {
-            "verdict": "unusable", "why": str(error), "named": [], "causes": [], "rivals": [], "not_testable": [],
-            "gain": {},
+            "verdict": "unusable", "why": str(error), "named": [], "causes": [], "rivals": [],
+            "undetectable_effects": [], "held_out_error": {},
         }  # fmt: skip
     assert isinstance(answered, Answer)  # the reference car's logs tell forces
     found = answered.json
     return answered, {
         "verdict": found["verdict"], "named": [cause["effect"] for cause in found["causes"]],
         "causes": found["causes"], "rivals": [rival["effect"] for rival in found["rivals"]],
-        "not_testable": found["not_testable"], "gain": found["gain"],
+        "undetectable_effects": found["undetectable_effects"], "held_out_error": found["held_out_error"],
     }  # fmt: skip

@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.study.fitting.candidates import PLACES
+from hil.diagnosis.estimation.terms import LOCATIONS
 from hil.validation.reference_car.case import Case, Hidden, as_number, logs, make_case, unknowns
 from hil.validation.reference_car.cases import SEPARABLE
 from hil.validation.reference_car.catalogue import Hideable, find
@@ -98,7 +98,7 @@ def _well_seen(
 def _places(kind: Hideable) -> tuple[str, ...]:
     """Where it may be hidden, and where else the plant lists it: all four radii are the scale of the wheel speeds."""
     scopes = [effect.scope for effect in THETA.effects if effect.name == kind.name and effect.scope is not Scope.NODE]
-    return tuple(dict.fromkeys([*kind.where, *(place for scope in scopes for place in PLACES[scope])]))
+    return tuple(dict.fromkeys([*kind.where, *(place for scope in scopes for place in LOCATIONS[scope])]))
 
 
 def _driven_forward(own: Signature) -> bool:

@@ -24,7 +24,7 @@ def _table() -> Mapping[str, Mapping[str, Mapping[str, Mapping[str, tuple[float,
 def separable(record: Record) -> bool:
     """Whether the one cause a record hides can be told from every other, at the ratio it was asked for."""
     (hidden,) = record["hidden"]
-    return effect_separable(hidden["effect"], hidden["wheel"], record["noise"], record["size"])
+    return effect_separable(hidden["effect"], hidden["location"], record["noise"], record["size"])
 
 
 def effect_separable(effect: str, wheel: str, noise_level: str, size: float) -> bool:

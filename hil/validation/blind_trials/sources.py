@@ -1,11 +1,21 @@
-"""Which plant, study and hidden car a trial was run with: digests of their sources."""
+"""Which plant, diagnosis and reference car a trial was run with: digests of their sources."""
 
+from collections.abc import Iterator
 from functools import cache
+from importlib import resources
 
 from plant.compiled import PACKAGES, digest
 
-_FLOORS = ("logs", "replay", "likelihood", "fitting", "search", "verdict")
-STUDIED = (*PACKAGES, "hil.study", *(f"hil.study.{floor}" for floor in _FLOORS))
+
+def _rooms(package: str) -> Iterator[str]:
+    """A package and all packages in it."""
+    yield package
+    for item in sorted(resources.files(package).iterdir(), key=lambda item: item.name):
+        if item.joinpath("__init__.py").is_file():
+            yield from _rooms(f"{package}.{item.name}")
+
+
+STUDIED = (*PACKAGES, *_rooms("hil.diagnosis"))
 """What an answer depends on."""
 HIDDEN = ("hil.validation.reference_car",)
 """What a case depends on."""

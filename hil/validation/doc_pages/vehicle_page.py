@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from importlib import resources
 from typing import Any
 
-from hil.study.replay.vehicle_keys import ALIASES, DERIVED, LATENCY_S, LINE_S, SPECIAL, UNLIMITED, WIDE
+from hil.diagnosis.vehicle.keys import ALIASES, DERIVED, LATENCY_S, LINE_S, SPECIAL, UNLIMITED, WIDE
 
 _WHAT = {
     "wheelbase_m": "between the axles",

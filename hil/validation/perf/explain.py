@@ -15,10 +15,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from hil.diagnosis.explain import explain
+from hil.diagnosis.result.answer import Answer
 from hil.errors import BrakebenchError
 from hil.rt.clock import process_cpu_time_ns
-from hil.study.explain import explain
-from hil.study.verdict.answer import Answer
 from hil.validation.perf.rivals import NONE, RIVALS, Guess
 from hil.validation.perf.row import Row
 from hil.validation.perf.signatures import problem

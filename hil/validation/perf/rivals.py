@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hil.study.logs.table import Floats
-from hil.study.search.diagnosis import ALPHA
-from hil.study.search.screen import threshold
+from hil.diagnosis.data.log import Floats
+from hil.diagnosis.detection.result import FALSE_ALARM_PROBABILITY
+from hil.diagnosis.detection.score_test import detection_threshold
 from hil.validation.perf.signatures import Problem
 
 NONE = "none"
@@ -103,7 +103,7 @@ def _guess(names: Iterable[str], gains: Floats, given: Problem) -> Guess:
     listed, looks = list(names), len(gains)
     best = int(np.argmax(gains))
     logs = 0.5 * (gains - np.log(given.samples)) - np.log(looks)
-    named = listed[best] if gains[best] > threshold(looks, ALPHA) else NONE
+    named = listed[best] if gains[best] > detection_threshold(looks, FALSE_ALARM_PROBABILITY) else NONE
     return Guess(named, _softmax([NONE, *listed], np.array([0.0, *logs]), given))
 
 

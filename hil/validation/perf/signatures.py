@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from hil.study.fitting.candidates import Column, candidates, columns
-from hil.study.fitting.linear import track_columns
-from hil.study.likelihood.estimate import first_guess
-from hil.study.likelihood.noise import Frame, tracks_of
-from hil.study.logs.prepare import prepare
-from hil.study.logs.read import read_logs
-from hil.study.logs.table import Floats
-from hil.study.replay.rig import Rig
-from hil.study.replay.vehicle_set import load_vehicle
-from hil.study.replay.world import nominal
+from hil.diagnosis.data.log import Floats
+from hil.diagnosis.data.prepare import prepare
+from hil.diagnosis.data.read import read_logs
+from hil.diagnosis.estimation.information import finite_difference_jacobian
+from hil.diagnosis.estimation.terms import Column, candidates, columns
+from hil.diagnosis.noise.estimate import first_guess
+from hil.diagnosis.noise.model import SampleMasks, tracks_of
+from hil.diagnosis.simulation.parameter_set import nominal
+from hil.diagnosis.simulation.simulator import Simulator
+from hil.diagnosis.vehicle.load import load_vehicle
 
 _LEAST_REACH = 1e-3
 """Norm, in standard deviations of the noise, that the largest allowed value must make: below, nothing is to be seen."""
@@ -44,21 +44,21 @@ class Problem:
 def problem(logs: Sequence[Path], vehicle: Path) -> Problem:
     """Of logs, or folders of them: no number of the vehicle is fitted and no disturbance is modelled.
 
-    Inputs are rid of noise, tracks masked and sensitivities taken as `hil.study.search.diagnose` does.
+    Inputs are rid of noise, tracks masked and sensitivities taken as `hil.diagnosis.detection.stepwise` does.
     """
     car = load_vehicle(vehicle)
     base = nominal(car)
     radius_m = float(car.parameters.wheel.rolling_radius_m)
     torque_constant = float(car.parameters.motor.torque_constant_nm_a)
-    rig = Rig(prepare(read_logs(logs, None, None, None, torque_constant), radius_m), car).quieted(base)
-    frame = Frame.of(rig.case)
-    rig.keep(base)
+    rig = Simulator(prepare(read_logs(logs, None, None, None, torque_constant), radius_m), car).denoised(base)
+    frame = SampleMasks.of(rig.dataset)
+    rig.cache_baseline(base)
     simulated = rig.run(base)
     apart = {group: values - simulated[group] for group, values in rig.measured().items()}
     residual = tracks_of(apart, frame, radius_m)
-    of = columns(car.untold)
+    of = columns(car.undiagnosable_effects)
     worlds = [column.stepped(base) for column in of]
-    signatures = track_columns(rig, frame, simulated, worlds, [column.step for column in of])
+    signatures = finite_difference_jacobian(rig, frame, simulated, worlds, [column.step for column in of])
     noise = first_guess(residual, frame, enabled=False)
     weights = {name: known / noise.tracks[name].a for name, known in frame.present.items()}
     rows = triangle(residual, signatures, weights)

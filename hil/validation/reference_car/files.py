@@ -200,13 +200,13 @@ def _cause(case: Case, one: Hidden) -> dict[str, Any]:
     kind = find(one.effect)
     cause: dict[str, Any] = {
         "effect": one.effect,
-        "wheel": one.wheel,
+        "location": one.wheel,
         "parameters": {kind.parameter: {"value": one.magnitude, "unit": kind.unit}},
         "onset": None,
         "onset_s": one.onset_s,
     }
     if kind.law:
-        cause |= {"joint": kind.joint, "variables": list(kind.variables)}
+        cause |= {"injection_point": kind.joint, "variables": list(kind.variables)}
     if one.onset_s is not None:
         starts = case.starts_s()
         k = int(np.searchsorted(starts, one.onset_s, side="right")) - 1

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from hil.diagnosis.result.extended_scenario import extended_scenario
 from hil.scenario.effects import NONE, Effects
 from hil.scenario.parameters import override
 from hil.scenario.scenario import load_scenario
-from hil.study.verdict.extended import extended_scenario
 from plant.parameters.plant import PlantParameters
 from plant.road import RoadSegment
 
@@ -111,7 +111,7 @@ def taught(extension: Path) -> Condition:
 
     Raises
     ------
-    hil.study.logs.table.UnusableError, hil.scenario.table.ScenarioError, hil.scenario.effects.EffectError
+    hil.diagnosis.data.log.UnusableError, hil.scenario.table.ScenarioError, hil.scenario.effects.EffectError
         An extension file that cannot be used, or nothing in it that a simulated car can have.
     """
     with TemporaryDirectory() as folder:

@@ -19,7 +19,7 @@ def run(*words):
 
 def keep(folder, *families, count=2, state="abc"):
     """Cases on file, every cause found at 15 and 8."""
-    grade = {"effect": "road_grade", "wheel": "car", "parameters": {"grade": {"value": 0.01, "unit": ""}}}
+    grade = {"effect": "road_grade", "location": "car", "parameters": {"grade": {"value": 0.01, "unit": ""}}}
     records = {}
     for family in families:
         for drawn, index, size in plan(family, count):
@@ -28,8 +28,8 @@ def keep(folder, *families, count=2, state="abc"):
                 "family": drawn, "index": index, "size": size, "seed": 1, "sources": state,
                 "reached": True, "noise": "low",
                 "hidden": [grade],
-                "verdict": "named" if named else "none", "named": named, "rivals": [], "not_testable": [], "gain": {},
-                "causes": [{"effect": e, "parameters": {}, "wheel": "car", "probability": 0.9} for e in named],
+                "verdict": "named" if named else "none", "named": named, "rivals": [], "undetectable_effects": [], "held_out_error": {},
+                "causes": [{"effect": e, "parameters": {}, "location": "car", "probability": 0.9} for e in named],
             }  # fmt: skip
     lines = "".join(json.dumps(record) + "\n" for record in records.values())
     with (folder / "cases.jsonl").open("a", encoding="utf-8") as file:
@@ -106,7 +106,7 @@ def test_cases_of_several_states_of_the_program_are_told(tmp_path, capsys):
 
 def test_a_missed_case_is_told_with_its_number(tmp_path, capsys):
     keep(tmp_path, "null", count=2)
-    alarm = '"causes": [{"effect": "headwind", "wheel": "car", "parameters": {}}]'
+    alarm = '"causes": [{"effect": "headwind", "location": "car", "parameters": {}}]'
     raised = (tmp_path / "cases.jsonl").read_text().replace('"causes": []', alarm, 1)
     (tmp_path / "cases.jsonl").write_text(raised)
     run("--family", "null", "--count", 2, "--out", tmp_path)

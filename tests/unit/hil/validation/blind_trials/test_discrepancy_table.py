@@ -4,14 +4,14 @@ import tomllib
 
 import pytest
 
-from hil.study.fitting.own_error import USUAL
+from hil.diagnosis.estimation.model_discrepancy import UNMEASURED_RATIO
 from hil.validation.blind_trials.discrepancy_table import as_toml, ratios, tables
 
 
 def test_many_cases_tell_the_ratio_and_none_tell_the_usual() -> None:
     table = ratios({("mass_offset", "mass_kg", "car"): [16.0] * 1000, ("headwind", "wind_mps", "car"): []})
     assert table["mass_offset"]["mass_kg"]["car"] == pytest.approx(4.0, abs=0.02)
-    assert table["headwind"]["wind_mps"]["car"] == USUAL
+    assert table["headwind"]["wind_mps"]["car"] == UNMEASURED_RATIO
 
 
 def test_what_the_form_does_to_all_wheels_alike_is_not_laid_on_one() -> None:

@@ -9,13 +9,18 @@ from hil.validation.blind_trials.misses import misses
 
 
 def _cause(effect: str, wheel: str, value: float, unit: str = "") -> dict[str, Any]:
-    return {"effect": effect, "joint": "", "wheel": wheel, "parameters": {"size": {"value": value, "unit": unit}}}
+    return {
+        "effect": effect,
+        "injection_point": "",
+        "location": wheel,
+        "parameters": {"size": {"value": value, "unit": unit}},
+    }
 
 
 def _record(hidden: list[dict[str, Any]], told: list[dict[str, Any]], **more: Any) -> dict[str, Any]:
     return {
         "index": 4, "size": None, "noise": "low", "reached": True, "hidden": hidden, "causes": told,
-        "rivals": [], "not_testable": [], "named": [cause["effect"] for cause in told],
+        "rivals": [], "undetectable_effects": [], "named": [cause["effect"] for cause in told],
         "verdict": "named" if told else "none",
     } | more  # fmt: skip
 

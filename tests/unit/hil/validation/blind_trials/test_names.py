@@ -1,6 +1,6 @@
 """Numbers of the reference car by the plant's name: every one that can be, and the oracle's candidates with them."""
 
-from hil.study.fitting.candidates import candidates, columns
+from hil.diagnosis.estimation.terms import candidates, columns
 from hil.validation.blind_trials.names import numbers
 from hil.validation.reference_car.cases import SEPARABLE
 
@@ -8,7 +8,7 @@ PHASED = {"dtv_judder", "wheel_tooth_error"}  # an amplitude and a phase there, 
 
 
 def test_the_plant_has_every_hidden_number_at_its_place_but_those_with_a_phase() -> None:
-    known = {(c.effect.name, c.parameter.name, c.place) for c in candidates(columns())}
+    known = {(c.effect.name, c.parameter.name, c.location) for c in candidates(columns())}
     strange = set()
     for kind in SEPARABLE:
         for place in kind.where:
@@ -25,5 +25,5 @@ def test_a_number_keeps_its_value() -> None:
 
 
 def test_spots_half_a_turn_on_are_the_same_spots() -> None:
-    hidden = {"effect": "hot_spot", "wheel": "rear", "parameters": {"amplitude": {"value": -0.002, "unit": ""}}}
+    hidden = {"effect": "hot_spot", "location": "rear", "parameters": {"amplitude": {"value": -0.002, "unit": ""}}}
     assert numbers(hidden) == {"amplitude": 0.002}

@@ -2,9 +2,9 @@
 
 import pytest
 
-from hil.study.explain import explain
-from hil.study.search.diagnosis import Settings
-from hil.study.verdict.patterns import WORDS
+from hil.diagnosis.detection.result import Settings
+from hil.diagnosis.explain import explain
+from hil.diagnosis.result.residual_patterns import WORDS
 from hil.validation.blind_trials.oracle import told
 from hil.validation.reference_car.case import Hidden, make_case
 from hil.validation.reference_car.files import read_answer, write
@@ -17,11 +17,11 @@ def test_the_truth_beats_the_tuned_car_and_half_the_truth(tmp_path) -> None:
     write(make_case((Hidden("road_grade", "car", 0.01),), 11, "low", "cold"), logs)
     answered = explain(logs, logs / "vehicle.toml", settings=Settings(most_causes=0))
     hidden = read_answer(logs)["causes"][0]
-    tuned = {WORDS[gain.channel]: gain.tuned for gain in answered.gains}
-    truth = told(answered.found, hidden)
-    half = told(answered.found, hidden | {"parameters": {"grade": {"value": 0.005}}})
+    tuned = {WORDS[gain.channel]: gain.tuned for gain in answered.held_out}
+    truth = told(answered.diagnosis, hidden)
+    half = told(answered.diagnosis, hidden | {"parameters": {"grade": {"value": 0.005}}})
     assert set(truth) == set(tuned)
     assert truth["wheel_speed"] < 0.7 * tuned["wheel_speed"]
     assert truth["wheel_speed"] < half["wheel_speed"] < tuned["wheel_speed"]
-    judder = {"effect": "dtv_judder", "wheel": "fl", "parameters": {"amplitude": {"value": 0.05}}}
-    assert told(answered.found, judder) is None
+    judder = {"effect": "dtv_judder", "location": "fl", "parameters": {"amplitude": {"value": 0.05}}}
+    assert told(answered.diagnosis, judder) is None

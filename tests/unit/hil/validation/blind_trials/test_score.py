@@ -14,7 +14,7 @@ CHANNELS = ("ax_mps2", "wheel_speed")
 def _cause(effect: str, joint: str = "", chance: float = 0.9, onset_s: float | None = None) -> dict[str, Any]:
     numbers = {"gain": {"value": 0.11, "unit": "", "ci95": [0.09, 0.12]}}
     return {
-        "effect": effect, "joint": joint, "wheel": "car", "parameters": numbers, "probability": chance,
+        "effect": effect, "injection_point": joint, "location": "car", "parameters": numbers, "probability": chance,
         "onset_s": onset_s,
     }  # fmt: skip
 
@@ -24,10 +24,12 @@ def _record(hidden: str | list[str], named: list[str], **more: Any) -> dict[str,
     record = {
         "family": "single", "index": 0, "size": 15.0, "sources": "abc",
         "reached": True, "noise": "medium", "named": named,
-        "rivals": [], "not_testable": [], "gain": {}, "verdict": "named" if named else "none",
+        "rivals": [], "undetectable_effects": [], "held_out_error": {}, "verdict": "named" if named else "none",
         "hidden": [
-            {"effect": e, "wheel": "car", "joint": "friction.mu", "onset_s": None, "parameters": dict(number)}
-            for e in effects
+            {
+                "effect": e, "location": "car", "injection_point": "friction.mu", "onset_s": None,
+                "parameters": dict(number),
+            } for e in effects
         ],
         "causes": [_cause(effect) for effect in named],
     }  # fmt: skip
@@ -83,7 +85,7 @@ def test_single_cases_count_the_first_name() -> None:
 def test_the_first_name_is_asked_for_only_where_causes_can_be_told_apart() -> None:
     """A rolling resistance of the front axle and a drag of it leave a d' of 2 to 3 at a ratio of 15."""
     tied = _record("rolling_resistance", ["residual_drag"], rivals=["rolling_resistance"], noise="low")
-    tied["hidden"][0]["wheel"] = "front"
+    tied["hidden"][0]["location"] = "front"
     entry = table_of("single", [tied, _record("mass_offset", ["mass_offset"])])
     assert entry["metrics"]["top1_snr15"]["value"] == 1.0
     assert entry["metrics"]["top1_of_all_snr15"]["value"] == 0.5
@@ -192,9 +194,9 @@ def test_abstaining_from_a_twin_is_counted_apart() -> None:
 
 def test_what_was_not_excited_is_called_not_testable_and_not_named() -> None:
     records = [
-        _record("hot_spot", [], not_testable=["hot_spot", "iwm_gain"]), _record("hot_spot", []),
-        _record("hot_spot", ["hot_spot"], not_testable=["hot_spot"]),
-        _record("hot_spot", ["mass_offset"], not_testable=["hot_spot"]),
+        _record("hot_spot", [], undetectable_effects=["hot_spot", "iwm_gain"]), _record("hot_spot", []),
+        _record("hot_spot", ["hot_spot"], undetectable_effects=["hot_spot"]),
+        _record("hot_spot", ["mass_offset"], undetectable_effects=["hot_spot"]),
     ]  # fmt: skip
     metrics = _metrics("not_testable", records)
     assert metrics["called_not_testable"]["value"] == 0.5
@@ -221,7 +223,7 @@ def test_a_number_of_another_name_is_compared_with_its_own() -> None:
 
 def _gained(after: dict[str, float], **more: Any) -> dict[str, Any]:
     gains = {name: {"before": 3.0, "after": after[name], "best_wrong": 2.9} for name in CHANNELS}
-    return _record("a", ["a"], gain=gains, oracle=dict.fromkeys(CHANNELS, 1.0)) | more
+    return _record("a", ["a"], held_out_error=gains, oracle=dict.fromkeys(CHANNELS, 1.0)) | more
 
 
 def test_the_gain_is_a_share_of_the_oracles() -> None:

@@ -8,7 +8,7 @@ from hil.validation.reference_car.noise import LEVELS
 
 
 def _record(effect: str, wheel: str, size: float = 15.0, noise: str = "low") -> dict[str, Any]:
-    return {"hidden": [{"effect": effect, "wheel": wheel}], "size": size, "noise": noise}
+    return {"hidden": [{"effect": effect, "location": wheel}], "size": size, "noise": noise}
 
 
 def test_a_drag_and_the_rolling_resistance_of_an_axle_are_one_but_a_grade_and_the_mass_stand_alone() -> None:

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from hil.study.replay.vehicle_set import load_vehicle
+from hil.diagnosis.vehicle.load import load_vehicle
 from hil.validation.doc_pages.vehicle_page import page
 
 PAGE = Path(__file__).parents[5] / "docs" / "vehicle-set.md"

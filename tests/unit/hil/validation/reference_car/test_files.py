@@ -6,7 +6,7 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from hil.study.replay.vehicle_set import load_vehicle
+from hil.diagnosis.vehicle.load import load_vehicle
 from hil.validation.reference_car.body import LINKS
 from hil.validation.reference_car.car import NOMINAL
 from hil.validation.reference_car.drive import PER_TICK, drive

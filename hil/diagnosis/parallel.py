@@ -1,0 +1,30 @@
+"""Work on parts that do not depend on each other, over the threads that are free."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from threading import Semaphore
+from typing import TypeVar
+
+from hil.diagnosis.compiled import WORKERS
+
+Item = TypeVar("Item")
+Of = TypeVar("Of")
+_FREE = Semaphore(max(WORKERS - 1, 0))
+"""How many may have others help them at a time: one less than there are processors."""
+
+
+@cache
+def _idle() -> ThreadPoolExecutor:
+    """Threads that help."""
+    return ThreadPoolExecutor(WORKERS)
+
+
+def parallel_map(of: Callable[[Item], Of], items: Sequence[Item]) -> list[Of]:
+    """Of each item, in order; over threads, unless others have them. ``of`` must not come back here."""
+    each = _idle().map if (helped := _FREE.acquire(blocking=False)) else map
+    try:
+        return list(each(of, items))
+    finally:
+        if helped:
+            _FREE.release()

@@ -1,0 +1,149 @@
+"""What sensors, frames and the tables of logs tell of a replay: channels as a log has them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hil.diagnosis.compiled import compiled
+from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Recording
+from hil.diagnosis.data.interpolation import cubic, shifted_linear, upsampled
+from hil.diagnosis.data.log import Floats
+from hil.diagnosis.data.prepare import averaged
+from hil.diagnosis.simulation.latency import delayed
+from hil.diagnosis.simulation.parameter_set import ParameterSet
+from hil.diagnosis.simulation.sensors import after_sensors
+from plant.effects.sensing.chain import Chain
+from plant.parameters.plant import PlantParameters
+from plant.vectors import INPUT
+
+_WHEELS = ("fl", "fr", "rl", "rr")
+SOURCE = {
+    "wheel": [f"state.wheel_speed_rad_s_{wheel}" for wheel in _WHEELS],
+    "pressure": [f"state.pressure_pa_{wheel}" for wheel in _WHEELS],
+    "motor": [f"state.motor_torque_nm_{wheel}" for wheel in _WHEELS],
+    "ax": ["state.imu_longitudinal_mps2"],
+    "ay": ["state.imu_lateral_mps2"],
+    "yaw": ["state.imu_yaw_rate_rad_s"],
+    "gps": ["state.speed_mps"],
+}
+"""Columns of the plant that each group of channels tells of."""
+Stack = dict[str, Floats]
+"""Channels by group, (samples of all drives, channels)."""
+_LATE = {"ax": (0,), "ay": (0,), "yaw": (0, 5), "pressure": (1,)}
+"""Which latencies of a world each group has."""
+_MOTOR = 2
+_USUAL_RADIUS_M = 0.3
+_TOOTH_ROWS, _TURNS_RAD_S = 2.0, 0.1
+_FINER = 4
+"""Points a row between which a motor's torque goes straight: as it lags it is bent, and a straight line from row to row
+would come 1.3 ms late."""
+
+
+@dataclass(frozen=True)
+class MeasurementModel:
+    """Channels of a case: which ``groups`` there are, the car's teeth and radius, the speed its turning goes with."""
+
+    groups: Sequence[str]
+    parameters: PlantParameters
+    characteristic_mps: float
+
+    def split(self, table: Floats) -> Stack:
+        """Columns of the plant, (rows, columns), by group."""
+        stack: Stack = {}
+        at = 0
+        for group in self.groups:
+            width = len(SOURCE[group])
+            stack[group] = table[:, at : at + width]
+            at += width
+        return stack
+
+    def measure(self, drive: Recording, world: ParameterSet, table: Floats) -> Stack:
+        """Channels as sensors, frames and the tables of logs give what was noted."""
+        stack = self.measure_rows(self.split(table), drive, world)
+        found = {group: averaged(values, drive.stride) for group, values in stack.items()}
+        if "wheel" in found:
+            self._at_measured_speed(found, drive)
+        return found
+
+    def measure_rows(self, happened: Stack, drive: Recording, world: ParameterSet) -> Stack:
+        """Channels as sensors and frames give what happened, row by row."""
+        chain = Chain(world.theta_in(drive))
+        others = {group: values for group, values in happened.items() if group != "motor"}
+        stack = after_sensors(others, chain, ROW_S) if others else {}
+        for group, values in stack.items():
+            late = sum(world.latency_s[k] for k in _LATE.get(group, ()))
+            if late:
+                stack[group] = delayed(values, late / ROW_S, straight=group == "pressure")
+            elif group == "wheel":
+                half_turned = np.pi / self.parameters.sensor.teeth / ROW_S
+                stack[group] = np.empty_like(values)
+                toothed(values, world.window_rows2, half_turned, world.tooth_share, stack[group])
+        if "motor" in happened:
+            fine = _finer(happened["motor"], drive.inputs[:, INPUT.slice("motor_torque_bend_nm")])
+            fine = after_sensors({"motor": fine}, chain, ROW_S / _FINER)["motor"]
+            stack["motor"] = np.empty_like(happened["motor"])
+            shifted_linear(fine, _FINER, _FINER * world.latency_s[_MOTOR] / ROW_S, stack["motor"])
+        return stack
+
+    def _at_measured_speed(self, found: Stack, drive: Recording) -> None:
+        """The turning of the car as it is at the measured speed."""
+        factors = np.empty((2, len(found["wheel"])))
+        radius_m = self.parameters.wheel.rolling_radius_m
+        faster_turning(drive.measured["wheel"], found["wheel"], radius_m, self.characteristic_mps, factors)
+        for group, factor in zip(("ay", "yaw"), factors, strict=True):
+            if group in found:
+                found[group] *= factor[:, None]
+
+
+@compiled
+def powers(speed_mps: Floats, characteristic_mps: float) -> tuple[Floats, Floats]:
+    """Powers of the speed that lateral acceleration and yaw rate go with at a given steering angle.
+
+    Of the linear single-track model, a_y = v^2 delta / (l (1 + v^2 / v_ch^2)) (Mitschke and Wallentowitz 2014,
+    Dynamik der Kraftfahrzeuge, sec. 27).
+    """
+    squared = (speed_mps / characteristic_mps) ** 2
+    return 2.0 / (1.0 + squared), (1.0 - squared) / (1.0 + squared)
+
+
+@compiled
+def faster_turning(measured: Floats, omega: Floats, radius_m: float, characteristic_mps: float, out: Floats) -> None:
+    """Factors of lateral acceleration and yaw rate, (2, samples), that take a car to the speed its wheels are measured
+    at, into ``out``; both speeds are (samples, wheels)."""
+    wheels = omega.shape[1]
+    for t in range(omega.shape[0]):
+        faster, mean = 0.0, 0.0
+        for k in range(wheels):
+            apart = measured[t, k] - omega[t, k]
+            faster += apart / wheels if apart == apart else 0.0
+            mean += omega[t, k] / wheels
+        turning = np.copysign(max(abs(mean), SLOW_MPS / _USUAL_RADIUS_M), mean)
+        share = min(max(faster / turning, -0.2), 0.2)
+        lateral, yaw = powers(turning * radius_m, characteristic_mps)
+        out[0, t] = 1.0 + lateral * share
+        out[1, t] = 1.0 + yaw * share
+
+
+def _finer(torque_nm: Floats, bend_nm: Floats) -> Floats:
+    """Torque on rows and between them: a parabola that is off the straight line by ``bend_nm`` in the middle."""
+    out = np.empty((len(torque_nm) * _FINER, torque_nm.shape[1]))
+    upsampled(torque_nm, bend_nm, out)
+    return out
+
+
+@compiled
+def toothed(omega: Floats, window_rows2: float, half_pitch: float, share: float, out: Floats) -> None:
+    """Speeds (rows, wheels) as toothed wheels tell them, when a tooth has passed, into ``out``.
+
+    ``half_pitch`` is half the angle between two teeth, rad rows/s: a speed comes later by a ``share`` of the time that
+    takes, two rows at most. It is a mean over a window of squared width ``window_rows2``, by its second derivative.
+    """
+    last, mean = omega.shape[0] - 1, omega.copy()
+    for t in range(1, last):
+        for k in range(omega.shape[1]):
+            mean[t, k] += window_rows2 / 24.0 * (omega[t + 1, k] - 2.0 * omega[t, k] + omega[t - 1, k])
+    for t in range(omega.shape[0]):
+        for k in range(omega.shape[1]):
+            rows = min(half_pitch / max(abs(omega[t, k]), _TURNS_RAD_S), _TOOTH_ROWS)
+            out[t, k] = cubic(mean, k, t - share * rows)

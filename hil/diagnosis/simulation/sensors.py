@@ -1,0 +1,77 @@
+"""Sensor and clock effects on the study's arrays: on simulated channels, and taken back from measured inputs."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from hil.diagnosis.data.log import Floats
+from plant.effects.effect import GROUND, NODES
+from plant.effects.sensing.catalogue import SENSING
+from plant.effects.sensing.chain import Chain
+from plant.effects.theta import THETA
+from plant.vectors import INPUT
+
+Stack = Mapping[str, Floats]
+_IMU = ("ax", "ay", "yaw")
+_NODE = {"wheel": "wheel", "pressure": "pressure", "motor": "motor", "gps": GROUND}
+_INPUT = {"pressure": "pressure_pa", "motor": "motor_torque_nm"}
+OUTPUT_SENSORS = np.concatenate(
+    [
+        np.arange(THETA.size)[THETA.slice(effect.name, parameter.name)]
+        for effect in SENSING
+        if not set(effect.nodes) & set(_INPUT)
+        for parameter in effect.parameters
+    ]
+)
+"""Places in theta of sensing effects that leave the replay's inputs alone."""
+SENSORS = np.concatenate(
+    [
+        np.arange(THETA.size)[THETA.slice(effect.name, name)]
+        for effect in SENSING
+        for name in (*(parameter.name for parameter in effect.parameters), "onset_s", "until_s")
+    ]
+)
+"""Places in theta of all that says what sensors and clocks do."""
+_GROUND_SCALE = THETA.slice("speed_scale", "gain").start
+_WHEEL_SCALE = THETA.slice("wrong_scale", "factor").start + NODES.index("wheel")
+
+
+def before_sensors(inputs: Floats, theta: Floats, row_s: float) -> Floats:
+    """Inputs as they were before the sensors; what loses information (a filter, a step) is left as it is."""
+    chain = Chain(theta)
+    if not any(chain.touches(node) for node in _INPUT):
+        return inputs
+    time_s: Floats = np.arange(len(inputs)) * row_s
+    true = inputs.copy()
+    for node, part in _INPUT.items():
+        if chain.touches(node):
+            where = INPUT.slice(part)
+            try:
+                true[:, where] = chain.undo(node, time_s, inputs[:, where])
+            except ValueError:
+                true[:, where] = inputs[:, where]
+    return true
+
+
+def after_sensors(stack: Stack, chain: Chain, row_s: float) -> dict[str, Floats]:
+    """Channels as the sensors give them."""
+    found = dict(stack)
+    time_s: Floats = np.arange(len(next(iter(stack.values())))) * row_s
+    for group, node in _NODE.items():
+        if group in found and chain.touches(node):
+            found[group] = chain.sense(node, time_s, found[group])
+    if chain.touches("imu") and any(name in found for name in _IMU):
+        rest = np.zeros((len(time_s), 1))
+        body = chain.sense("imu", time_s, np.hstack([found.get(name, rest) for name in _IMU]))
+        found |= {name: body[:, k : k + 1] for k, name in enumerate(_IMU) if name in found}
+    return found
+
+
+def wheel_speed_before(told_rad_s: float, theta: Floats) -> float:
+    """Middle wheel speed before a wrong scale of the wheel node; other wheel effects move no start."""
+    return told_rad_s / (1.0 + float(theta[_WHEEL_SCALE]))
+
+
+def ground_speed_before(told_mps: float, theta: Floats) -> float:
+    """Speed over ground before a wrong scale of what tells it."""
+    return told_mps / (1.0 + float(theta[_GROUND_SCALE]))

@@ -1,0 +1,109 @@
+"""A vehicle for the study: its parameters, what of them may be off, and what its set leaves open."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hil.diagnosis.data.log import MOTOR_DEMAND, Floats, Log
+from hil.diagnosis.vehicle.keys import LATENCY_S, OF_SECTION
+from hil.diagnosis.vehicle.priors import BRAKE_K, CONSTANT_EPSILON_W, Nuisance
+from plant.friction import mu_equilibrium
+from plant.parameters.plant import PlantParameters
+from plant.vectors import P
+
+_CONSTANT_B_1_J = 2e-6
+_HELD_KG_M2 = 1e12
+"""Yaw inertia of a car that cannot turn."""
+_TURNING = (
+    "vehicle_yaw_inertia_kg_m2", "vehicle_steering_ratio", "tyre_lky", "vehicle_slip_angle_share_front",
+    "vehicle_slip_angle_share_rear", "tyre_side_stiffness_load", "zero_steering",
+)  # fmt: skip
+_OF_STEERING = ("steer_lateral",)
+
+
+@dataclass(frozen=True, eq=False)
+class Vehicle:
+    """A vehicle for the study.
+
+    Attributes
+    ----------
+    parameters : as the plant wants them.  p : the same, flat.
+    nuisances : what may be off, by tolerance.
+    pad_temperature_matters : False where the brake has one gain and no friction model.
+    remarks : unknown keys and defaults taken, for the report.
+    unstated : sections that the set says nothing of (keys of `hil.diagnosis.vehicle.keys.OF_SECTION`).
+    unlimited : limits that it does not state, which do not act.
+    straight : whether it is held on its line.
+    sprung : whether the set states its suspension, every number of it.
+    node_latency_s : half-width of how much later than the wheel speeds the frames of other nodes are sent.
+    """
+
+    parameters: PlantParameters
+    p: Floats
+    nuisances: tuple[Nuisance, ...]
+    pad_temperature_matters: bool
+    remarks: tuple[str, ...] = ()
+    unstated: tuple[str, ...] = ()
+    unlimited: tuple[str, ...] = ()
+    straight_line: bool = False
+    suspension_stated: bool = True
+    node_latency_s: float = LATENCY_S
+
+    @property
+    def undiagnosable_effects(self) -> tuple[str, ...]:
+        """Effects on sections that are not stated, or on a steering that holds against them: none can be told."""
+        unstated = tuple(effect for section in self.unstated for effect in OF_SECTION[section])
+        return (*unstated, *_OF_STEERING) if self.straight_line else unstated
+
+    def with_motor_limits_from(self, logs: Sequence[Log]) -> "Vehicle":
+        """The same car, its motors no stronger than what is asked of them in the logs, if the set does not say.
+
+        Fading takes a share of what a motor can, which is of nothing known where that is not.
+        """
+        demands = [log.channels[name] for log in logs for name in MOTOR_DEMAND if name in log.channels]
+        most = max((float(np.nanmax(np.abs(values), initial=0.0)) for values in demands), default=0.0)
+        if "motor_peak_torque_nm" not in self.unlimited or most == 0.0:
+            return self
+        motor = replace(self.parameters.motor, peak_torque_nm=most)
+        parameters = replace(self.parameters, motor=motor)
+        p = self.p.copy()
+        p[P.motor_peak_torque_nm] = most
+        return replace(self, parameters=parameters, p=p)
+
+    def without_lateral_dynamics(self) -> "Vehicle":
+        """The same car kept on its line by a driver who is not seen: without lateral motion, whatever pulls."""
+        p = self.p.copy()
+        p[P.vehicle_yaw_inertia_kg_m2] = _HELD_KG_M2
+        nuisances = tuple(one for one in self.nuisances if one.name not in _TURNING)
+        said = "no log tells how it was steered, nor that it turned: the car is held straight against whatever pulls"
+        return replace(self, p=p, nuisances=nuisances, straight_line=True, remarks=(*self.remarks, said))
+
+
+def rest_friction(parameters: PlantParameters, temperature_k: float) -> float:
+    """Pad friction at rest."""
+    pad = parameters.pad
+    return mu_equilibrium(0.0, temperature_k, pad.a_1_ks, pad.b_1_j, pad.epsilon_w)
+
+
+def with_constant_friction(parameters: PlantParameters) -> PlantParameters:
+    """Ostermeyer's equation with a rest value so stiff that the friction is one number."""
+    mu, ambient = 0.38, parameters.friction_brake.ambient_k
+    a = mu * _CONSTANT_B_1_J * CONSTANT_EPSILON_W / ambient
+    pad = replace(
+        parameters.pad, a_1_ks=a, b_1_j=_CONSTANT_B_1_J, c_1_s=0.0, gamma_k_w=(0.0, 0.0),
+        epsilon_w=CONSTANT_EPSILON_W, heating_with_mu=0.0, temperature_of_disc=0.0,
+    )  # fmt: skip
+    return replace(parameters, pad=pad)
+
+
+def with_gains(parameters: PlantParameters, gains: Mapping[str, float]) -> PlantParameters:
+    """Piston areas for torque per pressure and wheel: gain = 2 mu eta A r."""
+    brake = parameters.friction_brake
+    constant = parameters.pad.epsilon_w >= CONSTANT_EPSILON_W
+    mu = rest_friction(parameters, brake.ambient_k if constant else BRAKE_K)
+    areas = list(brake.piston_area_m2)
+    for k, axle in enumerate(("front", "rear")):
+        if axle in gains:
+            areas[k] = gains[axle] / (2.0 * mu * brake.efficiency * brake.effective_radius_m[k])
+    return replace(parameters, friction_brake=replace(brake, piston_area_m2=(areas[0], areas[1])))

@@ -1,0 +1,132 @@
+"""The race: estimates, bounds and thresholds of the linear screen."""
+
+import tomllib
+from dataclasses import replace
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from hil.diagnosis.detection.nonparametric import NONPARAMETRIC_TERMS
+from hil.diagnosis.detection.score_test import (
+    detection_threshold,
+    inflation_factor,
+    score,
+    scores,
+    scores_given_best,
+    shortlist,
+)
+from hil.diagnosis.estimation.information import InformationBlocks, marginalise, solve
+from hil.diagnosis.estimation.model_discrepancy import UNLISTED, variance_inflation
+from hil.diagnosis.estimation.terms import LOCATIONS, candidates, columns, location_kind
+
+CANDIDATES = {c.name: c for c in candidates(columns())}
+
+
+def test_a_score_finds_the_value_that_made_the_residual() -> None:
+    candidate = CANDIDATES["mass_offset@car"]
+    q, true = 1.0, 120.0
+    found = score(candidate, q * true, q)
+    assert found.value == pytest.approx(true, rel=1e-3)
+    assert found.raw_gain == pytest.approx(q * true**2, rel=1e-3)
+
+
+def test_a_value_of_the_forbidden_sign_explains_nothing() -> None:
+    found = score(CANDIDATES["residual_drag@fl"], -50.0, 10.0)
+    assert found.value == 0.0
+    assert found.gain == 0.0
+
+
+def test_what_leaves_no_trace_cannot_score() -> None:
+    assert score(CANDIDATES["mass_offset@car"], 1.0, 0.0).max_snr == 0.0
+
+
+def test_more_looks_ask_for_more() -> None:
+    assert detection_threshold(1, 0.05) == pytest.approx(3.841, abs=1e-3)
+    assert detection_threshold(100, 0.003) > detection_threshold(10, 0.003) > detection_threshold(1, 0.003)
+
+
+def test_the_models_own_error_raises_what_is_asked() -> None:
+    quiet = [score(c, 0.3, 1e4) for c in CANDIDATES.values()]
+    loud = [score(c, 0.05 * c.parameter.typical * 1e6, 1e6) for c in CANDIDATES.values()]
+    assert inflation_factor(quiet) == 1.0
+    assert inflation_factor([]) == 1.0
+    assert inflation_factor(loud) > 1.0
+
+
+def test_a_cause_that_shows_through_others_is_no_error_of_the_model() -> None:
+    """Signatures that all resemble one: the cause inflates what every one explains, and nothing beside it.
+
+    Noise along what they share is explained by all of them at once, so one draw says little: the median of eleven does.
+    """
+    listed = [c for c in CANDIDATES.values() if len(c.columns) == 1 and c.parameter.low < 0.0]
+    count = 1 + max(c.columns[0] for c in listed)
+    tau = np.ones(count)
+    for candidate in listed:
+        tau[candidate.columns[0]] = candidate.prior_sd
+    cause, beside = listed[0], []
+    for seed in range(11):
+        rng = np.random.default_rng(seed)
+        shared = rng.standard_normal(3000)
+        signatures = (0.8 * shared[:, None] + 0.6 * rng.standard_normal((3000, count))) / tau
+        hidden = 0.3 * cause.prior_sd * signatures[:, cause.columns[0]]
+        joined = np.column_stack((rng.standard_normal(3000) + hidden, signatures))
+        total = InformationBlocks((joined.T @ joined)[None], 0, 3000, 0.0)
+        found = scores(listed, marginalise(total.total(), 0), 0, [0.0] * len(listed))
+        assert inflation_factor(found) > 3.0
+        beside.append(inflation_factor(scores_given_best(found, total, np.zeros(0), ())))
+    assert np.median(beside) == pytest.approx(1.0, abs=0.3)
+
+
+def test_a_gain_is_shared_out_over_the_models_own_error() -> None:
+    candidate = CANDIDATES["tyre_relaxation@car"]
+    found = score(candidate, 0.1 * 1e4, 1e4)
+    assert variance_inflation(candidate) > 1.0
+    assert found.gain == pytest.approx(found.raw_gain / variance_inflation(candidate))
+
+
+def test_dive_errs_more_where_nobody_states_the_springs() -> None:
+    candidate = CANDIDATES["pitch_dive@car"]
+    assert variance_inflation(replace(candidate, suspension_stated=False)) > variance_inflation(candidate)
+    assert variance_inflation(candidate) == variance_inflation(replace(candidate, suspension_stated=True))
+
+
+def test_every_entry_of_the_models_own_error_is_a_candidates_number_or_a_law_at_a_kind_of_place() -> None:
+    kinds = {(c.effect.name, c.parameter.name, location_kind(c.location)) for c in CANDIDATES.values()}
+    kinds |= {
+        (UNLISTED, law.name, location_kind(place)) for law in NONPARAMETRIC_TERMS for place in LOCATIONS[law.scope]
+    }
+    source = resources.files("hil.diagnosis.estimation") / "model_discrepancy.toml"
+    tables = tomllib.loads(source.read_text(encoding="utf-8"))
+    entries = [
+        ((effect, name, kind), ratio)
+        for effect, numbers in (*tables["ratio"].items(), *tables["unsprung"].items())
+        for name, ratios in numbers.items()
+        for kind, ratio in ratios.items()
+    ]
+    assert {entry for entry, _ in entries} <= kinds
+    assert all(ratio >= 1.0 for _, ratio in entries)
+
+
+def test_both_the_best_explanation_and_the_clearest_are_fitted() -> None:
+    """A number in which the model errs much explains most; one in which it errs little is still among the leaders."""
+    erring = [s for s in (score(c, 40.0, 100.0) for c in CANDIDATES.values()) if variance_inflation(s.candidate) > 4.0]
+    clear = min(CANDIDATES.values(), key=variance_inflation)
+    listed = [*erring, score(clear, 30.0 / abs(clear.parameter.typical), 100.0 / clear.parameter.typical**2)]
+    assert clear in [s.candidate for s in shortlist(listed, 2)]
+
+
+def test_a_nuisance_takes_only_what_its_tolerance_allows() -> None:
+    """Column equal to the nuisance's: the share beyond the tolerance is left to the effect."""
+    n, size = 1.0e4, 5.0  # five standard deviations off
+    total = np.array([[n * size**2, n * size, n * size], [n * size, n, n], [n * size, n, n]])
+    left = marginalise(total, 1, (), np.zeros(1))
+    assert left.b[0] ** 2 / left.q[0, 0] == pytest.approx(size**2, rel=1e-3)
+
+
+def test_solve_gives_back_what_was_put_in() -> None:
+    rng = np.random.default_rng(3)
+    columns_, true = rng.standard_normal((500, 3)), np.array([0.5, -0.2, 2.0])
+    joined = np.column_stack((columns_ @ true, columns_))
+    change, _ = solve(joined.T @ joined * 1e4, 2, [0], np.zeros(2))
+    assert change == pytest.approx(true, rel=1e-3)

@@ -1,0 +1,23 @@
+"""Listed causes of another shape: how far one is moved to see what it answers."""
+
+import pytest
+
+from hil.diagnosis.detection.shape import _within
+from plant.effects.theta import THETA
+
+_BEGINS = THETA.effect("pad_temp_fade").parameter("start_k")
+
+
+@pytest.mark.parametrize(
+    ("at", "step", "moved"),
+    [
+        (480.0, 20.0, 20.0),
+        (_BEGINS.high, 20.0, -20.0),
+        (_BEGINS.high - 10.0, 20.0, -20.0),
+        (_BEGINS.low + 10.0, 1e6, _BEGINS.high - _BEGINS.low - 10.0),
+        (_BEGINS.high - 10.0, 1e6, -(_BEGINS.high - _BEGINS.low - 10.0)),
+    ],
+)
+def test_a_shape_stays_within_its_bounds(at, step, moved):
+    """One that was hardly known was moved by its whole range, beyond its bounds."""
+    assert _within(at, step, _BEGINS) == pytest.approx(moved)

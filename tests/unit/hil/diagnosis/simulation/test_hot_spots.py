@@ -1,0 +1,142 @@
+"""Where hot spots stand: nobody tells, the wheels' speeds do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from hil.diagnosis.data.log import make_log
+from hil.diagnosis.data.prepare import prepare
+from hil.diagnosis.simulation.hot_spots import (
+    QUARTER_RAD,
+    fit_phase,
+    has_hot_spots,
+    phase_penalty,
+    row_chunks,
+    wheel_angles,
+    with_spots,
+    without_spots,
+)
+from hil.diagnosis.simulation.measurement_model import SOURCE
+from hil.diagnosis.simulation.parameter_set import ParameterSet, nominal
+from hil.diagnosis.simulation.simulator import Simulator
+from hil.diagnosis.vehicle.load import paper_car
+from plant.effects.hot_spot import ORDER
+from plant.effects.signals import WHEELS
+from plant.effects.theta import THETA
+
+AMPLITUDE = 0.1
+RADIUS_M, BRAKES_S = 0.308, 2.0
+
+
+def _stop(wheels: np.ndarray) -> Simulator:
+    """A rig of a stop from 20 m/s with these wheel speeds, rad/s, every 10 ms, on hot discs."""
+    t = np.arange(len(wheels)) * 0.01
+    channels = {f"wheel_speed_{w}_rad_s": wheels[:, k] for k, w in enumerate(WHEELS)}
+    channels |= {f"pressure_{w}_pa": np.where(t > BRAKES_S, 35e5, 0.0) for w in WHEELS}
+    log = replace(make_log("hot", t, channels), disc_temperature_k=650.0)
+    return Simulator(prepare([log], RADIUS_M), paper_car())
+
+
+def _spotted(world: ParameterSet, amplitude: float) -> ParameterSet:
+    theta = world.theta.copy()
+    theta[THETA.slice("hot_spot", "amplitude")] = amplitude
+    return replace(world, theta=theta)
+
+
+@pytest.fixture(scope="module")
+def rolled() -> np.ndarray:
+    """Wheel speeds of the car without spots, as it simulates them: a log that it explains."""
+    t = np.arange(650) * 0.01
+    speed = np.clip(20.0 - 5.4 * np.clip(t - BRAKES_S, 0.0, None), 0.0, None) / RADIUS_M
+    rig = _stop(np.column_stack([speed] * 4))
+    return rig.states(nominal(rig.vehicle), SOURCE["wheel"])
+
+
+def test_spots_are_turned_to_where_the_wheels_show_them(rolled: np.ndarray) -> None:
+    """Of a car whose spots stand elsewhere the amplitude is seen once they are turned, and was not before."""
+    made = _stop(rolled)
+    world = nominal(made.vehicle)
+    made._turned = [wheel_angles(drive) + QUARTER_RAD for drive in made.dataset.recordings]
+    spots = made.states(_spotted(world, AMPLITUDE), SOURCE["wheel"]) - made.states(world, SOURCE["wheel"])
+    seen = rolled[: len(spots)] + spots
+
+    def told(rig: Simulator) -> float:
+        """The amplitude that explains most, by one linear step, of the samples that are compared."""
+        compared = rig.dataset.recordings[0].moving > 0.5
+        bare = rig.run(world)["wheel"]
+        left = np.diff((rig.measured()["wheel"] - bare)[compared], axis=0).ravel()
+        shown = np.diff((rig.run(_spotted(world, 0.01))["wheel"] - bare)[compared], axis=0).ravel() / 0.01
+        return float(left @ shown / (shown @ shown))
+
+    rig = _stop(seen)
+    rig._turned = [wheel_angles(drive) for drive in rig.dataset.recordings]
+    before = told(rig)
+    assert not rig.fit_hot_spot_phase(world)
+    assert before != pytest.approx(AMPLITUDE, rel=0.2)
+    assert told(rig) == pytest.approx(AMPLITUDE, rel=0.2)
+
+
+@pytest.mark.parametrize("stand", [-0.3, -0.05, 0.0, 0.2, 0.31])
+def test_two_replays_tell_where_the_spots_stand(rolled: np.ndarray, stand: float) -> None:
+    (drive,) = _stop(rolled).dataset.recordings
+    rng = np.random.default_rng(3)
+    shown = [rng.normal(size=(drive.samples, 4)) for _ in range(2)]
+    left = 7.0 * (np.cos(ORDER * stand) * shown[0] + np.sin(ORDER * stand) * shown[1])
+    found, much = fit_phase(drive, left, shown)
+    assert found[0] == pytest.approx(stand)
+    assert np.all(much > 0.0)
+
+
+@pytest.mark.parametrize("much", [[1.0], [1.0] * 4, [1.0] * 8, [1.0, 0.5, 0.5, 0.2], [1.0, 0.3, 0.3, 0.3]])
+def test_angles_that_noise_chooses_explain_no_more_than_their_price(much: list[float]) -> None:
+    """As seldom as noise of one degree of freedom explains what is asked of a cause."""
+    shown, asked = np.array(much), 12.0
+    drawn = np.random.default_rng(5).rayleigh(size=(400_000, len(shown)))
+    gains = (drawn @ shown) ** 2 / np.sum(shown**2)
+    seldom = np.mean(gains > asked + phase_penalty(shown[:, None], (0,)))
+    assert seldom < 2.0 * chi2.sf(asked, 1)
+
+
+def test_angles_where_spots_do_not_show_cost_nothing() -> None:
+    much = np.zeros((3, 4))
+    assert phase_penalty(much, (0, 1)) == 0.0
+    much[0, 0] = 2.0
+    assert phase_penalty(much, (0, 1)) == phase_penalty(np.full((1, 4), 7.0), (1,))
+
+
+def test_angles_are_those_of_the_measured_wheels(rolled: np.ndarray) -> None:
+    (drive,) = _stop(np.full((600, 4), 30.0)).dataset.recordings
+    turned = wheel_angles(drive)
+    assert turned[0] == pytest.approx(0.0)
+    assert turned[100] == pytest.approx(30.0)
+    assert len(turned) == len(drive.inputs)
+
+
+def test_parts_have_all_rows_once() -> None:
+    rows = [row for part in row_chunks(slice(3, 21)) for row in range(part.start, part.stop)]
+    assert rows == list(range(3, 21))
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_spots_are_turned_for_the_sign_they_have(rolled: np.ndarray, sign: float) -> None:
+    """Of a car handed in with spots: less than none is the same spots half the way to the next."""
+    made = _stop(rolled)
+    made._turned = [wheel_angles(drive) for drive in made.dataset.recordings]
+    world = _spotted(nominal(made.vehicle), AMPLITUDE)
+    seen = made.states(world, SOURCE["wheel"])
+    rig = _stop(seen)
+    told = _spotted(world, sign * AMPLITUDE)
+    assert rig.fit_hot_spot_phase(told)
+    compared = rig.dataset.recordings[0].moving > 0.5
+    left, bare = (rig.measured()["wheel"] - rig.run(one)["wheel"] for one in (told, nominal(rig.vehicle)))
+    assert np.diff(left[compared], axis=0).std() < 0.4 * np.diff(bare[compared], axis=0).std()
+
+
+def test_only_a_world_with_spots_asks_for_angles(rolled: np.ndarray) -> None:
+    world = nominal(paper_car())
+    assert not has_hot_spots(world)
+    assert has_hot_spots(with_spots(world))
+    assert not has_hot_spots(without_spots(with_spots(world)))
+    assert pytest.approx(0.25 * 2.0 * np.pi / ORDER) == QUARTER_RAD

@@ -1,0 +1,79 @@
+"""Worlds: the vehicle's numbers move without corners, and stay what they are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hil.diagnosis.data.log import make_log
+from hil.diagnosis.data.prepare import prepare
+from hil.diagnosis.simulation.parameter_set import ZEROS, nominal, recording_nuisances
+from hil.diagnosis.vehicle.keys import LATENCY_S
+from hil.diagnosis.vehicle.load import load_vehicle, paper_car
+from plant.effects.theta import THETA
+
+SIX = {
+    "mass_kg": 1650.0, "wheelbase_m": 2.72, "cog_to_front_axle_m": 1.3, "rolling_radius_m": 0.318,
+    "brake_gain_front_nm_pa": 2.9e-4, "brake_gain_rear_nm_pa": 1.7e-4,
+}  # fmt: skip
+WHEELS = ("fl", "fr", "rl", "rr")
+TOLD = (("wheel_speed", "rad_s"), ("pressure", "pa"))
+STEPS = np.linspace(-1.0, 1.0, 25)  # of how far each may be off
+
+
+@pytest.mark.parametrize("vehicle", [paper_car(), load_vehicle(SIX)], ids=["own numbers", "six numbers"])
+def test_every_number_of_the_vehicle_moves_without_a_corner(vehicle):
+    """A number that stands still for part of its range has no sensitivity there, and the fit would go to and fro."""
+    base = nominal(vehicle)
+    for nuisance in vehicle.nuisances:
+        for at, step in zip(nuisance.at, nuisance.step, strict=True):
+            worlds = [base.with_nuisances([nuisance], np.array([z])) for z in nuisance.farthest * STEPS]
+            told = nuisance.kind in ("sensor", "scatter", "line")
+            values = np.array([(world.theta if told else world.p)[at] for world in worlds])
+            moved = np.diff(values) * np.sign(step)
+            assert (moved > 0.0).all(), nuisance.name
+            assert moved.max() < 30.0 * moved.min(), nuisance.name  # from a fifth to five times
+            if nuisance.kind == "vehicle" and base.p[at] > 0.0:
+                assert values.min() > 0.0, nuisance.name
+                assert values.max() < 5.001 * base.p[at], nuisance.name
+
+
+def test_one_standard_deviation_is_what_the_set_says():
+    vehicle = paper_car()
+    mass = next(nuisance for nuisance in vehicle.nuisances if nuisance.name == "vehicle_mass_kg")
+    base = nominal(vehicle)
+    assert base.with_nuisances([mass], np.array([1.0])).p[mass.at[0]] == pytest.approx(
+        base.p[mass.at[0]] + mass.step[0]
+    )
+
+
+def test_what_single_wheels_are_off_was_there_before_a_cause_of_the_same_kind():
+    """Pads of one wheel that lose a tenth from the second log on took with them, before, what all four are off."""
+    base = nominal(load_vehicle(SIX))
+    pads = THETA.slice("pad_mu_gain", "gain")
+    off = replace(base, theta=base.theta.copy())
+    off.theta[pads] = (0.01, -0.02, 0.0, 0.01)
+    weak = replace(off, theta=off.theta.copy())
+    weak.theta[pads.start] -= 0.1
+    begun = weak.with_onset("pad_mu_gain", 1, 2.0, before=off)
+    t = np.arange(3000) * 0.01
+    logs = [
+        make_log(name, t, {f"{what}_{w}_{unit}": 20.0 + 0.0 * t for w in WHEELS for what, unit in TOLD})
+        for name in "abc"
+    ]
+    first, second, third = prepare(logs, 0.318).recordings
+    assert begun.theta_in(first)[pads].tolist() == off.theta[pads].tolist()
+    assert begun.theta_in(second)[THETA.slice("pad_mu_gain", "onset_s")] == 2.0
+    assert begun.theta_in(third)[pads].tolist() == weak.theta[pads].tolist()
+
+
+def test_an_inertial_unit_has_zeros_across():
+    """0.012 m/s2, a tenth of a degree, were told as a cause."""
+    nuisances = recording_nuisances(True, LATENCY_S)
+    base = nominal(paper_car())
+    z = np.array([1.0 if one.kind == "sensor" else 0.0 for one in nuisances])
+    theta = base.with_nuisances(nuisances, z).theta
+    assert theta[THETA.slice("imu_bias", "ay_mps2")] == pytest.approx(ZEROS["ay_mps2"])
+    assert theta[THETA.slice("imu_bias", "yaw_rate_rad_s")] == pytest.approx(ZEROS["yaw_rate_rad_s"])
+    assert np.flatnonzero(theta != base.theta).size == 2
+    assert (base.with_nuisances(nuisances, 0.0 * z).theta == base.theta).all()

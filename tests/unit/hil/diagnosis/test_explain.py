@@ -1,0 +1,58 @@
+"""From logs to the answer, on logs that the plant itself made: nothing in nothing, a hidden drag by its name."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from plant_logs import STEP_S, log, logs
+
+from hil.diagnosis.data.log import UnusableError
+from hil.diagnosis.explain import explain
+from hil.diagnosis.vehicle.extension_file import load_extension
+from plant.effects.theta import THETA
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_nothing_is_found_in_nothing() -> None:
+    answer = explain(logs(THETA.neutral(), 5))
+    assert answer.json["verdict"] == "none"
+    assert answer.json["causes"] == []
+    assert json.loads(json.dumps(answer.json))["held_out_error"]["wheel_speed"]["after"] > 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_hidden_drag_is_named_extended_and_then_nothing_is_left(tmp_path: Path) -> None:
+    theta = THETA.set(THETA.neutral(), "residual_drag", {"torque_nm": {"rl": 30.0}})
+    dragging = logs(theta, 6)
+    found = explain(dragging, out=tmp_path).json
+    assert found["causes"][0]["effect"] == "residual_drag"
+    assert found["causes"][0]["location"] == "rl"
+    assert found["causes"][0]["parameters"]["torque_nm"]["value"] == pytest.approx(30.0, rel=0.3)
+    taught = load_extension(tmp_path / "extension.toml")
+    assert taught.theta[THETA.slice("residual_drag", "torque_nm")][2] == pytest.approx(30.0, rel=0.3)
+    assert explain(dragging, extend=tmp_path / "extension.toml").json["causes"] == []
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_drag_that_begins_in_the_middle_is_named_with_its_time() -> None:
+    dragging = THETA.set(THETA.neutral(), "residual_drag", {"torque_nm": {"rl": 40.0}})
+    beginning = dragging.copy()
+    beginning[THETA.slice("residual_drag", "onset_s")] = 5.0
+    drives = [log(theta, 8, k) for k, theta in enumerate((THETA.neutral(), beginning, dragging))]
+    (cause,) = explain(drives).json["causes"]
+    assert (cause["effect"], cause["location"]) == ("residual_drag", "rl")
+    assert cause["onset"]["log"].endswith("1")
+    assert cause["onset"]["t_s"] == pytest.approx(5.0, abs=0.1)
+    assert cause["onset_s"] == pytest.approx(14.0 + 5.0, abs=0.1)
+
+
+def test_without_motion_or_torque_there_is_no_answer() -> None:
+    t = np.arange(500) * STEP_S
+    with pytest.raises(UnusableError, match="how the car moved"):
+        explain({"t_s": t, "ax_mps2": np.zeros(500)})
+    with pytest.raises(UnusableError, match="what braked the car"):
+        explain({"t_s": t, "speed_mps": np.full(500, 20.0)})
