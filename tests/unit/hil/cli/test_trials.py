@@ -28,7 +28,8 @@ def keep(folder, *families, count=2, state="abc"):
                 "family": drawn, "index": index, "size": size, "seed": 1, "sources": state,
                 "reached": True, "noise": "low",
                 "hidden": [grade],
-                "verdict": "named" if named else "none", "named": named, "rivals": [], "undetectable_effects": [], "held_out_error": {},
+                "verdict": "named" if named else "none", "named": named, "rivals": [], "undetectable_effects": [],
+                "held_out_error": {},
                 "causes": [{"effect": e, "parameters": {}, "location": "car", "probability": 0.9} for e in named],
             }  # fmt: skip
     lines = "".join(json.dumps(record) + "\n" for record in records.values())
