@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from hil.parameters import load_set
+from hil.scenario.parameters import load_set
 from plant.effects.catalogue import BUILT_IN
 from plant.extra_states import EXTRA_STATES
 from plant.injection.theta import THETA

@@ -135,7 +135,7 @@ def wheel_states(
 
 
 @helper
-def stand(s: Vector, p: Vector) -> None:
+def apply_standstill(s: Vector, p: Vector) -> None:
     """The car stands: nothing to learn; a standing brake gives what holds the car, and no more than it can."""
     s[SPEED] = 0.0
     holding = 0.25 * p[P_MASS] * s[MASS] * GRAVITY_MPS2 * s[GRADE] * p[P_ARM]

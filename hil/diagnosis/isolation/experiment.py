@@ -29,7 +29,7 @@ from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import paper_car
 from hil.diagnosis.vehicle.spec import Vehicle
 from hil.errors import BrakebenchError
-from hil.scenario import Scenario, find_scenario, load_scenario, scenario_names
+from hil.scenario.scenario import Scenario, find_scenario, load_scenario, scenario_names
 from plant.effects.effect import GROUND, Scope
 from plant.model import pack
 from plant.node import PlantNode

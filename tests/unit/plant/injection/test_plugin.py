@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import hil.effects
-from hil.effects import EffectError, plugin_table, read_effects
-from hil.sensitivities import SHOWN, signatures
-from hil.sensitivities_figure import draw
-from plant.injection.theta import THETA, Theta
-from plant.open_loop_manoeuvres import MANOEUVRES, drive
-from plant.signals import NAMES, simulate
+import hil.scenario.effects
+from hil.scenario.effects import EffectError, plugin_table, read_effects
+from hil.validation.doc_pages.sensitivities_figure import draw
+from hil.validation.sensitivities import SHOWN, signatures
+from plant.effects.manoeuvres import MANOEUVRES, drive
+from plant.effects.signals import NAMES, simulate
+from plant.effects.theta import THETA, Theta
 
 ROOT = Path(__file__).parents[4]
 
@@ -32,12 +32,14 @@ def installed(parking_brake, monkeypatch):
         def load(self):
             return parking_brake
 
-    monkeypatch.setattr(hil.effects, "entry_points", lambda group: [Point()] if group == "brakebench.effects" else [])
-    hil.effects.plugins.cache_clear()
-    hil.effects.layout.cache_clear()
+    monkeypatch.setattr(
+        hil.scenario.effects, "entry_points", lambda group: [Point()] if group == "brakebench.effects" else []
+    )
+    hil.scenario.effects.plugins.cache_clear()
+    hil.scenario.effects.layout.cache_clear()
     yield parking_brake
-    hil.effects.plugins.cache_clear()
-    hil.effects.layout.cache_clear()
+    hil.scenario.effects.plugins.cache_clear()
+    hil.scenario.effects.layout.cache_clear()
 
 
 def test_the_example_brakes_the_rear_wheels(installed, paper_car):
@@ -70,11 +72,11 @@ def test_a_name_taken_twice_is_refused(parking_brake):
 
 def test_what_is_no_effect_is_refused(monkeypatch):
     point = EntryPoint("pi", "math:pi", "brakebench.effects")
-    monkeypatch.setattr(hil.effects, "entry_points", lambda group: [point])
-    hil.effects.plugins.cache_clear()
+    monkeypatch.setattr(hil.scenario.effects, "entry_points", lambda group: [point])
+    hil.scenario.effects.plugins.cache_clear()
     with pytest.raises(EffectError, match="expected an Effect"):
-        hil.effects.plugins()
-    hil.effects.plugins.cache_clear()
+        hil.scenario.effects.plugins()
+    hil.scenario.effects.plugins.cache_clear()
 
 
 def test_no_plugin_no_table():
