@@ -23,8 +23,8 @@ def run(args: argparse.Namespace) -> int:
     from hil.scenario.scenario import load_scenario
     from hil.validation.sensitivities import SHOWN, alike, as_json, recorded, signatures
     from hil.validation.verify.car import paper_car
-    from plant.effects.manoeuvres import MANOEUVRES, drive
-    from plant.effects.signals import NAMES
+    from plant.open_loop_manoeuvres import MANOEUVRES, drive
+    from plant.signals import NAMES
 
     if args.scenario in MANOEUVRES:
         show = MANOEUVRES[args.scenario]

@@ -14,7 +14,7 @@ from matplotlib.patches import Rectangle
 from hil.report.palette import INK, NEUTRAL, SEVERITY_COLOURS
 from hil.validation.blind_trials.metrics import Record
 from hil.validation.doc_pages.effects_page import SUBSYSTEMS
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 NONE = "none"
 _PLACES = {effect.name: ([*SUBSYSTEMS].index(effect.subsystem), effect.row) for effect in THETA.effects}

@@ -1,7 +1,7 @@
 """What a record says: which of the hidden causes were named, and whether one cause was claimed."""
 
 from hil.validation.blind_trials.metrics import Record
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 _LISTED = frozenset(effect.name for effect in THETA.effects)
 

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from hil.report.palette import INK, NEUTRAL
 from hil.validation.doc_pages.effects_page import SUBSYSTEMS
 from hil.validation.sensitivities import SHOWN, Signature
-from plant.effects.catalogue import BUILT_IN
-from plant.effects.signals import CHANNELS, NAMES
+from plant.signals import CHANNELS, NAMES
 
 LEAST, MOST = 0.1, 100.0  # sigma; smaller is left white, larger saturates
 GROUPS = {

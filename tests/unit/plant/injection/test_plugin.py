@@ -9,9 +9,9 @@ import hil.scenario.effects
 from hil.scenario.effects import EffectError, plugin_table, read_effects
 from hil.validation.doc_pages.sensitivities_figure import draw
 from hil.validation.sensitivities import SHOWN, signatures
-from plant.effects.manoeuvres import MANOEUVRES, drive
-from plant.effects.signals import NAMES, simulate
-from plant.effects.theta import THETA, Theta
+from plant.injection.theta import THETA, Theta
+from plant.open_loop_manoeuvres import MANOEUVRES, drive
+from plant.signals import NAMES, simulate
 
 ROOT = Path(__file__).parents[4]
 

@@ -20,7 +20,7 @@ from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.vehicle.load import paper_car
 from hil.scenario.effects import EffectError, read_laws, written_laws
 from hil.scenario.scenario import load_scenario
-from plant.effects.bank import term
+from plant.injection.bank import term
 
 LAW_TOML = """
 [[laws]]
