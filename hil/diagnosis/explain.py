@@ -13,9 +13,9 @@ from dbc.database import parse_database
 from hil.diagnosis.data.axle_torques import with_both_axles
 from hil.diagnosis.data.channel_map import load_map
 from hil.diagnosis.data.log import Log
+from hil.diagnosis.data.masks import is_straight_line
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.data.read import from_frame, read_logs
-from hil.diagnosis.data.straight_line import is_straight_line
 from hil.diagnosis.detection.result import Progress, Settings
 from hil.diagnosis.detection.stepwise import diagnose
 from hil.diagnosis.result.answer import Answer, answer
