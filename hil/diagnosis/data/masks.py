@@ -11,7 +11,8 @@ from hil.diagnosis.data.log import Floats, Log
 Mask = NDArray[np.bool_]
 SETTLE_S, _RINGS_S = 1.0, 2.0
 """Time after a change (stop, start, demand) that is not compared; and the time a car that stopped oscillates on its
-brakes and springs: the exact time of the stop would outweigh all that was before (docs/decisions/replay-and-comparison.md)."""
+brakes and springs: the exact time of the stop would outweigh all that was before
+(docs/decisions/replay-and-comparison.md)."""
 _BEFORE_S = 0.2
 """Time before the car is slow that is not compared: the simulated one may be slow a little earlier."""
 _AT_REST_MPS = 0.02
@@ -39,7 +40,7 @@ def moving_and_resting(speed_mps: Floats, sample_s: float) -> tuple[Mask, Mask]:
 def known_pressures(demand_pa: Floats, sample_s: float) -> dict[str, Floats]:
     """Where the pressures of hydraulics that no set states are known, by track, (samples,), 1 or 0.
 
-    They are zero without a demand, and equal on both sides of an axle where the demands are; ``demand_pa`` (samples, 4).
+    They are zero without a demand, and equal on both sides of an axle if the demands are; ``demand_pa`` (samples, 4).
     """
 
     def settled(demand: Floats) -> Floats:
