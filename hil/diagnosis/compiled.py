@@ -1,4 +1,4 @@
-"""How loops over samples are compiled: cached on disk, without the global interpreter lock."""
+"""Compilation of loops over samples: cached on disk, without the global interpreter lock."""
 
 import os
 from collections.abc import Callable
@@ -7,5 +7,6 @@ from typing import Any, cast
 from numba import njit
 
 WORKERS = len(os.sched_getaffinity(0))
-"""Threads that run such loops side by side."""
+"""Number of threads that run compiled loops in parallel: one per available processor."""
 compiled = cast(Callable[[Callable[..., Any]], Callable[..., Any]], njit(cache=True, nogil=True, error_model="numpy"))
+"""Decorator of a loop."""

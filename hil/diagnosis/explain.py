@@ -13,9 +13,9 @@ from dbc.database import parse_database
 from hil.diagnosis.data.axle_torques import with_both_axles
 from hil.diagnosis.data.channel_map import load_map
 from hil.diagnosis.data.log import Log
+from hil.diagnosis.data.masks import is_straight_line
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.data.read import from_frame, read_logs
-from hil.diagnosis.data.straight_line import is_straight_line
 from hil.diagnosis.detection.result import Diagnosis, Progress, Settings
 from hil.diagnosis.detection.stepwise import diagnose
 from hil.diagnosis.result.answer import Answer, answer
@@ -61,7 +61,7 @@ def explain(
         return check(read, car, why, extend, folder, report)
     car = (car.without_lateral_dynamics() if is_straight_line(read) else car).with_motor_limits_from(read)
     dataset = prepare(read, radius_m, car.unstated)
-    base = nominal(car) if extend is None else load_extension(Path(extend)).applied(nominal(car))
+    base = nominal(car) if extend is None else nominal(car).with_extension(load_extension(Path(extend)))
     with threadpool_limits(1, "blas"):  # simulations fill the processors; linear algebra beside them only waits
         diagnosis = diagnose(dataset, car, base, settings, report)
         report("held-out error by cross-validation")
@@ -83,7 +83,8 @@ def _write_extension(diagnosis: Diagnosis, without: ParameterSet, folder: Path) 
     causes = fitter.parameter_set(np.zeros_like(final.z), final.terms).theta
     extended = replace(fitter.parameter_set(final.z, final.terms), theta=causes)
     names = ", ".join(term.candidate.name for term in final.terms) or "no effect"
-    write_extension(path, without, extended, f"Estimated from {len(diagnosis.dataset.recordings)} logs: {names}")
+    note = f"Estimated from {len(diagnosis.dataset.recordings)} logs: {names}"
+    write_extension(path, extended.extension_of(without), note)
     return str(path)
 
 

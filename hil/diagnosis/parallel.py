@@ -1,4 +1,4 @@
-"""Work on parts that do not depend on each other, over the threads that are free."""
+"""Independent work items over the free threads."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -9,22 +9,24 @@ from typing import TypeVar
 from hil.diagnosis.compiled import WORKERS
 
 Item = TypeVar("Item")
-Of = TypeVar("Of")
-_FREE = Semaphore(max(WORKERS - 1, 0))
-"""How many may have others help them at a time: one less than there are processors."""
+Result = TypeVar("Result")
+_CALLERS = Semaphore(max(WORKERS - 1, 0))
+"""Number of callers that may use the pool at the same time: one less than there are processors."""
 
 
 @cache
-def _idle() -> ThreadPoolExecutor:
-    """Threads that help."""
+def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(WORKERS)
 
 
-def parallel_map(of: Callable[[Item], Of], items: Sequence[Item]) -> list[Of]:
-    """Of each item, in order; over threads, unless others have them. ``of`` must not come back here."""
-    each = _idle().map if (helped := _FREE.acquire(blocking=False)) else map
+def parallel_map(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """``function`` of each item, in order; in threads, unless others use them all.
+
+    ``function`` must not call `parallel_map`.
+    """
+    has_pool = _CALLERS.acquire(blocking=False)
     try:
-        return list(each(of, items))
+        return list((_pool().map if has_pool else map)(function, items))
     finally:
-        if helped:
-            _FREE.release()
+        if has_pool:
+            _CALLERS.release()

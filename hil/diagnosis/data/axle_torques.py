@@ -1,4 +1,4 @@
-"""Motors at one axle alone: logs that tell torques of two wheels."""
+"""Cars with motors at one axle: logs with the torques of two wheels."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -11,29 +11,29 @@ _FRONT, _REAR = {*MOTOR_TORQUE[:2], *MOTOR_DEMAND[:2]}, {*MOTOR_TORQUE[2:], *MOT
 
 
 def with_both_axles(logs: Sequence[Log]) -> Sequence[Log]:
-    """Logs of a car that has motors at one axle, with no torque at the other.
+    """Logs of a car with motors at one axle, with zero torque added at the other; other logs as they are.
 
-    So it is where every log tells of both wheels of one axle, and none of any of the other's.
+    It is such a car if every log has the torques of both wheels of one axle, and none has any of the other axle.
     """
-    told = set().union(*(log.channels for log in logs)) & (_FRONT | _REAR)
-    groups = [group for group in (MOTOR_TORQUE, MOTOR_DEMAND) if told & {*group}]
-    of_one = told <= _FRONT or told <= _REAR
-    if not (told and of_one and len(told) == 2 * len(groups) and all(log.has(*told) for log in logs)):
+    logged = set().union(*(log.channels for log in logs)) & (_FRONT | _REAR)
+    groups = [group for group in (MOTOR_TORQUE, MOTOR_DEMAND) if logged & {*group}]
+    one_axle = logged <= _FRONT or logged <= _REAR
+    if not (logged and one_axle and len(logged) == 2 * len(groups) and all(log.has(*logged) for log in logs)):
         return logs
-    said = f"no torque of motors is told at the {'rear' if told <= _FRONT else 'front'}: it is taken to have none"
-    none = {name for group in groups for name in group} - told
+    remark = f"no motor torque is logged at the {'rear' if logged <= _FRONT else 'front'}: taken as zero there"
+    zero = {name for group in groups for name in group} - logged
     return [
         replace(
             log,
-            channels={**log.channels, **{name: np.zeros(len(log.t_s)) for name in sorted(none)}},
-            remarks=(*log.remarks, said),
+            channels={**log.channels, **{name: np.zeros(len(log.t_s)) for name in sorted(zero)}},
+            remarks=(*log.remarks, remark),
         )
         for log in logs
     ]
 
 
 def undriven(logs: Iterable[Log]) -> set[int]:
-    """Wheels of one axle whose motors, as told and as asked, never do anything in logs where those of the other do."""
+    """Wheels of the axle without motors: torques and demands are always zero there and not at the other; else none."""
     driven = {
         k
         for log in logs

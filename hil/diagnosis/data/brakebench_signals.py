@@ -1,4 +1,4 @@
-"""Recordings of our own DBC: which signal is which channel."""
+"""Signals of our own DBC as channels."""
 
 import numpy as np
 
@@ -31,10 +31,10 @@ def own_channels(log: DecodedLog, torque_constant_nm_a: float) -> dict[str, tupl
             names[signal.format(axle=axle, wheel=wheel.upper())] = (channel.format(w=wheel), factor)
         current = f"MOTOR_STATUS_{axle}.CURRENT_{wheel.upper()}"
         names[current] = (f"motor_torque_{wheel}_nm", torque_constant_nm_a)
-    found = {}
+    series = {}
     for signal, (channel, factor) in names.items():
         if signal in log.columns and len(log.columns[signal].rows) > 1:
             t, values = log.series(signal)
             order = np.argsort(t, kind="stable")
-            found[channel] = (t[order], np.asarray(values, np.float64)[order] * factor)
-    return found
+            series[channel] = (t[order], np.asarray(values, np.float64)[order] * factor)
+    return series

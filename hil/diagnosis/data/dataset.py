@@ -1,4 +1,4 @@
-"""What is replayed and compared: drives on a 10 ms grid, cut into segments."""
+"""The dataset that is simulated and compared: recordings on a 10 ms grid, cut into segments."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,14 +8,15 @@ import numpy as np
 from hil.diagnosis.data.log import Floats, Log
 
 ROW_S = 0.01
-SLOW_MPS = 2.0  # below, wheel sensors and the contact's low-speed terms say little
+SLOW_MPS = 2.0  # below, wheel sensors and the contact's low-speed terms dominate
 GROUPS = ("wheel", "pressure", "motor")
 SINGLES = ("ax", "ay", "yaw", "gps")
 
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """A stretch that is replayed freely from its start: rows of one drive, and the speed it starts with."""
+    """A stretch simulated open loop from its start: rows ``first`` to before ``last`` of a recording, and the measured
+    wheel and ground speeds at its start."""
 
     first: int
     last: int
@@ -25,17 +26,17 @@ class Segment:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One log, ready for replay.
+    """One log, ready for simulation.
 
     Attributes
     ----------
     inputs : (rows, INPUT.size), rows of 10 ms.  segments : in order, without gaps.
-    measured : group of tracks -> (samples, channels); NaN where nothing is known.  stride : rows a sample.
-    moving, resting : (samples,) where speeds, and where the body at rest is compared.
-    speed_mps, pressure_pa : (samples,) about the speed, and the largest pressure.
-    state_of_charge : at the start.  number : among the drives.
-    wait_s : standard deviation of what two nodes' frames wait more or less than each other.
-    compared : track (`hil.diagnosis.noise.model`) -> (samples,) where the simulation follows it; all else, everywhere.
+    measured : group of tracks -> (samples, channels); NaN where nothing was measured.  stride : rows per sample.
+    moving, resting : (samples,) 1 where the motion, and where the body at rest is compared, else 0.
+    speed_mps, pressure_pa : (samples,) approximate speed, and largest pressure of a wheel.
+    state_of_charge : at the start, 0 to 1.  number : index in the dataset.
+    timestamp_jitter_s : standard deviation of the difference in delay between the frames of two nodes.
+    compared : track (`hil.diagnosis.noise.model`) -> (samples,) where the simulation can follow it; others everywhere.
     """
 
     log: Log
@@ -54,13 +55,21 @@ class Recording:
 
     @property
     def samples(self) -> int:
-        """Samples compared."""
+        """Number of samples."""
         return len(self.inputs) // self.stride
 
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
-    """All drives of one diagnosis; ``followed`` are the groups whose demands the simulation follows."""
+    """All recordings of one diagnosis.
+
+    Attributes
+    ----------
+    measured_input_mask : (CUT.size,) 1 where the simulation takes the measured value for its own.
+    groups : groups of tracks to compare.  sample_s : time between two samples, s.
+    missing_channels : what missing channels leave undiagnosed, for the reader.
+    tracked_actuators : groups whose demands the simulation follows.
+    """
 
     recordings: tuple[Recording, ...]
     measured_input_mask: Floats
@@ -71,16 +80,16 @@ class Dataset:
 
     @property
     def segments(self) -> list[tuple[int, Segment]]:
-        """Every segment with its drive's number."""
-        return [(k, segment) for k, drive in enumerate(self.recordings) for segment in drive.segments]
+        """Every segment with the index of its recording."""
+        return [(k, segment) for k, recording in enumerate(self.recordings) for segment in recording.segments]
 
     def segment_ids(self) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-        """Segment number of every sample of all drives, in order."""
-        numbers, parts = 0, []
-        for drive in self.recordings:
-            part = np.zeros(drive.samples, np.int64)
-            for segment in drive.segments:
-                part[segment.first // drive.stride : segment.last // drive.stride] = numbers
-                numbers += 1
+        """(samples of all recordings,) running number of each sample's segment."""
+        segment_id, parts = 0, []
+        for recording in self.recordings:
+            part = np.zeros(recording.samples, np.int64)
+            for segment in recording.segments:
+                part[segment.first // recording.stride : segment.last // recording.stride] = segment_id
+                segment_id += 1
             parts.append(part)
         return np.concatenate(parts)

@@ -1,4 +1,4 @@
-"""The canonical table: one log as SI channels over one time base."""
+"""The canonical table of a log: SI channels over one time base, and the checks it has to pass."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from hil.errors import BrakebenchError
 
-Floats = NDArray[Any]  # of numbers; float64 unless a docstring says otherwise
+Floats = NDArray[Any]  # float64 unless a docstring says otherwise
 WHEELS = ("fl", "fr", "rl", "rr")
 
 
 def four(stem: str, unit: str) -> tuple[str, ...]:
-    """Names of a quantity's channels at the wheels."""
+    """Names of a quantity's channels at the four wheels."""
     return tuple(f"{stem}_{wheel}_{unit}" for wheel in WHEELS)
 
 
@@ -25,9 +25,9 @@ MOTOR_TORQUE = four("motor_torque", "nm")
 MOTOR_DEMAND = four("motor_torque_demand", "nm")
 SINGLE = ("ax_mps2", "ay_mps2", "yaw_rate_rad_s", "steer_rad", "pedal", "throttle", "soc", "speed_mps")
 CHANNELS = (*WHEEL_SPEED, *PRESSURE, *PRESSURE_DEMAND, *MOTOR_TORQUE, *MOTOR_DEMAND, *SINGLE)
-"""Every channel a table may have beside ``t_s``; all are optional."""
+"""All channels of a table besides ``t_s``; each is optional."""
 
-PLAUSIBLE = {
+_PLAUSIBLE = {
     "wheel_speed": (-400.0, 400.0),
     "pressure": (-2e6, 4e7),
     "motor_torque": (-5000.0, 5000.0),
@@ -40,12 +40,12 @@ PLAUSIBLE = {
     "soc": (-0.05, 1.05),
     "speed": (-10.0, 120.0),
 }
-SHORTEST_S = 2.0
-SLOWEST_HZ = 5.0
+"""Stem of a channel's name -> range of values a car can have, SI."""
+_SHORTEST_S, _SLOWEST_HZ = 2.0, 5.0
 
 
 class UnusableError(BrakebenchError):
-    """Measured data that no conclusion can be drawn from; the message says why."""
+    """Measured data or an input file that cannot be used; the message says why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +54,11 @@ class Log:
 
     Attributes
     ----------
-    name : file it is from.
+    name : of its file.
     t_s : (n,) strictly increasing, s.
-    channels : name of `CHANNELS` -> (n,) values; NaN where there is none.
-    direction : +1 or -1, which way along the road.
-    disc_temperature_k : at the start, None where nobody knows.
+    channels : name of `CHANNELS` -> (n,) values, SI; NaN where missing.
+    direction : +1 or -1 along the road.
+    disc_temperature_k : at the start, K; None if unknown.
     remarks : what was done to the data, for the report.
     """
 
@@ -70,53 +70,53 @@ class Log:
     remarks: tuple[str, ...] = field(default=())
 
     def has(self, *names: str) -> bool:
-        """Whether all these channels are there."""
+        """Whether the log has all these channels."""
         return all(name in self.channels for name in names)
 
 
 def make_log(name: str, t_s: Floats, channels: Mapping[str, Floats], remarks: tuple[str, ...] = ()) -> Log:
-    """A log after all checks.
+    """A checked log: unknown columns, repeated times and implausible values are left out, with a remark.
 
     Raises
     ------
     UnusableError
-        A clock that stands still or runs backwards, too short, too slow, no channel, values no car has.
+        No known channel; times not finite or decreasing; too short or too slow; more than 1 % implausible values.
     """
     t_s = np.asarray(t_s, np.float64)
     known = {key: np.asarray(value, np.float64) for key, value in channels.items() if key in CHANNELS}
-    said = list(remarks)
-    odd = sorted(set(channels) - set(known))
-    if odd:
-        said.append(f"columns nobody here knows are left out: {', '.join(odd[:12])}")
+    notes = list(remarks)
+    unknown = sorted(set(channels) - set(known))
+    if unknown:
+        notes.append(f"unknown columns are left out: {', '.join(unknown[:12])}")
     known = {key: value for key, value in known.items() if np.isfinite(value).any()}
     if not known:
-        raise UnusableError(f"{name}: no channel of the table is there; expected some of {', '.join(CHANNELS)}")
+        raise UnusableError(f"{name}: no channel with values; expected some of {', '.join(CHANNELS)}")
     if not np.isfinite(t_s).all():
-        raise UnusableError(f"{name}: t_s has {int((~np.isfinite(t_s)).sum())} values that are no time; mend the clock")
+        raise UnusableError(f"{name}: {int((~np.isfinite(t_s)).sum())} values of t_s are not finite")
     steps = np.diff(t_s)
     if len(steps) and (steps < 0.0).any():
         at = int(np.argmax(steps < 0.0))
         raise UnusableError(f"{name}: the clock runs backwards at row {at + 1} ({t_s[at]:g} to {t_s[at + 1]:g} s)")
     if len(steps) and (steps == 0.0).any():
         keep = np.concatenate((steps > 0.0, [True]))
-        said.append(f"{int((~keep).sum())} rows with a doubled time are left out")
+        notes.append(f"{int((~keep).sum())} rows with a repeated time are left out")
         t_s, known = t_s[keep], {key: value[keep] for key, value in known.items()}
-    length = float(t_s[-1] - t_s[0]) if len(t_s) > 1 else 0.0
-    if length < SHORTEST_S:
-        raise UnusableError(f"{name}: {length:.2f} s long; expected {SHORTEST_S:g} s or more (is t_s in seconds?)")
-    if len(t_s) / length < SLOWEST_HZ:
-        raise UnusableError(f"{name}: {len(t_s) / length:.2f} samples a second; expected {SLOWEST_HZ:g} or more")
+    length_s = float(t_s[-1] - t_s[0]) if len(t_s) > 1 else 0.0
+    if length_s < _SHORTEST_S:
+        raise UnusableError(f"{name}: {length_s:.2f} s long; expected {_SHORTEST_S:g} s or more (is t_s in seconds?)")
+    if len(t_s) / length_s < _SLOWEST_HZ:
+        raise UnusableError(f"{name}: {len(t_s) / length_s:.2f} samples a second; expected {_SLOWEST_HZ:g} or more")
     for key, value in known.items():
-        low, high = next(limits for stem, limits in PLAUSIBLE.items() if key.startswith(stem))
+        low, high = next(limits for stem, limits in _PLAUSIBLE.items() if key.startswith(stem))
         outside = (value < low) | (value > high)
         if outside.mean() > 0.01:
             raise UnusableError(
                 f"{name}: {key} goes from {np.nanmin(value):g} to {np.nanmax(value):g}; expected {low:g} to {high:g}: "
-                "wrong unit? The name of a column says its unit"
+                "wrong unit? The column's name gives its unit"
             )
         if outside.any():
             value = value.copy()
             value[outside] = np.nan
             known[key] = value
-            said.append(f"{int(outside.sum())} impossible values of {key} are left out")
-    return Log(name, t_s, known, remarks=tuple(said))
+            notes.append(f"{int(outside.sum())} implausible values of {key} are left out")
+    return Log(name, t_s, known, remarks=tuple(notes))

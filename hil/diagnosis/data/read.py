@@ -1,4 +1,4 @@
-"""Measured logs of any kind into the canonical table."""
+"""Log files of any kind (CAN logs, CSV, Parquet, MF4, MAT) into the canonical table."""
 
 import re
 import tomllib
@@ -11,13 +11,12 @@ import numpy as np
 
 from dbc.database import Database
 from hil.diagnosis.data.brakebench_signals import own_channels
-from hil.diagnosis.data.channel_map import ChannelMap
+from hil.diagnosis.data.channel_map import ChannelMap, to_si
 from hil.diagnosis.data.log import CHANNELS, Floats, Log, UnusableError, make_log
-from hil.diagnosis.data.units import to_si
 from hil.log.decode import DecodedLog, decode_log
 from hil.log.read import read_log
 
-GRID_S = 0.01
+_GRID_S = 0.01
 _TABLES = (".csv", ".parquet", ".mf4", ".mdf", ".mat")
 _WITH_UNIT = re.compile(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*")
 _FRAMES = {"arbitration_id", "id", "data"}
@@ -37,7 +36,7 @@ def read_logs(
     Raises
     ------
     UnusableError, hil.log.frames.LogError
-        What cannot be used, and why.
+        A file that cannot be used: the message says why.
     """
     files = [file for path in paths for file in _files(path)]
     if not files:
@@ -53,7 +52,7 @@ def _files(path: Path) -> list[Path]:
 
 
 def _with_log_facts(log: Log, file: Path, about: Path | None) -> Log:
-    """With what ``logs.toml`` says of the file: ``["name.csv"]`` with direction, initial_disc_temperature_k."""
+    """A log with its entry of ``logs.toml``: ``["name.csv"]`` with direction and initial_disc_temperature_k."""
     source = about or file.parent / "logs.toml"
     if not source.exists():
         if about is not None:
@@ -81,7 +80,7 @@ def read_one(
     path: Path, database: Database | None = None, channel_map: ChannelMap | None = None,
     torque_constant_nm_a: float = 1.0,
 ) -> Log:  # fmt: skip
-    """Read one log: a table by its suffix and head, else a CAN log."""
+    """Read one log: a table by its suffix and header, else a CAN log."""
     columns = None if database is not None else _table_columns(path)
     if columns is not None:
         return from_columns(path.name, columns, channel_map)
@@ -92,7 +91,7 @@ def read_one(
             path.name, {target: channel_map.convert(target, series) for target in channel_map.targets(series)}
         )
     if database is not None:
-        raise UnusableError(f"{path.name}: a foreign DBC needs --map CHANNELS.toml: which signal is which channel")
+        raise UnusableError(f"{path.name}: another car's DBC needs --map CHANNELS.toml, its signals by channel")
     return _brakebench_log(path.name, decoded, torque_constant_nm_a)
 
 
@@ -104,24 +103,24 @@ def _brakebench_log(name: str, decoded: DecodedLog, torque_constant_nm_a: float)
 
 
 def _gridded(name: str, series: Mapping[str, tuple[Floats, Floats]]) -> Log:
-    """Signals of different time stamps on one grid, linearly between samples, nothing over gaps of 0.25 s."""
+    """Signals with their own time stamps on one grid: linear interpolation, NaN over gaps of 0.25 s."""
     if not series:
         raise UnusableError(f"{name}: none of the mapped signals is in the log")
     begin = max(min(float(t[0]) for t, _ in series.values()), 0.0)
     end = max(float(t[-1]) for t, _ in series.values())
-    grid = np.arange(begin, end, GRID_S)
+    grid = np.arange(begin, end, _GRID_S)
     columns = {}
     for channel, (t, v) in series.items():
-        held = np.interp(grid, t, v, left=np.nan, right=np.nan)
+        values = np.interp(grid, t, v, left=np.nan, right=np.nan)
         nearest = np.clip(np.searchsorted(t, grid), 1, len(t) - 1) if len(t) > 1 else np.zeros(len(grid), int)
         gap = t[nearest] - t[nearest - 1] if len(t) > 1 else np.full(len(grid), np.inf)
-        held[gap > _HOLD_S] = np.nan
-        columns[channel] = held
+        values[gap > _HOLD_S] = np.nan
+        columns[channel] = values
     return make_log(name, grid - begin, columns)
 
 
 def from_columns(name: str, columns: Mapping[str, tuple[Floats, str]], channel_map: ChannelMap | None = None) -> Log:
-    """A log from columns with units; an empty unit is that of the canonical name."""
+    """A log from columns and their units; an empty unit is that of the canonical name."""
     time = next((key for key in ("t_s", "time_s", "time", "t", "timestamp") if key in columns), None)
     if channel_map is not None and channel_map.time is not None:
         time = channel_map.time if channel_map.time in columns else None
@@ -131,8 +130,8 @@ def from_columns(name: str, columns: Mapping[str, tuple[Floats, str]], channel_m
     t_s = columns[time][0] * factor
     if channel_map is not None:
         series = {key: (t_s, values) for key, (values, _) in columns.items()}
-        found = {target: channel_map.convert(target, series)[1] for target in channel_map.targets(series)}
-        return make_log(name, t_s - t_s[0], found)
+        mapped = {target: channel_map.convert(target, series)[1] for target in channel_map.targets(series)}
+        return make_log(name, t_s - t_s[0], mapped)
     channels: dict[str, Floats] = {}
     for key, (values, unit) in columns.items():
         if key != time:
@@ -162,11 +161,12 @@ def _table_columns(path: Path) -> dict[str, tuple[Floats, str]] | None:
 
 
 def _named(columns: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
-    found = {}
+    """Columns and their units, which stand in brackets after the name."""
+    out = {}
     for key, values in columns.items():
         match = _WITH_UNIT.fullmatch(key)
-        found[match[1] if match else key] = (values, match[2] if match else "")
-    return found
+        out[match[1] if match else key] = (values, match[2] if match else "")
+    return out
 
 
 def _csv(path: Path) -> dict[str, tuple[Floats, str]] | None:
@@ -176,22 +176,22 @@ def _csv(path: Path) -> dict[str, tuple[Floats, str]] | None:
     except (OSError, UnicodeDecodeError) as error:
         raise UnusableError(f"{path}: cannot be read: {error}") from error
     if not lines:
-        raise UnusableError(f"{path}: empty file; expected a head and rows")
+        raise UnusableError(f"{path}: empty file; expected a header and rows")
     at = 0
     while lines[at].startswith("#") and at + 1 < len(lines) and lines[at + 1].startswith("#"):
         at += 1
-    head = [cell.strip().strip('"') for cell in lines[at].lstrip("# ").split(",")]
-    if set(head) >= _FRAMES or set(head) >= {"arbitration_id", "data"}:
+    header = [cell.strip().strip('"') for cell in lines[at].lstrip("# ").split(",")]
+    if set(header) >= _FRAMES or set(header) >= {"arbitration_id", "data"}:
         return None
     rows = [line for line in lines[at + 1 :] if line.strip() and not line.startswith("#")]
     try:
         table = np.genfromtxt(rows, delimiter=",", dtype=np.float64, ndmin=2)
     except ValueError as error:
         raise UnusableError(f"{path}: rows of different length: {str(error).splitlines()[0]}") from error
-    if table.size == 0 or table.shape[1] != len(head):
+    if table.size == 0 or table.shape[1] != len(header):
         got = table.shape[1] if table.size else 0
-        raise UnusableError(f"{path}: {len(head)} heads over {got} columns; expected as many")
-    return _named({name: table[:, k] for k, name in enumerate(head)})
+        raise UnusableError(f"{path}: {len(header)} names in the header, {got} columns; expected as many")
+    return _named({name: table[:, k] for k, name in enumerate(header)})
 
 
 def _parquet(path: Path) -> dict[str, tuple[Floats, str]] | None:
@@ -201,16 +201,16 @@ def _parquet(path: Path) -> dict[str, tuple[Floats, str]] | None:
     try:
         table = pyarrow.parquet.read_table(path)
     except (pa.ArrowException, OSError) as error:
-        raise UnusableError(f"{path}: no Parquet file: {str(error).splitlines()[0]}") from error
+        raise UnusableError(f"{path}: not a Parquet file: {str(error).splitlines()[0]}") from error
     if set(table.column_names) >= _FRAMES:
         return None
-    found: dict[str, tuple[Floats, str]] = {}
+    columns: dict[str, tuple[Floats, str]] = {}
     for item in table.schema:
         if pa.types.is_floating(item.type) or pa.types.is_integer(item.type):
             unit = (item.metadata or {}).get(b"unit", b"").decode()
             values = np.asarray(table[item.name].to_numpy(zero_copy_only=False), np.float64)
-            found |= {key: (v, unit or u) for key, (v, u) in _named({item.name: values}).items()}
-    return found
+            columns |= {key: (v, unit or u) for key, (v, u) in _named({item.name: values}).items()}
+    return columns
 
 
 def _mdf(path: Path) -> dict[str, tuple[Floats, str]] | None:
@@ -225,13 +225,13 @@ def _mdf(path: Path) -> dict[str, tuple[Floats, str]] | None:
             signals = [
                 s for s in mdf.iter_channels(skip_master=True) if s.samples.ndim == 1 and s.samples.dtype.kind in "fiu"
             ]
-    except Exception as error:  # asammdf raises whatever a damaged block trips it into
+    except Exception as error:  # asammdf raises many kinds on a damaged block
         raise UnusableError(f"{path}: asammdf cannot read it: {error}") from error
     if not signals:
         raise UnusableError(f"{path}: no numeric signal in it")
     longest = max(signals, key=lambda s: len(s.timestamps)).timestamps
-    found = {s.name: (np.interp(longest, s.timestamps, s.samples.astype(np.float64)), s.unit) for s in signals}
-    return {"t_s": (np.asarray(longest, np.float64), ""), **found}
+    columns = {s.name: (np.interp(longest, s.timestamps, s.samples.astype(np.float64)), s.unit) for s in signals}
+    return {"t_s": (np.asarray(longest, np.float64), ""), **columns}
 
 
 def _mat(path: Path) -> dict[str, tuple[Floats, str]]:

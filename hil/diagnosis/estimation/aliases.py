@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.estimation.gauss_newton import Model, Term
 from hil.diagnosis.simulation.parameter_set import ParameterSet
-from hil.diagnosis.vehicle.priors import Nuisance
+from hil.diagnosis.vehicle.priors import Nuisance, NuisanceKind
 from plant.injection.apply import Q
 from plant.injection.theta import THETA
 from plant.vectors import OUTPUT, PARAMETER
@@ -57,7 +57,7 @@ def alias_of(term: Term, nuisances: Sequence[Nuisance], world: ParameterSet) -> 
         return None
     changed = np.flatnonzero(moved[0] != world.p).tolist()
     for k, nuisance in enumerate(nuisances):
-        if nuisance.kind == "vehicle" and list(nuisance.at) == changed:
+        if nuisance.kind is NuisanceKind.VEHICLE and list(nuisance.at) == changed:
             slope = float(moved[0][changed[0]] - moved[1][changed[0]]) / step
             return Alias(k, changed[0], slope) if slope else None
     return None

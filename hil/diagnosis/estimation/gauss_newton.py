@@ -19,7 +19,7 @@ from hil.diagnosis.noise.model import Noise, SampleMasks, tracks_of, whiten, whi
 from hil.diagnosis.simulation.measurement_model import Stack
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator
-from hil.diagnosis.vehicle.priors import Nuisance
+from hil.diagnosis.vehicle.priors import Nuisance, NuisanceKind
 
 Tracks = dict[str, Floats]
 _LARGEST_STEP = 8.0
@@ -116,10 +116,8 @@ class Fitter:
         self.nuisances, self.nuisance_jacobian = tuple(nuisances), nuisance_columns
         self.bound = np.array([nuisance.bound for nuisance in self.nuisances])
         self.upper = np.array([nuisance.upper for nuisance in self.nuisances])
-        self.lower = np.where(
-            [nuisance.kind in ("held", "window", "line") for nuisance in self.nuisances], 0.0, -self.bound
-        )
-        self._of_form = np.array([nuisance.kind != "scatter" for nuisance in self.nuisances])
+        self.lower = np.array([nuisance.lower for nuisance in self.nuisances])
+        self._of_form = np.array([nuisance.kind is not NuisanceKind.SIDE_TO_SIDE for nuisance in self.nuisances])
         self._limits = [k for k, nuisance in enumerate(self.nuisances) if nuisance.name in _LIMITS]
         self.radius = float(rig.vehicle.parameters.wheel.rolling_radius_m)
         self._measured = rig.measured()

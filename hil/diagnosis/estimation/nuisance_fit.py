@@ -9,8 +9,9 @@ from hil.diagnosis.data.log import Floats
 from hil.diagnosis.estimation.gauss_newton import BIASED_BIRGE_RATIO, Fitter, Model, Term, same_terms, with_term
 from hil.diagnosis.estimation.information import finite_difference_jacobian
 from hil.diagnosis.noise.model import Noise, SampleMasks
-from hil.diagnosis.simulation.parameter_set import ParameterSet, recording_nuisances
+from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator
+from hil.diagnosis.vehicle.priors import recording_nuisances
 from hil.diagnosis.vehicle.spec import Vehicle
 
 _KINKED = ("ehb_dead_time_s",)

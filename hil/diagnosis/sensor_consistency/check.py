@@ -20,14 +20,14 @@ from hil.diagnosis.data.log import (
 from hil.diagnosis.sensor_consistency.braking import LEAST_STOPS, BrakingModel
 from hil.diagnosis.sensor_consistency.coverage import missing, needs
 from hil.diagnosis.sensor_consistency.held_out import HeldOutError, held_out_errors
-from hil.diagnosis.sensor_consistency.labels import Cause, causes_of
+from hil.diagnosis.sensor_consistency.labels import Cause, causes_of, simulated_effects
 from hil.diagnosis.sensor_consistency.lateral import LateralModel
 from hil.diagnosis.sensor_consistency.longitudinal import SLIP, LongitudinalModel, known_slip
-from hil.diagnosis.sensor_consistency.memory import load_channels, write_channels
 from hil.diagnosis.sensor_consistency.motion import Motion, motion_of
 from hil.diagnosis.sensor_consistency.selection import Progress, SelectionResult, select_parameters
 from hil.diagnosis.sensor_consistency.stops import estimates, nominal_braking, relative_sigma, stop_search
 from hil.diagnosis.sensor_consistency.wheel_radius import SPREAD, WheelRadiusModel
+from hil.diagnosis.vehicle.extension_file import load_channels, write_channels
 from hil.diagnosis.vehicle.spec import Vehicle
 from plant.injection.theta import THETA
 
@@ -87,7 +87,14 @@ def check(
     if out is not None:
         Path(out).mkdir(parents=True, exist_ok=True)
         written = str(Path(out) / "extension.toml")
-        write_channels(Path(written), models, causes)
+        effects, notes = simulated_effects(causes)
+        names = ", ".join(cause.labels[0].effect for cause in causes) or "no effect"
+        head = (
+            f"Estimated by a comparison of sensors: {names}",
+            "[effects] for `run --extend`; [channels] for `explain --extend`, which starts from these values.",
+        )
+        channels = {name: result.parameters for name, result in models.items()}
+        write_channels(Path(written), effects, channels, (*head, *notes))
     listed = [c.as_json() for c in causes]
     rivals = _rivals(causes, listed)
     tied = any(c.is_ambiguous for c in causes)

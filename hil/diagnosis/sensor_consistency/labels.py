@@ -1,10 +1,13 @@
 """What the numbers of the models are called in the list of effects, and which other effects would look the same."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from hil.diagnosis.sensor_consistency.selection import RARE, SelectionResult
+from plant.effects.effect import Scope
 from plant.injection.theta import THETA
 
 GRAVITY_MPS2 = 9.80665
@@ -194,3 +197,28 @@ def _scale(
     if not to_ground:  # nobody measured the ground: the wheels' radius would look the same
         names.append(Label("tyre_radius", "gain", "car", 1.0, 0.015))
     return tuple(names), (channel,), None
+
+
+def simulated_effects(causes: Sequence[Cause]) -> tuple[dict[str, dict[str, Any]], list[str]]:
+    """Effects by name that a simulation can have, as in the extension file, and notes on the causes that it cannot."""
+    effects: dict[str, dict[str, Any]] = {}
+    notes = []
+    for cause in causes:
+        name = cause.labels[0]
+        effect = THETA.effect(name.effect)
+        parameter = effect.parameter(name.parameter)
+        value = name.factor * cause.value
+        label = f"{name.effect}.{name.parameter} = {value:.6g} ({name.location}, {', '.join(cause.channels)})"
+        if name.effect == "wrong_scale":
+            notes.append(f"not simulated: {label}: correct the channel map, not the car")
+        elif cause.model == "braking" and name.effect != "timestamp_offset":
+            notes.append(f"not simulated: {label}: a parameter of that car")
+        elif not parameter.low <= value <= parameter.high:
+            notes.append(f"not simulated: {label}: outside {parameter.low:g} to {parameter.high:g}")
+        else:
+            entry = effects.setdefault(name.effect, {})
+            if effect.scope in (Scope.WHEEL, Scope.NODE, Scope.AXLE) and name.location in effect.scope.members:
+                entry.setdefault(name.parameter, {})[name.location] = value
+            else:
+                entry[name.parameter] = value
+    return effects, notes

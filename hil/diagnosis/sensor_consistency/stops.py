@@ -10,6 +10,7 @@ from hil.diagnosis.sensor_consistency.braking import BrakingModel
 from hil.diagnosis.sensor_consistency.likelihood import Fit, Values, fit, standard_deviations, typical_noise
 from hil.diagnosis.sensor_consistency.motion import Motion
 from hil.diagnosis.sensor_consistency.selection import ALPHA, THRESHOLD, Progress, SelectionResult, SelectionStep
+from hil.diagnosis.vehicle.priors import NuisanceKind
 from hil.diagnosis.vehicle.spec import Vehicle, rest_friction
 from plant.vectors import PARAMETER, P
 
@@ -30,7 +31,7 @@ _UNITS: Final = {
 def relative_sigma(vehicle: Vehicle, name: str, member: int = 0) -> float:
     """Standard deviation of one of the vehicle's numbers, as a share of it."""
     at = PARAMETER.slice(name).start + member
-    steps = [n.step[n.at.index(at)] for n in vehicle.nuisances if n.kind == "vehicle" and at in n.at]
+    steps = [n.step[n.at.index(at)] for n in vehicle.nuisances if n.kind is NuisanceKind.VEHICLE and at in n.at]
     return float(np.sqrt(np.sum(np.square(steps))) / vehicle.p[at]) if steps else 0.0
 
 

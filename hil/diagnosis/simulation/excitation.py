@@ -66,7 +66,7 @@ OF_LATENCY = (
     Excitation.TURNING,
     Excitation.TURNING,
 )
-"""What must be going on for the latency of each node (`hil.diagnosis.simulation.parameter_set.LATENCY_NODES`) to matter."""
+"""What must be going on for the latency of each node (`hil.diagnosis.vehicle.priors.LATENCY_NODES`) to matter."""
 
 
 def _of_number(name: str) -> Excitation:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hil.diagnosis.data.dataset import ROW_S
-from hil.diagnosis.data.interpolation import shifted, shifted_linear
+from hil.diagnosis.data.grid import shifted, shifted_linear
 from hil.diagnosis.data.log import Floats
 from plant.vectors import INPUT
 
@@ -14,7 +14,7 @@ _STEERING = INPUT.slice("steering_wheel_rad")
 def delayed(values: Floats, rows: float, straight: bool = False) -> Floats:
     """Channels as seen some rows later.
 
-    ``straight`` lines between rows for what has corners, as a motor at its rate limit; else `hil.diagnosis.data.interpolation`.
+    ``straight`` lines between rows for what has corners, as a motor at its rate limit; else `hil.diagnosis.data.grid`.
     """
     out = np.empty(values.shape)
     if straight:

@@ -7,9 +7,8 @@ import numpy as np
 
 from hil.diagnosis.compiled import compiled
 from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Recording
-from hil.diagnosis.data.interpolation import cubic, shifted_linear, upsampled
+from hil.diagnosis.data.grid import averaged, cubic, shifted_linear, upsampled
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.data.prepare import averaged
 from hil.diagnosis.simulation.latency import delayed
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.sensors import after_sensors

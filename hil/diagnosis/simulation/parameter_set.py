@@ -10,23 +10,14 @@ from hil.diagnosis.data.log import Floats
 from hil.diagnosis.simulation import excitation as acting
 from hil.diagnosis.simulation.excitation import Excitation
 from hil.diagnosis.simulation.sensors import SENSORS
-from hil.diagnosis.vehicle.keys import LATENCY_S
-from hil.diagnosis.vehicle.priors import HALF_WIDTH_TO_SIGMA, Nuisance, factor_of
+from hil.diagnosis.vehicle.extension_file import Extension
+from hil.diagnosis.vehicle.priors import LATENCY_NODES, Nuisance, NuisanceKind, factor_of
 from hil.diagnosis.vehicle.spec import Vehicle
-from plant.effects.effect import NODES
 from plant.injection.bank import NO_TERMS
 from plant.injection.theta import THETA
+from plant.vectors import PARAMETER
 
 _SIGN_ALONG_ROAD = (("road_grade", "grade"), ("headwind", "wind_mps"))
-LATENCY_NODES = ("imu", "pressure", "motor", "demand", "steering", "yaw_rate")
-"""Nodes whose frames may come later than the wheel speeds'; demands, and the steering wheel, may act later than they
-are logged; a yaw rate, which is filtered by itself, comes that much later than the accelerations."""
-GYRO_S = 6e-3
-"""Half-width of how much later a yaw rate comes, in s: as a filter of 25 Hz delays."""
-ZEROS = {"ay_mps2": 0.01, "yaw_rate_rad_s": 5e-4}
-"""Standard deviations of what an inertial unit tells at rest, across: a tenth of a degree of roll, and 0.03 deg/s."""
-DISC_MEASURED_SD_K, DISC_ASSUMED_SD_K = 5.0, 15.0
-"""Standard deviations of the discs' temperature at the start: as a thermocouple tells it, and as we guess."""
 
 
 @dataclass(frozen=True)
@@ -91,46 +82,40 @@ class ParameterSet:
         theta, window = self.theta.copy(), self.window_rows2
         for nuisance, amount in zip(nuisances, z, strict=True):
             for at, step in zip(nuisance.at, nuisance.step, strict=True):
-                if nuisance.kind == "disc":
-                    disc += amount * step
-                elif nuisance.kind in ("late", "held"):
-                    late[at] += amount * step
-                elif nuisance.kind == "tooth":
-                    tooth += amount * step
-                elif nuisance.kind == "window":
-                    window += amount * step
-                elif nuisance.kind in ("sensor", "scatter", "line"):
-                    theta[at] += amount * step
-                elif nuisance.kind == "signed":
-                    p[at] += amount * step
-                else:
-                    p[at] = _positive(p[at], amount, step)
+                match nuisance.kind:
+                    case NuisanceKind.VEHICLE:
+                        p[at] = _positive(p[at], amount, step)
+                    case NuisanceKind.SIGNED:
+                        p[at] += amount * step
+                    case NuisanceKind.SENSOR | NuisanceKind.SIDE_TO_SIDE | NuisanceKind.LINE_LAG:
+                        theta[at] += amount * step
+                    case NuisanceKind.LATENCY | NuisanceKind.DEMAND_LATENCY:
+                        late[at] += amount * step
+                    case NuisanceKind.DISC_TEMPERATURE:
+                        disc += amount * step
+                    case NuisanceKind.TOOTH_LAG:
+                        tooth += amount * step
+                    case NuisanceKind.TOOTH_WINDOW:
+                        window += amount * step
         return replace(
             self, p=p, theta=theta, disc_offset_k=disc, latency_s=tuple(late), tooth_share=tooth, window_rows2=window
         )
 
+    def with_extension(self, extension: Extension) -> "ParameterSet":
+        """With the effects, parameters and nonparametric terms of an extension file."""
+        p, theta = self.p.copy(), self.theta.copy()
+        for name, values in extension.parameters.items():
+            p[PARAMETER.slice(name)] = values
+        changed = extension.theta != THETA.neutral()
+        theta[changed] = extension.theta[changed]
+        rows = np.vstack([self.nonparametric_rows, extension.nonparametric_rows])
+        return replace(self, p=p, theta=theta, nonparametric_rows=rows)
 
-def recording_nuisances(disc_told: bool, latency_s: float) -> list[Nuisance]:
-    """What the logs, not the vehicle, leave open: temperature of the discs, latency of the nodes, zeros.
-
-    ``disc_told``: all logs tell the discs' temperature at the start. ``latency_s``: half-width of the latency of a node
-    that measures.
-    """
-    found = []
-    for k, node in enumerate(LATENCY_NODES):
-        half = latency_s if node in NODES else GYRO_S if node == "yaw_rate" else LATENCY_S
-        found.append(
-            Nuisance(f"late_{node}", (k,), (HALF_WIDTH_TO_SIGMA * half,), "held" if node == "demand" else "late")
-        )
-    found += [
-        Nuisance(f"zero_{name}", (THETA.slice("imu_bias", name).start,), (step,), "sensor")
-        for name, step in ZEROS.items()
-    ]
-    return [
-        Nuisance("disc_temperature_k", (0,), (DISC_MEASURED_SD_K if disc_told else DISC_ASSUMED_SD_K,), "disc"),
-        Nuisance("tooth_lag", (0,), (0.5,), "tooth"),
-        Nuisance("tooth_window", (0,), (1.0,), "window"), *found,
-    ]  # fmt: skip
+    def extension_of(self, vehicle: "ParameterSet") -> Extension:
+        """Effects and nonparametric terms, and the parameters that differ from those of a nominal vehicle."""
+        slices = {name: PARAMETER.slice(name) for name in PARAMETER.sizes}
+        changed = {n: self.p[own].tolist() for n, own in slices.items() if (self.p[own] != vehicle.p[own]).any()}
+        return Extension(self.theta, changed, self.nonparametric_rows)
 
 
 def _positive(now: float, z: float, step: float) -> float:

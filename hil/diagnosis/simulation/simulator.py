@@ -12,8 +12,8 @@ from scipy.signal import savgol_filter
 
 from hil.diagnosis.compiled import WORKERS
 from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Dataset, Recording, Segment
+from hil.diagnosis.data.grid import averaged
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.data.prepare import averaged
 from hil.diagnosis.parallel import parallel_map
 from hil.diagnosis.simulation import excitation as acting
 from hil.diagnosis.simulation.hot_spots import (

@@ -1,94 +1,108 @@
-"""The extension file: what a diagnosis taught, as TOML that ``explain --extend`` and ``run --extend`` take."""
+"""The extension file: what a diagnosis adds to a car, as TOML that ``explain --extend`` and ``run --extend`` take.
+
+``[effects]``, ``[[laws]]`` (nonparametric terms) and ``[parameters]`` are for simulations; ``[channels]``, by model, is
+for the next comparison of sensors (`hil.diagnosis.sensor_consistency`).
+"""
 
 import json
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hil.diagnosis.data.log import Floats, UnusableError
-from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.scenario.effects import EffectError, read_laws, written_laws
 from plant.injection.bank import NO_TERMS
 from plant.injection.theta import THETA
 from plant.vectors import PARAMETER
 
+_CHANNEL_MODELS = ("along", "turning", "wheels", "braking")
+
 
 @dataclass(frozen=True, eq=False)
 class Extension:
-    """Theta of the effects, numbers of the vehicle by flat name and place that the fit moved, rows of unlisted laws."""
+    """Theta of the effects, changed parameters of the plant by flat name, and rows of nonparametric terms.
+
+    Theta is (THETA.size,), the rows as in `plant.injection.bank`.
+    """
 
     theta: Floats
     parameters: Mapping[str, list[float]]
     nonparametric_rows: Floats = field(default_factory=NO_TERMS.copy)
 
-    def applied(self, world: ParameterSet) -> ParameterSet:
-        """A world with the extension."""
-        p = world.p.copy()
-        for name, values in self.parameters.items():
-            p[PARAMETER.slice(name)] = values
-        neutral = THETA.neutral()
-        moved = self.theta != neutral
-        theta = world.theta.copy()
-        theta[moved] = self.theta[moved]
-        return replace(
-            world, p=p, theta=theta, nonparametric_rows=np.vstack([world.nonparametric_rows, self.nonparametric_rows])
-        )
 
-
-def write_extension(path: Path, handed_in: ParameterSet, extended: ParameterSet, note: str) -> None:
-    """Write what the extended world has and the one handed in has not."""
-    lines = [
-        f"# {note}",
-        "# Effects by name, then the vehicle's numbers within their tolerance as the data have them.",
-        "",
-    ]
+def write_extension(path: Path, extension: Extension, note: str) -> None:
+    """Write an extension file that begins with the comment ``note``."""
     neutral = THETA.neutral()
+    effects: dict[str, dict[str, Any]] = {}
     for effect in THETA.effects:
-        entries = []
+        entries: dict[str, Any] = {}
         for parameter in effect.parameters:
-            where = THETA.slice(effect.name, parameter.name)
-            values = extended.theta[where]
-            if np.any(values != neutral[where]):
-                members = effect.scope.members
-                shown = (
-                    repr(float(values[0])) if len(values) == 1
-                    else "{ " + ", ".join(f"{m} = {float(v)!r}" for m, v in zip(members, values, strict=True)) + " }"
-                )  # fmt: skip
-                entries.append(f"{parameter.name} = {shown}")
+            own = THETA.slice(effect.name, parameter.name)
+            values = extension.theta[own].tolist()
+            if np.any(extension.theta[own] != neutral[own]):
+                by_member = zip(effect.scope.members, values, strict=True)
+                entries[parameter.name] = values[0] if len(values) == 1 else dict(by_member)
         for time in ("onset_s", "until_s"):
-            value = float(extended.theta[THETA.slice(effect.name, time)][0])
+            value = float(extension.theta[THETA.slice(effect.name, time)][0])
             if entries and abs(value) < 1e11:
-                entries.append(f"{time} = {value!r}")
-        if entries:
-            lines += [f"[effects.{effect.name}]", *entries, ""]
-    for law in written_laws(extended.nonparametric_rows):
-        lines += ["[[laws]]", *(f"{name} = {json.dumps(value)}" for name, value in law.items()), ""]
-    moved = extended.p != handed_in.p
-    if moved.any():
-        lines.append("[parameters]")
-        for name in PARAMETER.sizes:
-            where = PARAMETER.slice(name)
-            if moved[where].any():
-                lines.append(f"{name} = {json.dumps([float(v) for v in extended.p[where]])}")
-        lines.append("")
-    path.write_text("\n".join(lines), encoding="utf-8")
+                entries[time] = value
+        effects[effect.name] = entries
+    lines = [f"# {note}", "# Effects by name, then estimated parameters of the vehicle within their tolerance."]
+    lines += _tables("effects", effects)
+    for law in written_laws(extension.nonparametric_rows):
+        lines += ["", "[[laws]]", *_entries(law)]
+    if extension.parameters:
+        lines += ["", "[parameters]", *_entries(extension.parameters)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def write_channels(
+    path: Path, effects: Mapping[str, Mapping[str, Any]], channels: Mapping[str, Mapping[str, float]],
+    notes: Sequence[str],
+) -> None:  # fmt: skip
+    """Write the result of a comparison of sensors: effects, estimated parameters by model, and comments ``notes``."""
+    lines = [*(f"# {note}" for note in notes), *_tables("effects", effects), *_tables("channels", channels)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _tables(kind: str, tables: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Lines of the tables ``[kind.name]``, without empty ones."""
+    return [line for name, table in tables.items() if table for line in ("", f"[{kind}.{name}]", *_entries(table))]
+
+
+def _entries(table: Mapping[str, Any]) -> list[str]:
+    return [f"{toml_key(key)} = {toml_value(value)}" for key, value in table.items()]
+
+
+def toml_key(key: str) -> str:
+    """A TOML key, quoted where it has to be."""
+    return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else json.dumps(key)
+
+
+def toml_value(value: Any) -> str:
+    """A TOML value; mappings become inline tables."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{toml_key(k)} = {toml_value(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(toml_value(v) for v in value) + "]"
+    if isinstance(value, str | bool):
+        return json.dumps(value)
+    return repr(float(value) if isinstance(value, float) else value)
 
 
 def load_extension(path: Path) -> Extension:
-    """Read an extension file.
+    """Effects, parameters and nonparametric terms of an extension file.
 
     Raises
     ------
     UnusableError
-        Not TOML, an unknown effect or number, a value out of bounds.
+        Not TOML; an unknown effect or parameter; a value out of bounds.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise UnusableError(f"{path}: not an extension file: {error}") from error
+    table = _read(path)
     theta = THETA.neutral()
     for name, values in table.get("effects", {}).items():
         try:
@@ -98,15 +112,35 @@ def load_extension(path: Path) -> Extension:
     parameters = {}
     for name, values in table.get("parameters", {}).items():
         if name not in PARAMETER.sizes:
-            raise UnusableError(f"{path}: parameters: no number {name!r} in the plant")
-        numbers = [float(v) for v in (values if isinstance(values, list) else [values])]
-        if len(numbers) != PARAMETER.sizes[name]:
-            raise UnusableError(
-                f"{path}: parameters.{name}: expected {PARAMETER.sizes[name]} numbers, got {len(numbers)}"
-            )
-        parameters[name] = numbers
+            raise UnusableError(f"{path}: parameters: the plant has no parameter {name!r}")
+        parameters[name] = [float(v) for v in (values if isinstance(values, list) else [values])]
+        expected, got = PARAMETER.sizes[name], len(parameters[name])
+        if got != expected:
+            raise UnusableError(f"{path}: parameters.{name}: expected {expected} values, got {got}")
     try:
-        terms = read_laws(table.get("laws", []), f"{path}: laws")
+        rows = read_laws(table.get("laws", []), f"{path}: laws")
     except EffectError as error:
         raise UnusableError(str(error)) from error
-    return Extension(theta, parameters, terms)
+    return Extension(theta, parameters, rows)
+
+
+def load_channels(path: Path) -> dict[str, dict[str, float]]:
+    """Estimated parameters of ``[channels]``, by model.
+
+    Raises
+    ------
+    UnusableError
+        Not TOML, or an unknown model.
+    """
+    table = _read(path).get("channels", {})
+    unknown = [name for name in table if name not in _CHANNEL_MODELS or not isinstance(table[name], dict)]
+    if unknown:
+        raise UnusableError(f"{path}: channels.{unknown[0]}: expected one of {', '.join(_CHANNEL_MODELS)}")
+    return {name: {key: float(v) for key, v in values.items()} for name, values in table.items()}
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise UnusableError(f"{path}: not an extension file: {error}") from error

@@ -1,4 +1,4 @@
-"""Keys of a vehicle set: short names for the numbers a car is known by; all others are the plant's own, flat."""
+"""Keys of a vehicle set: short names of common parameters; all others are the plant's own flat names."""
 
 from typing import Final
 
@@ -39,7 +39,7 @@ ALIASES: Final = {
     "damping_ratio": "ehb_damping_ratio",
     "torque_constant_nm_a": "motor_torque_constant_nm_a",
 }
-"""Short name -> name used here."""
+"""Short name -> flat name."""
 
 DERIVED: Final = {
     "lift_front": ("vehicle_lift_coefficient", 0, 1.0),
@@ -60,23 +60,23 @@ DERIVED: Final = {
     "pitch_damping": ("suspension_damping_ns_m", None, 2400.0 / 0.3),
     "dive_rad_s2_m": ("suspension_brake_support_tangent", None, 0.27 / 0.00231),
 }
-"""Key -> (the plant's number, place in a pair, factor). Place None: only its tolerance counts, for both axles."""
+"""Key -> (parameter of the plant, index in a pair, factor). Index None: only its tolerance counts, for both axles."""
 
 SPECIAL: Final = {
     "wheelbase_m", "cog_to_front_axle_m", "cog_to_rear_axle_m", "front_weight_share", "brake_gain_front",
     "brake_gain_rear",
 }  # fmt: skip
-"""Names that are no single number of the plant; brake gains are N m at one wheel per Pa."""
+"""Names that are not a parameter of the plant by themselves; brake gains are N m at one wheel per Pa."""
 
 LATENCY: Final = "node_latency_s"
-"""Of it a set states the tolerance alone: how much later or earlier than the wheel speeds a node's frames are sent."""
+"""Latency of a node's frames behind those of the wheel speeds; a set states its tolerance alone."""
 LATENCY_S: Final = 4e-3
-"""Half-width of that where a set does not say."""
+"""Default half-width of the latency, s."""
 LINE: Final = "line_lag_s"
-"""Of it, too: by how much pads lag behind what the sensors of the pressures tell, as one pole."""
+"""Lag of the pads behind the pressure sensors, as one pole; a set states its tolerance alone."""
 LINE_S: Final = 8e-3
-"""Half-width of that where a set does not say: 5 to 20 ms of a line (`plant.effects.hydraulics.pressure_location`),
-which many a set counts into its dead time."""
+"""Default half-width of the line lag, s: 5 to 20 ms of a line (`plant.effects.hydraulics.pressure_location`), which many sets
+count into their dead time."""
 
 WIDE: Final = {
     "vehicle_mass_kg": 0.1,
@@ -99,7 +99,7 @@ WIDE: Final = {
     "suspension_ride_rate_n_m": 2.0,
     "suspension_damping_ns_m": 1.0,
 }
-"""Half width as a share of the usual value, where a set does not say."""
+"""Default half-width of a parameter that a set does not state, as a share of the shipped value."""
 
 UNLIMITED: Final = {
     "ehb": ({"build_rate_pa_s": 5e8, "release_rate_pa_s": 5e8},),
@@ -110,7 +110,7 @@ UNLIMITED: Final = {
     "battery": ({"charge_power_w": 1e6, "discharge_power_w": 1e6},),
     "tyre": (),
 }  # fmt: skip
-"""Limits that do not act, for those of which a set says nothing: another car's limits would be wrong."""
+"""Limits out of reach, for those that a set does not state: another car's limits would be wrong."""
 
 OF_SECTION: Final = {
     "ehb": (
@@ -121,4 +121,14 @@ OF_SECTION: Final = {
     "battery": ("battery_soc",),
     "tyre": ("slip_stiffness", "tyre_relaxation", "load_sensitivity", "tyre_temperature", "low_speed", "mu_road"),
 }  # fmt: skip
-"""Effects that change what a section states: where it states nothing, nothing can be told from it."""
+"""Effects on a section of the vehicle set: undetectable where the set does not state the section."""
+
+_SECTIONS: Final = (
+    "friction_brake", "vehicle", "suspension", "wheel", "tyre", "ehb", "pad", "motor", "battery", "sensor",
+)  # fmt: skip
+
+
+def split_name(flat: str) -> tuple[str, str]:
+    """Section of a parameter of the plant, and its name there, by its flat name."""
+    section = next(section for section in _SECTIONS if flat.startswith(f"{section}_"))
+    return section, flat.removeprefix(f"{section}_")

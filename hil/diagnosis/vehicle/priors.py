@@ -1,176 +1,308 @@
-"""Numbers of the vehicle that may be off, and by how much: what the set states, and forms of curves that none does."""
+"""Nuisance parameters and their priors: what a vehicle set states, what no set states, and what the logs leave open."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
-from hil.diagnosis.data.log import Floats
-from plant.layout import Layout
+from hil.diagnosis.data.log import WHEELS, Floats
+from hil.diagnosis.vehicle.keys import LATENCY_S
+from plant.effects.effect import NODES
+from plant.injection.theta import THETA
+from plant.vectors import PARAMETER, P
 
 CONSTANT_EPSILON_W = 1e7
-"""Pads from here on have one friction, whatever their temperature."""
+"""Pad parameter epsilon from which on the pad friction is constant."""
 BRAKE_K = 423.15
-"""Temperature that brake gains are stated at."""
-HALF_WIDTH_TO_SIGMA = 0.5  # a tolerance is two standard deviations
-_GUESSED = 8.0
+"""Disc temperature that brake gains are stated at."""
+HALF_WIDTH_TO_SIGMA = 0.5
+"""A tolerance is two standard deviations."""
+_WIDE_BOUND = 8.0
 _WIDE, _MOST_FACTOR, _MOST_TIMES = 0.1, 1.7, 5.0
-_FORM = {
-    "motor_time_constant_s": 0.1, "ehb_dead_time_s": 0.1, "wheel_inertia_kg_m2": 0.05, "vehicle_cog_height_m": 0.04,
-    "vehicle_yaw_inertia_kg_m2": 0.05, "vehicle_steering_ratio": 0.02,
-}  # fmt: skip
-"""Share that a number is off at least, however well it is stated: an equation's number is not what was measured."""
-_SUSPENSION = {
-    "suspension_ride_rate_n_m": 0.3, "suspension_progression_n_m3": 1.0, "suspension_damping_ns_m": 0.3,
-    "suspension_brake_support_tangent": 0.6, "suspension_drive_support_tangent": 0.6,
-    "suspension_anti_roll_nm_rad": 0.7, "suspension_roll_centre_height_m": 3.0,
-    "vehicle_pitch_inertia_kg_m2": 0.6, "vehicle_roll_inertia_kg_m2": 0.2,
-}  # fmt: skip
-_SPRINGS = 0.05
-"""The same share of a number of the suspension that a set states."""
-_LIFT = 0.1
-"""Half-width of an axle's lift coefficient that no set states."""
-_SIDE = 0.5
-"""Share that the load may be off at which a tyre's cornering stiffness is largest: whether it grows with the load."""
-_THERMAL = {"friction_brake_heat_capacity_j_k": 0.2, "friction_brake_cooling_w_k": 0.3}
-"""Heat store of the discs, if a set does not state it."""
-_SIGNED = (
-    "suspension_progression_n_m3", "suspension_brake_support_tangent", "suspension_drive_support_tangent",
-    "suspension_roll_centre_height_m",
-)  # fmt: skip
-"""Numbers that a car may have of either sign."""
+"""Share of a standard deviation in a positive value from which on the value is multiplied; the largest factor of one
+standard deviation, and of the bound of a wide prior."""
+
+
+class NuisanceKind(StrEnum):
+    """What a nuisance parameter moves in a parameter set, and how."""
+
+    VEHICLE = "vehicle"
+    """A positive parameter of the vehicle: added to, or multiplied where it is uncertain (`factor_of`)."""
+    SIGNED = "signed"
+    """A parameter of the vehicle of either sign: added to."""
+    SENSOR = "sensor"
+    """Zero of a sensor, in theta."""
+    SIDE_TO_SIDE = "side_to_side"
+    """Deviation of one brake, motor, tyre or clock from the others, in theta."""
+    LINE_LAG = "line_lag"
+    """Lag of the pads behind the pressure sensors, in theta; not negative."""
+    LATENCY = "latency"
+    """Latency of a node's frames behind those of the wheel speeds."""
+    DEMAND_LATENCY = "demand_latency"
+    """Latency from a logged demand to its action; not negative."""
+    DISC_TEMPERATURE = "disc_temperature"
+    """Temperature of the discs at the start."""
+    TOOTH_LAG = "tooth_lag"
+    """Lag of a toothed wheel's speed."""
+    TOOTH_WINDOW = "tooth_window"
+    """Time over which a toothed wheel's speed is a mean; not negative."""
+
+
+_NOT_NEGATIVE = (NuisanceKind.DEMAND_LATENCY, NuisanceKind.TOOTH_WINDOW, NuisanceKind.LINE_LAG)
 
 
 @dataclass(frozen=True, eq=False)
 class Nuisance:
-    """A number of the vehicle that may be off: ``p[at] += z * step``, z normal with standard deviation 1.
+    """An uncertain parameter of no interest: ``value[at] += z * step``, z normal with standard deviation 1.
 
-    ``farthest`` is how many standard deviations it may be off at most; farther off it is a cause to be named. Beyond
-    ``most`` more its equation has no meaning.
-    ``kind`` says of what: a number of the vehicle (``signed`` if it may be below zero), the discs' temperature at the
-    start, the latency of a node, or of what holds a demand (never below zero), zero of a sensor, what one brake, motor,
-    tyre or clock is off beside the others (``scatter``), the lag of a toothed wheel, or the time over which it is a
-    mean (never below zero), the lag of pads behind their sensors (``line``, never below zero).
+    Attributes
+    ----------
+    at : indices in the vector that ``kind`` says.  step : (len(at),) prior standard deviations, in its units.
+    bound : largest z; a parameter farther off is a cause to be named.
+    upper_bound : largest z > 0 for which the equation has a meaning.
     """
 
     name: str
     at: tuple[int, ...]
     step: tuple[float, ...]
-    kind: str = "vehicle"
+    kind: NuisanceKind = NuisanceKind.VEHICLE
     bound: float = 3.0
     upper_bound: float = np.inf
 
     @property
+    def lower(self) -> float:
+        """Smallest z."""
+        return 0.0 if self.kind in _NOT_NEGATIVE else -self.bound
+
+    @property
     def upper(self) -> float:
-        """How many standard deviations it may be more at most."""
+        """Largest z."""
         return min(self.bound, self.upper_bound)
 
 
+def factor_of(value: float, step: float) -> float:
+    """Factor that one standard deviation multiplies an uncertain positive value by; 1 where ``step`` is added."""
+    wide = value > 0.0 and abs(step) >= _WIDE * value
+    return min(1.0 + abs(step) / value, _MOST_FACTOR) if wide else 1.0
+
+
 def with_wide_prior(nuisance: Nuisance, p: Floats) -> Nuisance:
-    """A number that no set states may go far, but a positive one to no more than five times or a fifth."""
-    if nuisance.kind == "signed":
-        return replace(nuisance, bound=_GUESSED)
+    """A parameter that no set states, with a wide bound: a positive one at most five times or a fifth of its value."""
+    if nuisance.kind is NuisanceKind.SIGNED:
+        return replace(nuisance, bound=_WIDE_BOUND)
     factor = max(factor_of(p[at], step) for at, step in zip(nuisance.at, nuisance.step, strict=True))
-    limit = np.log(_MOST_TIMES) / np.log(factor) if factor > 1.0 else _GUESSED
-    return replace(nuisance, bound=min(_GUESSED, float(limit)))
+    limit = np.log(_MOST_TIMES) / np.log(factor) if factor > 1.0 else _WIDE_BOUND
+    return replace(nuisance, bound=min(_WIDE_BOUND, float(limit)))
 
 
-def factor_of(now: float, step: float) -> float:
-    """By what one standard deviation multiplies a positive number known badly; 1 for one that it is added to."""
-    wide = now > 0.0 and abs(step) >= _WIDE * now
-    return min(1.0 + abs(step) / now, _MOST_FACTOR) if wide else 1.0
+class _Prior(NamedTuple):
+    """Row of the table: half-width of a parameter of the plant.
+
+    It is the set's tolerance, and at least ``share`` of the value and ``half_width``; where the set states the value,
+    at least ``if_stated`` of it instead.  ``fixed``: whatever the set says.
+    ``split``: one nuisance per axle.  ``signed``: of either sign.  ``name`` of the nuisance, if not the parameter's.
+    ``reciprocal`` of another parameter is the upper limit.
+    """
+
+    parameter: str
+    share: float = 0.0
+    if_stated: float = 0.0
+    half_width: float = 0.0
+    fixed: bool = False
+    split: bool = False
+    signed: bool = False
+    name: str = ""
+    reciprocal: str = ""
 
 
-def _amount(now: float, step: float, then: float) -> float:
-    """How many standard deviations a positive number ``then`` is off ``now``."""
-    factor = factor_of(now, step)
-    return float(np.log(then / now) / np.log(factor)) if factor > 1.0 else (then - now) / step
+_WHOLE_CAR = (
+    _Prior("vehicle_mass_kg"), _Prior("vehicle_cog_height_m", 0.04, 0.04), _Prior("vehicle_drag_coefficient"),
+    _Prior("vehicle_rolling_resistance"), _Prior("wheel_rolling_radius_m"), _Prior("wheel_inertia_kg_m2", 0.05, 0.05),
+    _Prior("tyre_lkx"), _Prior("tyre_lsgkp"), _Prior("ehb_natural_frequency_hz"), _Prior("ehb_damping_ratio"),
+    _Prior("ehb_dead_time_s", 0.1, 0.1), _Prior("ehb_build_rate_pa_s"), _Prior("ehb_release_rate_pa_s"),
+    _Prior("tyre_lmux"), _Prior("motor_time_constant_s", 0.1, 0.1), _Prior("motor_rate_limit_nm_s"),
+    _Prior("motor_peak_torque_nm"), _Prior("motor_fade_end_mps"), _Prior("motor_fade_start_mps"),
+    _Prior("battery_charge_power_w"), _Prior("sensor_imu_cutoff_hz"), _Prior("tyre_lky"),
+    _Prior("vehicle_yaw_inertia_kg_m2", 0.05, 0.05), _Prior("vehicle_steering_ratio", 0.02, 0.02),
+)  # fmt: skip
+"""Both axles are moved together. A share counts however well the set states the value: a parameter of an equation is
+not quite what was measured."""
+_AXLES = (
+    _Prior("friction_brake_threshold_pressure_pa", split=True),
+    _Prior("vehicle_slip_angle_share", split=True),
+)
+_CURVES = (
+    _Prior("pad_a_1_ks"),
+    _Prior("pad_epsilon_w"),
+    _Prior("pad_c_1_s"),
+    _Prior("tyre_lex", half_width=1.5, fixed=True, name="tyre_curve", reciprocal="tyre_pex1"),
+    _Prior("tyre_lcx", half_width=0.25, fixed=True, name="tyre_shape"),
+    _Prior("tyre_pkx3", half_width=0.3, fixed=True, name="tyre_stiffness_load"),
+    _Prior("tyre_pky2", 0.5, fixed=True, name="tyre_side_stiffness_load"),
+    _Prior("tyre_pdx2", half_width=0.04, fixed=True, name="tyre_friction_load"),
+    _Prior("tyre_ptx2", half_width=1.5, fixed=True, name="tyre_relaxation_load"),
+    _Prior("wheel_brake_windup_time_s", half_width=0.006, fixed=True),
+    _Prior("tyre_lsgal", half_width=0.3, fixed=True),
+    _Prior("tyre_lmuy", half_width=0.15, fixed=True),
+    _Prior("vehicle_lift_coefficient", half_width=0.1, split=True, signed=True),
+    _Prior("suspension_ride_rate_n_m", 0.3, 0.05, split=True),
+    _Prior("suspension_progression_n_m3", 1.0, 0.05, split=True, signed=True),
+    _Prior("suspension_damping_ns_m", 0.3, 0.05, split=True),
+    _Prior("suspension_brake_support_tangent", 0.6, 0.05, split=True, signed=True),
+    _Prior("suspension_drive_support_tangent", 0.6, 0.05, split=True, signed=True),
+    _Prior("suspension_anti_roll_nm_rad", 0.7, 0.05, split=True),
+    _Prior("suspension_roll_centre_height_m", 3.0, 0.05, split=True, signed=True),
+    _Prior("vehicle_pitch_inertia_kg_m2", 0.6, 0.05),
+    _Prior("vehicle_roll_inertia_kg_m2", 0.2, 0.05),
+    _Prior("friction_brake_heat_capacity_j_k", 0.2, split=True),
+    _Prior("friction_brake_cooling_w_k", 0.3, split=True),
+)
+"""Pads; curves of the tyre near its peak and sideways, which hardly a set states; body, suspension and discs."""
 
 
-def nuisance_parameters(
-    p: Floats, tolerance: Mapping[str, float], layout: Layout, stated: Collection[str]
-) -> list[Nuisance]:
-    """One a parameter; what acts alike is one (radius and area, pad numbers), axles are moved together or apart.
+def nuisance_parameters(p: Floats, tolerance: Mapping[str, float], stated: Collection[str]) -> list[Nuisance]:
+    """Nuisances of a car: one per parameter or axle; parameters with the same action (pad radius and area) are one.
 
     Parameters
     ----------
-    tolerance : half-widths of numbers of the flat vehicle ``p``.  stated : numbers that the set gives.
+    p : (PARAMETER.size,).  tolerance : half-widths by parameter.  stated : parameters that the vehicle set gives.
     """
-    found: list[Nuisance] = []
 
-    def add(name: str, at: list[int], half: list[float]) -> None:
-        if any(half):
-            found.append(Nuisance(name, tuple(at), tuple(h * HALF_WIDTH_TO_SIGMA for h in half)))
+    def of(rows: tuple[_Prior, ...]) -> list[Nuisance]:
+        return [nuisance for row in rows for nuisance in _nuisances(row, p, tolerance, row.parameter in stated)]
 
-    for name in (
-        "vehicle_mass_kg", "vehicle_cog_height_m", "vehicle_drag_coefficient", "vehicle_rolling_resistance",
-        "wheel_rolling_radius_m", "wheel_inertia_kg_m2", "tyre_lkx", "tyre_lsgkp", "ehb_natural_frequency_hz",
-        "ehb_damping_ratio", "ehb_dead_time_s", "ehb_build_rate_pa_s", "ehb_release_rate_pa_s",
-        "tyre_lmux", "motor_time_constant_s",
-        "motor_rate_limit_nm_s", "motor_peak_torque_nm",
-        "motor_fade_end_mps", "motor_fade_start_mps", "battery_charge_power_w", "sensor_imu_cutoff_hz",
-        "tyre_lky", "vehicle_yaw_inertia_kg_m2", "vehicle_steering_ratio",
-    ):  # fmt: skip
-        own = layout.slice(name)
-        half = max(tolerance.get(name, 0.0), _FORM.get(name, 0.0) * float(p[own].mean()))
-        add(name, list(range(own.start, own.stop)), [half] * layout.sizes[name])
-    cog = layout.slice("vehicle_cog_to_axle_m").start
-    add(
-        "vehicle_cog_to_axle_m",
-        [cog, cog + 1],
-        [tolerance.get("cog_to_front_axle_m", tolerance.get("vehicle_cog_to_axle_m", 0.0))] * 2,
+    cog = PARAMETER.slice("vehicle_cog_to_axle_m").start
+    step = HALF_WIDTH_TO_SIGMA * tolerance.get("cog_to_front_axle_m", tolerance.get("vehicle_cog_to_axle_m", 0.0))
+    nuisances = [*of(_WHOLE_CAR), Nuisance("vehicle_cog_to_axle_m", (cog, cog + 1), (step, -step))]
+    of_axles = of(_AXLES)
+    for k, axle in enumerate(("front", "rear")):
+        area = PARAMETER.slice("friction_brake_piston_area_m2").start + k
+        if step := HALF_WIDTH_TO_SIGMA * (_brake_gain_share(p, tolerance, k, axle) * float(p[area])):
+            nuisances.append(Nuisance(f"brake_gain_{axle}", (area,), (step,)))
+        nuisances += [one for one in of_axles if one.name.endswith(axle)]
+    return nuisances + of(_CURVES)
+
+
+def _nuisances(row: _Prior, p: Floats, tolerance: Mapping[str, float], stated: bool) -> list[Nuisance]:
+    """Nuisances of one row, without those of no half-width."""
+    own, name = PARAMETER.slice(row.parameter), row.name or row.parameter
+    members = [(at,) for at in range(own.start, own.stop)] if row.split else [tuple(range(own.start, own.stop))]
+    share, least = (row.if_stated, 0.0) if stated and not row.fixed else (row.share, row.half_width)
+    kind = NuisanceKind.SIGNED if row.signed else NuisanceKind.VEHICLE
+    nuisances = []
+    for at, axle in zip(members, ("_front", "_rear") if row.split else ("",), strict=True):
+        value = float(p[list(at)].mean())
+        half_width = max(0.0 if row.fixed else tolerance.get(row.parameter, 0.0), share * value, least)
+        if half_width:
+            step = HALF_WIDTH_TO_SIGMA * half_width
+            limit = np.inf
+            if row.reciprocal and (factor := float(p[PARAMETER.slice(row.reciprocal)][0])) > 0.0:
+                limit = _sigmas(value, step, 1.0 / factor)  # E is 1 at most (Pacejka 2012, eq. 4.E14)
+            nuisances.append(Nuisance(f"{name}{axle}", at, (step,) * len(at), kind, upper_bound=limit))
+    return nuisances
+
+
+def _sigmas(value: float, step: float, other: float) -> float:
+    """Number of standard deviations from a positive ``value`` to ``other``."""
+    factor = factor_of(value, step)
+    return float(np.log(other / value) / np.log(factor)) if factor > 1.0 else (other - value) / step
+
+
+def _brake_gain_share(p: Floats, tolerance: Mapping[str, float], k: int, axle: str) -> float:
+    """Half-width of an axle's brake gain as a share of it: as stated, else of its piston, radius and efficiency."""
+    area, radius = (
+        float(p[PARAMETER.slice(f"friction_brake_{name}").start + k])
+        for name in ("piston_area_m2", "effective_radius_m")
     )
-    found[-1] = replace(found[-1], step=(found[-1].step[0], -found[-1].step[1]))
-    for k, axle in enumerate(("front", "rear")):
-        area = layout.slice("friction_brake_piston_area_m2").start + k
-        radius = layout.slice("friction_brake_effective_radius_m").start + k
+    gain = tolerance.get(f"brake_gain_{axle}")
+    if gain is None or not np.isfinite(gain):
         share = np.hypot(
-            tolerance.get("friction_brake_piston_area_m2", 0.0) / p[area],
-            tolerance.get("friction_brake_effective_radius_m", 0.0) / p[radius],
+            tolerance.get("friction_brake_piston_area_m2", 0.0) / area,
+            tolerance.get("friction_brake_effective_radius_m", 0.0) / radius,
         )
-        share = np.hypot(share, tolerance.get("friction_brake_efficiency", 0.0))
-        gain = tolerance.get(f"brake_gain_{axle}")
-        if gain is not None and np.isfinite(gain):
-            brake_gain = 2.0 * p[layout.slice("pad_a_1_ks").start] / p[layout.slice("pad_b_1_j").start]
-            brake_gain *= p[layout.slice("friction_brake_efficiency").start] * p[area] * p[radius]
-            temperature = p[layout.slice("friction_brake_ambient_k").start]
-            epsilon = p[layout.slice("pad_epsilon_w").start]
-            reached = temperature if epsilon >= CONSTANT_EPSILON_W else BRAKE_K
-            share = gain / (brake_gain * reached / epsilon)
-        add(f"brake_gain_{axle}", [area], [float(share) * p[area]])
-        for name in ("friction_brake_threshold_pressure_pa", "vehicle_slip_angle_share"):
-            add(f"{name}_{axle}", [layout.slice(name).start + k], [tolerance.get(name, 0.0)])
-    for name in ("pad_a_1_ks", "pad_epsilon_w", "pad_c_1_s"):
-        add(name, [layout.slice(name).start], [tolerance.get(name, 0.0)])
-    # forms of curves that no vehicle set states: the tyre's near its peak and at the side, the roll of the body
-    curve = layout.slice("tyre_lex").start
-    add("tyre_curve", [curve], [1.5])
-    of_one = float(p[layout.slice("tyre_pex1").start])
-    if of_one > 0.0:  # E is 1 at most (Pacejka 2012, eq. 4.E14)
-        found[-1] = replace(found[-1], upper_bound=_amount(float(p[curve]), found[-1].step[0], 1.0 / of_one))
-    add("tyre_shape", [layout.slice("tyre_lcx").start], [0.25])
-    add("tyre_stiffness_load", [layout.slice("tyre_pkx3").start], [0.3])
-    side = layout.slice("tyre_pky2").start
-    add("tyre_side_stiffness_load", [side], [_SIDE * float(p[side])])
-    add("tyre_friction_load", [layout.slice("tyre_pdx2").start], [0.04])
-    add("tyre_relaxation_load", [layout.slice("tyre_ptx2").start], [1.5])
-    add("wheel_brake_windup_time_s", [layout.slice("wheel_brake_windup_time_s").start], [0.006])
-    add("tyre_lsgal", [layout.slice("tyre_lsgal").start], [0.3])
-    add("tyre_lmuy", [layout.slice("tyre_lmuy").start], [0.15])
-    lift = layout.slice("vehicle_lift_coefficient")
-    least = 0.0 if "vehicle_lift_coefficient" in stated else _LIFT
-    for k, axle in enumerate(("front", "rear")):
-        half = max(tolerance.get("vehicle_lift_coefficient", 0.0), least)
-        add(f"vehicle_lift_coefficient_{axle}", [lift.start + k], [half])
-        found[-1] = replace(found[-1], kind="signed")
-    # the same for suspension and discs, where a set does not state them
-    shares = {name: _SPRINGS if name in stated else share for name, share in _SUSPENSION.items()}
-    shares |= {name: 0.0 if name in stated else share for name, share in _THERMAL.items()}
-    for name, share in shares.items():
-        at, size = layout.slice(name).start, layout.sizes[name]
-        for k in range(size):
-            half = max(tolerance.get(name, 0.0), share * float(p[at + k]))
-            add(name if size == 1 else f"{name}_{('front', 'rear')[k]}", [at + k], [half])
-            if name in _SIGNED:
-                found[-1] = replace(found[-1], kind="signed")
-    return found
+        return float(np.hypot(share, tolerance.get("friction_brake_efficiency", 0.0)))
+    brake_gain = 2.0 * p[P.pad_a_1_ks] / p[P.pad_b_1_j]
+    brake_gain *= p[P.friction_brake_efficiency] * area * radius
+    epsilon = p[P.pad_epsilon_w]
+    temperature = p[P.friction_brake_ambient_k] if epsilon >= CONSTANT_EPSILON_W else BRAKE_K
+    return float(gain / (brake_gain * temperature / epsilon))
+
+
+_SIDE_TO_SIDE = (
+    ("pressure_offset", "offset_pa", 7e3), ("pressure_gain", "gain", 0.005), ("iwm_gain", "gain", 0.005),
+    ("iwm_gain", "unseen", 0.005), ("pad_mu_gain", "gain", 0.01), ("tyre_radius", "gain", 0.0012),
+)  # fmt: skip
+"""Effect, parameter and prior sd by wheel: zero and gain of a pressure sensor; torque of a motor beside its demand and
+beside its measured value; friction of the pads; radius of a wheel (docs/decisions/nuisance-parameters.md)."""
+_CLOCK_SHARE = 5e-5
+"""Prior sd of the rate of a node's clock: quartz is good to 20 to 100 ppm (plant/effects/sensing)."""
+_STRAIGHT_AHEAD_RAD = 0.01
+"""Prior sd of the steering wheel's angle straight ahead: half a degree. Workshop manuals let the sensor's zero be set
+within 3 to 5 degrees (Hyundai Motor, Grandeur 2006: within 5, nonlinear by 2.5)."""
+
+
+def side_to_side_variation(p: Floats, motors: bool) -> list[Nuisance]:
+    """Nuisances of a car ``p`` of usual quality: single brakes, motors, tyres and clocks, and its steering wheel.
+
+    ``motors``: the motors' torques are compared with their demands.
+    """
+    wheels = [
+        _in_theta(f"{effect}.{parameter}_{wheel}", effect, parameter, sd, NuisanceKind.SIDE_TO_SIDE, k)
+        for effect, parameter, sd in _SIDE_TO_SIDE
+        if motors or (effect, parameter) != ("iwm_gain", "gain")
+        for k, wheel in enumerate(WHEELS)
+    ]
+    clocks = [
+        _in_theta(f"clock_drift.share_{node}", "clock_drift", "share", _CLOCK_SHARE, NuisanceKind.SIDE_TO_SIDE, k)
+        for k, node in enumerate(NODES)
+        if node != "driver"
+    ]
+    zero = _STRAIGHT_AHEAD_RAD / float(p[P.vehicle_steering_ratio])  # as an angle of the front wheels
+    return [*wheels, *clocks, _in_theta("zero_steering", "steer_lateral", "offset_rad", zero)]
+
+
+def line_lag(half_s: float) -> list[Nuisance]:
+    """Lag of the pads behind the pressure sensors with half-width ``half_s``, s; none if that is zero."""
+    if not half_s:
+        return []
+    step = HALF_WIDTH_TO_SIGMA * half_s
+    return [_in_theta("line_lag", "pressure_location", "lag_s", step, NuisanceKind.LINE_LAG)]
+
+
+def _in_theta(
+    name: str, effect: str, parameter: str, step: float, kind: NuisanceKind = NuisanceKind.SENSOR, member: int = 0
+) -> Nuisance:
+    return Nuisance(name, (THETA.slice(effect, parameter).start + member,), (step,), kind)
+
+
+LATENCY_NODES = ("imu", "pressure", "motor", "demand", "steering", "yaw_rate")
+"""Nodes whose frames may come later than those of the wheel speeds; demands and the steering wheel may act later than
+they are logged; a yaw rate has a filter of its own and comes that much later than the accelerations."""
+_YAW_RATE_S = 6e-3
+"""Half-width of the yaw rate's latency, s: the delay of a filter of 25 Hz."""
+ZERO_SD = {"ay_mps2": 0.01, "yaw_rate_rad_s": 5e-4}
+"""Prior sd of the zeros of an inertial unit: a roll of a tenth of a degree, and 0.03 deg/s."""
+DISC_MEASURED_SD_K, DISC_ASSUMED_SD_K = 5.0, 15.0
+"""Prior sd of the discs' temperature at the start, K: of a thermocouple, and assumed."""
+
+
+def recording_nuisances(disc_measured: bool, latency_s: float) -> list[Nuisance]:
+    """Nuisances of the logs: disc temperature, toothed wheels, latencies and sensor zeros.
+
+    ``disc_measured``: all logs have the discs' temperature at the start. ``latency_s``: half-width of a node's latency.
+    """
+    latencies = []
+    for k, node in enumerate(LATENCY_NODES):
+        half = latency_s if node in NODES else _YAW_RATE_S if node == "yaw_rate" else LATENCY_S
+        kind = NuisanceKind.DEMAND_LATENCY if node == "demand" else NuisanceKind.LATENCY
+        latencies.append(Nuisance(f"late_{node}", (k,), (HALF_WIDTH_TO_SIGMA * half,), kind))
+    disc_sd_k = DISC_MEASURED_SD_K if disc_measured else DISC_ASSUMED_SD_K
+    return [
+        Nuisance("disc_temperature_k", (0,), (disc_sd_k,), NuisanceKind.DISC_TEMPERATURE),
+        Nuisance("tooth_lag", (0,), (0.5,), NuisanceKind.TOOTH_LAG),
+        Nuisance("tooth_window", (0,), (1.0,), NuisanceKind.TOOTH_WINDOW),
+        *latencies,
+        *(_in_theta(f"zero_{name}", "imu_bias", name, sd) for name, sd in ZERO_SD.items()),
+    ]

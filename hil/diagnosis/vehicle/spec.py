@@ -1,4 +1,4 @@
-"""A vehicle for the study: its parameters, what of them may be off, and what its set leaves open."""
+"""The vehicle: its parameters, its nuisance parameters, and what its vehicle set does not state."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from plant.parameters.plant import PlantParameters
 from plant.vectors import P
 
 _CONSTANT_B_1_J = 2e-6
-_HELD_KG_M2 = 1e12
+_FIXED_KG_M2 = 1e12
 """Yaw inertia of a car that cannot turn."""
 _TURNING = (
     "vehicle_yaw_inertia_kg_m2", "vehicle_steering_ratio", "tyre_lky", "vehicle_slip_angle_share_front",
@@ -24,19 +24,19 @@ _OF_STEERING = ("steer_lateral",)
 
 @dataclass(frozen=True, eq=False)
 class Vehicle:
-    """A vehicle for the study.
+    """The nominal vehicle and its uncertainty.
 
     Attributes
     ----------
-    parameters : as the plant wants them.  p : the same, flat.
-    nuisances : what may be off, by tolerance.
+    parameters : of the plant.  p : the same, (PARAMETER.size,).
+    nuisances : uncertain parameters with their priors.
     pad_temperature_matters : False where the brake has one gain and no friction model.
-    remarks : unknown keys and defaults taken, for the report.
-    unstated : sections that the set says nothing of (keys of `hil.diagnosis.vehicle.keys.OF_SECTION`).
-    unlimited : limits that it does not state, which do not act.
-    straight : whether it is held on its line.
-    sprung : whether the set states its suspension, every number of it.
-    node_latency_s : half-width of how much later than the wheel speeds the frames of other nodes are sent.
+    remarks : unknown keys and assumed values, for the report.
+    unstated : sections that the set does not state (keys of `hil.diagnosis.vehicle.keys.OF_SECTION`).
+    unlimited : limits that it does not state and that are out of reach.
+    straight_line : lateral dynamics are off.
+    suspension_stated : the set states every parameter of the suspension.
+    node_latency_s : half-width of the latency of a node's frames behind those of the wheel speeds.
     """
 
     parameters: PlantParameters
@@ -52,14 +52,14 @@ class Vehicle:
 
     @property
     def undiagnosable_effects(self) -> tuple[str, ...]:
-        """Effects on sections that are not stated, or on a steering that holds against them: none can be told."""
+        """Effects on unstated sections, and on the steering where the car has no lateral dynamics."""
         unstated = tuple(effect for section in self.unstated for effect in OF_SECTION[section])
         return (*unstated, *_OF_STEERING) if self.straight_line else unstated
 
     def with_motor_limits_from(self, logs: Sequence[Log]) -> "Vehicle":
-        """The same car, its motors no stronger than what is asked of them in the logs, if the set does not say.
+        """The same car with the largest demand of the logs as the motors' peak torque, if the set does not state it.
 
-        Fading takes a share of what a motor can, which is of nothing known where that is not.
+        Fade-out at low speed is a share of the peak torque, so it needs a realistic value.
         """
         demands = [log.channels[name] for log in logs for name in MOTOR_DEMAND if name in log.channels]
         most = max((float(np.nanmax(np.abs(values), initial=0.0)) for values in demands), default=0.0)
@@ -72,22 +72,22 @@ class Vehicle:
         return replace(self, parameters=parameters, p=p)
 
     def without_lateral_dynamics(self) -> "Vehicle":
-        """The same car kept on its line by a driver who is not seen: without lateral motion, whatever pulls."""
+        """The same car without lateral motion: a driver whose steering is not logged keeps it on its line."""
         p = self.p.copy()
-        p[P.vehicle_yaw_inertia_kg_m2] = _HELD_KG_M2
+        p[P.vehicle_yaw_inertia_kg_m2] = _FIXED_KG_M2
         nuisances = tuple(one for one in self.nuisances if one.name not in _TURNING)
-        said = "no log tells how it was steered, nor that it turned: the car is held straight against whatever pulls"
-        return replace(self, p=p, nuisances=nuisances, straight_line=True, remarks=(*self.remarks, said))
+        remark = "no log has the steering or shows a turn: the car is simulated without lateral motion"
+        return replace(self, p=p, nuisances=nuisances, straight_line=True, remarks=(*self.remarks, remark))
 
 
 def rest_friction(parameters: PlantParameters, temperature_k: float) -> float:
-    """Pad friction at rest."""
+    """Coefficient of pad friction at rest, at a disc temperature in K."""
     pad = parameters.pad
     return mu_equilibrium(0.0, temperature_k, pad.a_1_ks, pad.b_1_j, pad.epsilon_w)
 
 
 def with_constant_friction(parameters: PlantParameters) -> PlantParameters:
-    """Ostermeyer's equation with a rest value so stiff that the friction is one number."""
+    """The same car with a constant pad friction: Ostermeyer's equation with a stiff equilibrium value."""
     mu, ambient = 0.38, parameters.friction_brake.ambient_k
     a = mu * _CONSTANT_B_1_J * CONSTANT_EPSILON_W / ambient
     pad = replace(
@@ -98,10 +98,10 @@ def with_constant_friction(parameters: PlantParameters) -> PlantParameters:
 
 
 def with_gains(parameters: PlantParameters, gains: Mapping[str, float]) -> PlantParameters:
-    """Piston areas for torque per pressure and wheel: gain = 2 mu eta A r."""
+    """The same car with piston areas for brake ``gains`` by axle, N m at one wheel per Pa: gain = 2 mu eta A r."""
     brake = parameters.friction_brake
-    constant = parameters.pad.epsilon_w >= CONSTANT_EPSILON_W
-    mu = rest_friction(parameters, brake.ambient_k if constant else BRAKE_K)
+    is_constant = parameters.pad.epsilon_w >= CONSTANT_EPSILON_W
+    mu = rest_friction(parameters, brake.ambient_k if is_constant else BRAKE_K)
     areas = list(brake.piston_area_m2)
     for k, axle in enumerate(("front", "rear")):
         if axle in gains:

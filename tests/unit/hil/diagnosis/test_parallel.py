@@ -1,4 +1,4 @@
-"""Work over threads that are free: in order, and free again after it, whatever happens."""
+"""A parallel map keeps the order, and frees its threads also after an error."""
 
 import pytest
 

@@ -59,17 +59,17 @@ def test_channel_map_scales_signs_and_offsets(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
-        ("[speed]\nsignal='v'\n", "no such channel"),
+        ("[speed]\nsignal='v'\n", "unknown channel"),
         ("[speed_mps]\nsignal='v'\nunit='furlong'\n", "unit"),
         ("[speed_mps]\nscale=2\n", "expected signal"),
         ("[speed_mps\n", "channel map"),
     ],
 )
-def test_a_wrong_map_is_refused(tmp_path: Path, text: str, said: str) -> None:
+def test_a_wrong_map_is_refused(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "map.toml").write_text(text)
-    with pytest.raises(UnusableError, match=said):
+    with pytest.raises(UnusableError, match=message):
         load_map(tmp_path / "map.toml")
 
 
@@ -81,16 +81,16 @@ def test_logs_toml_gives_direction_and_temperature(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("t_s", "channels", "said"),
+    ("t_s", "channels", "message"),
     [
         (np.arange(300) * 0.01, {}, "no channel"),
         (np.arange(300) * -0.01, {"speed_mps": np.ones(300)}, "backwards"),
         (np.arange(30) * 0.01, {"speed_mps": np.ones(30)}, "long"),
         (np.arange(30) * 1.0, {"speed_mps": np.ones(30)}, "samples a second"),
         (np.arange(300) * 0.01, {"pressure_fl_pa": np.full(300, 1e9)}, "wrong unit"),
-        (np.full(300, np.nan), {"speed_mps": np.ones(300)}, "no time"),
+        (np.full(300, np.nan), {"speed_mps": np.ones(300)}, "not finite"),
     ],
 )
-def test_what_nobody_can_use_is_refused(t_s: np.ndarray, channels: dict[str, np.ndarray], said: str) -> None:
-    with pytest.raises(UnusableError, match=said):
+def test_an_unusable_log_is_refused(t_s: np.ndarray, channels: dict[str, np.ndarray], message: str) -> None:
+    with pytest.raises(UnusableError, match=message):
         make_log("x", t_s, channels)

@@ -37,7 +37,7 @@ def _alike(log, one: str, other: str) -> float:
 def test_a_car_that_rings_at_a_stop_does_not_tell_two_names_of_one_brake_apart(monkeypatch, rings_s, alike):
     """The simulated car stops 0.2 s after the measured one: compared a second later, it rings."""
     if rings_s is not None:
-        monkeypatch.setattr("hil.diagnosis.data.prepare._RINGS_S", rings_s)
+        monkeypatch.setattr("hil.diagnosis.data.masks._RINGS_S", rings_s)
     t = np.arange(1800) * 0.01
     speed = np.clip(20.0 - 3.0 * np.clip(t - 1.0, 0.0, None), 0.0, None)
     channels = {f"wheel_speed_{w}_rad_s": speed / 0.318 for w in WHEELS}

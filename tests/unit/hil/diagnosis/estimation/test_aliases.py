@@ -6,9 +6,10 @@ import pytest
 from hil.diagnosis.estimation.aliases import alias_of, resolve_aliases
 from hil.diagnosis.estimation.gauss_newton import Model, Term
 from hil.diagnosis.estimation.terms import candidates, columns
-from hil.diagnosis.simulation.parameter_set import nominal, recording_nuisances
+from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.vehicle.keys import LATENCY_S
 from hil.diagnosis.vehicle.load import paper_car
+from hil.diagnosis.vehicle.priors import recording_nuisances
 
 VEHICLE = paper_car()
 BASE = nominal(VEHICLE)

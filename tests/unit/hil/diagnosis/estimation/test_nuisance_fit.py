@@ -11,9 +11,10 @@ from hil.diagnosis.estimation.gauss_newton import Fitter, Term, birge_ratio
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.estimation.terms import candidates, columns
 from hil.diagnosis.noise.model import SampleMasks
-from hil.diagnosis.simulation.parameter_set import DISC_ASSUMED_SD_K, DISC_MEASURED_SD_K, nominal
+from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import load_vehicle, paper_car
+from hil.diagnosis.vehicle.priors import DISC_ASSUMED_SD_K, DISC_MEASURED_SD_K
 
 NOISE_PA = 2e3
 GAINS = {"brake_gain_front_nm_pa": 2e-4, "brake_gain_rear_nm_pa": 1e-4}
@@ -71,7 +72,7 @@ def test_what_single_wheels_are_off_makes_light_of_no_strain():
     vehicle = load_vehicle(stated)
     case = prepare([log_of_pulses()], 0.3)
     fitter = Fitter(Simulator(case, vehicle), SampleMasks.of(case), nominal(vehicle), vehicle.nuisances, {})
-    of_wheels = np.array([one.kind == "scatter" for one in vehicle.nuisances])
+    of_wheels = np.array([one.kind == "side_to_side" for one in vehicle.nuisances])
     assert of_wheels.sum() >= 16
     assert fitter.birge_ratio(np.where(of_wheels, 0.0, 2.0)) == pytest.approx(4.0)
     assert fitter.birge_ratio(np.where(of_wheels, 3.0, 0.0)) == 1.0

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil.diagnosis.data.interpolation import at_samples
+from hil.diagnosis.data.grid import at_samples
 from hil.diagnosis.simulation.latency import delayed, without_latency
 from plant.vectors import INPUT
 

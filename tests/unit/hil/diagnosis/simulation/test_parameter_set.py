@@ -7,9 +7,10 @@ import pytest
 
 from hil.diagnosis.data.log import make_log
 from hil.diagnosis.data.prepare import prepare
-from hil.diagnosis.simulation.parameter_set import ZEROS, nominal, recording_nuisances
+from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.vehicle.keys import LATENCY_S
 from hil.diagnosis.vehicle.load import load_vehicle, paper_car
+from hil.diagnosis.vehicle.priors import ZERO_SD, recording_nuisances
 from plant.injection.theta import THETA
 
 SIX = {
@@ -27,8 +28,8 @@ def test_every_number_of_the_vehicle_moves_without_a_corner(vehicle):
     base = nominal(vehicle)
     for nuisance in vehicle.nuisances:
         for at, step in zip(nuisance.at, nuisance.step, strict=True):
-            worlds = [base.with_nuisances([nuisance], np.array([z])) for z in nuisance.farthest * STEPS]
-            told = nuisance.kind in ("sensor", "scatter", "line")
+            worlds = [base.with_nuisances([nuisance], np.array([z])) for z in nuisance.bound * STEPS]
+            told = nuisance.kind in ("sensor", "side_to_side", "line_lag")
             values = np.array([(world.theta if told else world.p)[at] for world in worlds])
             moved = np.diff(values) * np.sign(step)
             assert (moved > 0.0).all(), nuisance.name
@@ -73,7 +74,7 @@ def test_an_inertial_unit_has_zeros_across():
     base = nominal(paper_car())
     z = np.array([1.0 if one.kind == "sensor" else 0.0 for one in nuisances])
     theta = base.with_nuisances(nuisances, z).theta
-    assert theta[THETA.slice("imu_bias", "ay_mps2")] == pytest.approx(ZEROS["ay_mps2"])
-    assert theta[THETA.slice("imu_bias", "yaw_rate_rad_s")] == pytest.approx(ZEROS["yaw_rate_rad_s"])
+    assert theta[THETA.slice("imu_bias", "ay_mps2")] == pytest.approx(ZERO_SD["ay_mps2"])
+    assert theta[THETA.slice("imu_bias", "yaw_rate_rad_s")] == pytest.approx(ZERO_SD["yaw_rate_rad_s"])
     assert np.flatnonzero(theta != base.theta).size == 2
     assert (base.with_nuisances(nuisances, 0.0 * z).theta == base.theta).all()

@@ -8,10 +8,11 @@ import pytest
 from hil.diagnosis.data.dataset import ROW_S
 from hil.diagnosis.data.log import Log, make_log
 from hil.diagnosis.data.prepare import prepare
-from hil.diagnosis.simulation.parameter_set import LATENCY_NODES, ParameterSet, nominal
+from hil.diagnosis.simulation.parameter_set import ParameterSet, nominal
 from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.simulation.substeps import STEPS
 from hil.diagnosis.vehicle.load import load_vehicle, paper_car
+from hil.diagnosis.vehicle.priors import LATENCY_NODES
 from plant.effects.effect import NODES
 from plant.injection.theta import THETA
 from plant.model import initial_state, pack, replay

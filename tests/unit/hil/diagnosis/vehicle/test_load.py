@@ -1,12 +1,12 @@
-"""Vehicle sets: six numbers are enough, unknown keys are told, tolerances become standard deviations."""
+"""Vehicle sets: six values are enough, unknown keys are reported, tolerances become standard deviations."""
 
 import numpy as np
 import pytest
 
 from hil.diagnosis.data.log import MOTOR_DEMAND, Log, UnusableError, make_log
-from hil.diagnosis.simulation.parameter_set import nominal, recording_nuisances
+from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.vehicle.load import load_vehicle, paper_car
-from hil.diagnosis.vehicle.priors import HALF_WIDTH_TO_SIGMA
+from hil.diagnosis.vehicle.priors import HALF_WIDTH_TO_SIGMA, recording_nuisances
 from hil.diagnosis.vehicle.spec import Vehicle, rest_friction
 from plant.injection.theta import THETA
 from plant.vectors import PARAMETER, P
@@ -21,7 +21,7 @@ SIX = {
 }
 
 
-def test_six_numbers_make_a_car_with_a_constant_brake_gain() -> None:
+def test_six_values_make_a_car_with_a_constant_brake_gain() -> None:
     car = load_vehicle(SIX)
     brake, p = car.parameters.friction_brake, car.parameters
     assert p.vehicle.mass_kg == 1800.0
@@ -32,10 +32,10 @@ def test_six_numbers_make_a_car_with_a_constant_brake_gain() -> None:
         assert gain == pytest.approx(2.5e-4)
         assert temperature > 0.0
     assert not car.pad_temperature_matters
-    assert any("wide uncertainty" in text for text in car.remarks)
+    assert any("wide prior" in text for text in car.remarks)
 
 
-def test_an_unknown_key_is_told_not_refused() -> None:
+def test_an_unknown_key_is_reported_not_refused() -> None:
     assert any("'colour'" in text for text in load_vehicle({**SIX, "colour": 3.0}).remarks)
     near = load_vehicle({**SIX, "wheel_inertia_kg_m": 1.0, "cog_hight_m_tolerance": 0.02}).remarks
     assert any("'wheel_inertia_kg_m' is left out; did you mean 'wheel_inertia_kg_m2'?" in text for text in near)
@@ -44,23 +44,22 @@ def test_an_unknown_key_is_told_not_refused() -> None:
 
 def test_a_tolerance_is_two_standard_deviations() -> None:
     car = load_vehicle({**SIX, "mass_kg_tolerance": 60.0, "brake_gain_front_nm_pa_tolerance": 2.5e-5})
-    found = {n.name: (n.step[0], car.p[n.at[0]]) for n in car.nuisances if n.kind == "vehicle"}
-    assert found["vehicle_mass_kg"][0] == pytest.approx(HALF_WIDTH_TO_SIGMA * 60.0)
-    step, area = found["brake_gain_front"]
+    nuisances = {n.name: (n.step[0], car.p[n.at[0]]) for n in car.nuisances if n.kind == "vehicle"}
+    assert nuisances["vehicle_mass_kg"][0] == pytest.approx(HALF_WIDTH_TO_SIGMA * 60.0)
+    step, area = nuisances["brake_gain_front"]
     assert step == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.1 * area, rel=1e-3)
 
 
-def test_a_number_of_the_car_told_by_axle_is_taken_between_them_and_told() -> None:
-    """It was refused."""
+def test_a_list_for_one_value_per_car_gives_mean_and_tolerance() -> None:
     car = load_vehicle({**SIX, "cog_height_m": [0.5, 0.6], "cog_height_m_tolerance": 0.02})
     assert car.parameters.vehicle.cog_height_m == pytest.approx(0.55)
     (height,) = [n for n in car.nuisances if n.name == "vehicle_cog_height_m"]
     assert height.step[0] == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.05)
-    assert any("cog_height_m is one number of the car: 0.55 is taken" in text for text in car.remarks)
+    assert any("cog_height_m is one value per car: the mean 0.55" in text for text in car.remarks)
 
 
 def test_wheels_of_an_axle_with_motors_may_be_heavier() -> None:
-    """0.95 and 2.6 kg m2 were taken as 1.8, and softness of the rear axle was told of a car with nothing hidden."""
+    """The mean of 0.95 and 2.6 kg m2 would show as a soft rear axle of a car with nothing hidden."""
     car = load_vehicle({**SIX, "wheel_inertia_kg_m2": [0.95, 2.6], "wheel_inertia_kg_m2_tolerance": 0.12})
     assert car.parameters.wheel.inertia_kg_m2 == (0.95, 2.6)
     (inertia,) = [n for n in car.nuisances if n.name == "wheel_inertia_kg_m2"]
@@ -69,43 +68,42 @@ def test_wheels_of_an_axle_with_motors_may_be_heavier() -> None:
     assert both.parameters.wheel.inertia_kg_m2 == (1.2, 1.2)
 
 
-@pytest.mark.parametrize(("told", "taken", "members"), [
+@pytest.mark.parametrize(("stated", "taken", "members"), [
     ([3e4, 24e4], (3e4, 24e4), [1, 1]), (4e4, (4e4, 4e4), [2]), (None, (5e4, 5e4), [1, 1]),
 ])  # fmt: skip
-def test_each_axle_has_its_threshold(told, taken, members):
-    """Drums at the rear need more pressure before they grip: axles may be off apart, but where one number is stated."""
-    given = {} if told is None else {"threshold_pressure_pa": told, "threshold_pressure_pa_tolerance": 2e4}
+def test_each_axle_has_its_threshold(stated, taken, members):
+    """Drums at the rear need more pressure before they grip: axles deviate apart unless one value is stated."""
+    given = {} if stated is None else {"threshold_pressure_pa": stated, "threshold_pressure_pa_tolerance": 2e4}
     car = load_vehicle(SIX | given)
     assert car.parameters.friction_brake.threshold_pressure_pa == pytest.approx(taken)
-    found = [n for n in car.nuisances if n.name.startswith("friction_brake_threshold_pressure_pa")]
-    assert [len(n.at) for n in found] == members
-    assert [car.p[k] for n in found for k in n.at] == pytest.approx(taken)
-    if told is not None:
-        assert all(step == pytest.approx(HALF_WIDTH_TO_SIGMA * 2e4) for n in found for step in n.step)
+    nuisances = [n for n in car.nuisances if n.name.startswith("friction_brake_threshold_pressure_pa")]
+    assert [len(n.at) for n in nuisances] == members
+    assert [car.p[k] for n in nuisances for k in n.at] == pytest.approx(taken)
+    if stated is not None:
+        assert all(step == pytest.approx(HALF_WIDTH_TO_SIGMA * 2e4) for n in nuisances for step in n.step)
 
 
-def test_of_a_tolerance_by_axle_the_larger_counts() -> None:
-    """A list was left out without a word."""
-    told = {**SIX, "track_m": [1.5, 1.48]}
+def test_the_larger_tolerance_of_two_axles_counts() -> None:
+    stated = {**SIX, "track_m": [1.5, 1.48]}
     steps = [
-        {n.name: n.step for n in load_vehicle({**told, "track_m_tolerance": of}).nuisances}
+        {n.name: n.step for n in load_vehicle({**stated, "track_m_tolerance": of}).nuisances}
         for of in (0.05, [0.01, 0.05])
     ]
     assert steps[0] == steps[1]
     with pytest.raises(UnusableError, match="track_m_tolerance: expected a number, got 'narrow'"):
-        load_vehicle({**told, "track_m_tolerance": "narrow"})
+        load_vehicle({**stated, "track_m_tolerance": "narrow"})
 
 
-def test_a_number_of_wrong_shape_makes_the_set_unusable() -> None:
+def test_a_value_of_wrong_shape_makes_the_set_unusable() -> None:
     with pytest.raises(UnusableError, match="track_m"):
         load_vehicle({**SIX, "track_m": [1.5, 1.48, 1.5]})
 
 
 def test_a_stated_tolerance_is_kept_to_as_far_as_an_equation_is_that_good() -> None:
-    told = {**SIX, "cog_height_m": 0.5, "cog_height_m_tolerance": 0.03}
-    step = {n.name: n.step[0] for n in load_vehicle(told).nuisances}
+    stated = {**SIX, "cog_height_m": 0.5, "cog_height_m_tolerance": 0.03}
+    step = {n.name: n.step[0] for n in load_vehicle(stated).nuisances}
     assert step["vehicle_cog_height_m"] == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.03)
-    step = {n.name: n.step[0] for n in load_vehicle({**told, "cog_height_m_tolerance": 0.001}).nuisances}
+    step = {n.name: n.step[0] for n in load_vehicle({**stated, "cog_height_m_tolerance": 0.001}).nuisances}
     assert step["vehicle_cog_height_m"] == pytest.approx(HALF_WIDTH_TO_SIGMA * 0.04 * 0.5)
     step = {n.name: n.step[0] for n in load_vehicle(SIX).nuisances}
     assert step["vehicle_cog_height_m"] > 0.03
@@ -118,9 +116,9 @@ SPRINGS = {
 }  # fmt: skip
 
 
-def test_springs_that_are_stated_are_as_far_off_as_stated_and_at_least_a_twentieth() -> None:
-    told = {"suspension_ride_rate_n_m_tolerance": 4800.0, "suspension_damping_ns_m_tolerance": 10.0}
-    by_name = {one.name: one for one in load_vehicle(SIX | SPRINGS | told).nuisances}
+def test_stated_springs_have_their_tolerance_and_at_least_a_twentieth() -> None:
+    stated = {"suspension_ride_rate_n_m_tolerance": 4800.0, "suspension_damping_ns_m_tolerance": 10.0}
+    by_name = {one.name: one for one in load_vehicle(SIX | SPRINGS | stated).nuisances}
     assert by_name["suspension_ride_rate_n_m_front"].step[0] == pytest.approx(HALF_WIDTH_TO_SIGMA * 4800.0)
     assert by_name["suspension_damping_ns_m_front"].step[0] == pytest.approx(HALF_WIDTH_TO_SIGMA * 110.0)
     assert "suspension_progression_n_m3_front" not in by_name  # linear springs, and known to be
@@ -128,16 +126,16 @@ def test_springs_that_are_stated_are_as_far_off_as_stated_and_at_least_a_twentie
     assert silent["suspension_ride_rate_n_m_front"].step[0] > 5.0 * by_name["suspension_ride_rate_n_m_front"].step[0]
 
 
-@pytest.mark.parametrize(("told", "half"), [({}, 0.1), ({"lift_front": 0.05, "lift_front_tolerance": 0.03}, 0.03)])
-def test_lift_that_is_stated_is_off_by_less(told: dict[str, float], half: float) -> None:
-    by_name = {one.name: one for one in load_vehicle(SIX | told).nuisances}
+@pytest.mark.parametrize(("stated", "half"), [({}, 0.1), ({"lift_front": 0.05, "lift_front_tolerance": 0.03}, 0.03)])
+def test_stated_lift_has_its_tolerance(stated: dict[str, float], half: float) -> None:
+    by_name = {one.name: one for one in load_vehicle(SIX | stated).nuisances}
     assert by_name["vehicle_lift_coefficient_front"].step[0] == pytest.approx(HALF_WIDTH_TO_SIGMA * half)
 
 
-def test_discs_that_are_stated_are_as_far_off_as_stated() -> None:
+def test_stated_discs_have_their_tolerance() -> None:
     pads = {"pad_a_1_ks": 3e-5, "pad_b_1_j": 9e-7, "pad_c_1_s": 4e-3, "pad_epsilon_w": 35510.0}
-    told = {"disc_heat_front_j_k": 3000.0, "disc_heat_front_j_k_tolerance": 60.0}
-    for given, half in ((told, 60.0), ({}, 600.0)):
+    stated = {"disc_heat_front_j_k": 3000.0, "disc_heat_front_j_k_tolerance": 60.0}
+    for given, half in ((stated, 60.0), ({}, 600.0)):
         by_name = {one.name: one for one in load_vehicle(SIX | pads | given).nuisances}
         assert by_name["friction_brake_heat_capacity_j_k_front"].step[0] == pytest.approx(HALF_WIDTH_TO_SIGMA * half)
 
@@ -151,13 +149,13 @@ def test_the_curvature_of_a_tyre_ends_where_its_equation_does() -> None:
     assert curve.upper < curve.bound
 
 
-def test_curves_that_a_set_does_not_state_go_as_far_as_a_guess() -> None:
+def test_curves_that_a_set_does_not_state_have_a_wide_bound() -> None:
     by_name = {one.name: one for one in load_vehicle(SIX | {"tyre_lkx": 1.1, "tyre_lkx_tolerance": 0.1}).nuisances}
     assert by_name["tyre_lkx"].bound == 3.0
     assert by_name["tyre_friction_load"].bound > 3.0
 
 
-def test_how_late_a_node_may_be_is_as_stated_or_four_milliseconds() -> None:
+def test_the_latency_of_a_node_is_as_stated_or_four_milliseconds() -> None:
     assert load_vehicle(SIX).node_latency_s == 4e-3
     vehicle = load_vehicle(SIX | {"node_latency_s_tolerance": 1e-3})
     assert vehicle.node_latency_s == 1e-3
@@ -170,35 +168,35 @@ def test_how_late_a_node_may_be_is_as_stated_or_four_milliseconds() -> None:
     assert any("node_latency_s" in remark for remark in load_vehicle(SIX | {"node_latency_s": 1e-3}).remarks)
 
 
-def test_pads_lag_behind_their_sensors_by_as_much_as_is_stated_or_usual() -> None:
-    """Lags of 3 and 4 ms were told as causes of cars with nothing hidden."""
+def test_the_line_lag_has_the_stated_or_default_tolerance() -> None:
+    """Without it lags of 3 and 4 ms are named as causes of cars with nothing hidden."""
     car = load_vehicle(SIX)
     (line,) = (one for one in car.nuisances if one.name == "line_lag")
     assert line.step[0] == pytest.approx(4e-3)
     lagging = nominal(car).with_nuisances([line], np.ones(1))
     assert lagging.theta[THETA.slice("pressure_location", "lag_s")] == pytest.approx(4e-3)
     for half, count in ((2e-3, 1), (0.0, 0)):
-        told = load_vehicle(SIX | {"line_lag_s_tolerance": half})
-        assert [one.step[0] for one in told.nuisances if one.name == "line_lag"] == [0.5 * half] * count
-        assert not any("line_lag" in remark for remark in told.remarks)
+        stated = load_vehicle(SIX | {"line_lag_s_tolerance": half})
+        assert [one.step[0] for one in stated.nuisances if one.name == "line_lag"] == [0.5 * half] * count
+        assert not any("line_lag" in remark for remark in stated.remarks)
     assert not any(one.name == "line_lag" for one in paper_car().nuisances)
 
 
 @pytest.mark.parametrize("missing", [None, *SPRINGS])
 def test_the_suspension_is_stated_if_every_number_of_it_is(missing: str | None) -> None:
-    told = {name: value for name, value in SPRINGS.items() if name != missing}
-    assert load_vehicle(SIX | told).suspension_stated == (missing is None)
+    stated = {name: value for name, value in SPRINGS.items() if name != missing}
+    assert load_vehicle(SIX | stated).suspension_stated == (missing is None)
     assert not load_vehicle(SIX).suspension_stated
 
 
-def test_the_shipped_car_keeps_its_own_numbers() -> None:
+def test_the_shipped_car_keeps_its_own_values() -> None:
     car = paper_car()
     assert car.parameters.vehicle.mass_kg == 1463.0
     assert np.isfinite(car.p).all()
 
 
 @pytest.mark.parametrize("value", ["heavy", True, [], float("nan"), 10**400])
-def test_what_is_no_number_is_refused(value: object) -> None:
+def test_a_value_that_is_not_a_number_is_refused(value: object) -> None:
     if isinstance(value, str):
         assert load_vehicle({**SIX, "colour": value})
         return
@@ -206,37 +204,37 @@ def test_what_is_no_number_is_refused(value: object) -> None:
         load_vehicle({**SIX, "mass_kg": value})
 
 
-def test_what_a_set_says_nothing_of_is_not_judged() -> None:
+def test_effects_on_unstated_sections_are_undiagnosable() -> None:
     car = load_vehicle(SIX)
     assert {"ehb_dead_time", "motor_tau", "battery_soc"} <= set(car.undiagnosable_effects)
     assert car.parameters.motor.peak_torque_nm > 2000.0
-    said = next(text for text in car.remarks if "nothing said of ehb, motor, battery" in text)
-    assert "pressures are compared only where none" in said
-    assert "torques of the motors are not compared" in said
-    told = load_vehicle({**SIX, "ehb_dead_time_s": 0.02, "motor_peak_torque_nm": 400.0, "tyre_lkx": 1.0})
-    assert set(told.undiagnosable_effects) == {"battery_soc"}
-    assert not any("compared" in text for text in told.remarks)
-    motor, ehb = told.parameters.motor, told.parameters.ehb
+    remark = next(text for text in car.remarks if "not given: ehb, motor, battery" in text)
+    assert "pressures are compared only where their demand" in remark
+    assert "torques of the motors are not compared" in remark
+    stated = load_vehicle({**SIX, "ehb_dead_time_s": 0.02, "motor_peak_torque_nm": 400.0, "tyre_lkx": 1.0})
+    assert set(stated.undiagnosable_effects) == {"battery_soc"}
+    assert not any("compared" in text for text in stated.remarks)
+    motor, ehb = stated.parameters.motor, stated.parameters.ehb
     assert motor.peak_torque_nm == 400.0
     assert min(motor.peak_power_w, motor.rate_limit_nm_s, ehb.build_rate_pa_s, ehb.release_rate_pa_s) > 2e5
     assert motor.fade_start_mps < 0.5
     assert motor.derating_start_k > 5e3
     assert motor.max_speed_rad_s > 300.0
-    assert any("no such limit is simulated: ehb_build_rate_pa_s" in text for text in told.remarks)
-    assert not {"ehb_build_rate_pa_s", "motor_peak_power_w"} & {one.name for one in told.nuisances}
+    assert any("no such limit is simulated: ehb_build_rate_pa_s" in text for text in stated.remarks)
+    assert not {"ehb_build_rate_pa_s", "motor_peak_power_w"} & {one.name for one in stated.nuisances}
     assert paper_car().unstated == ()
 
 
 def test_a_brake_gain_without_tolerance_is_known_to_a_hundredth() -> None:
-    """It was known to what the shipped car's piston, radius and efficiency are, some 15 %."""
+    """Not to the tolerance of the shipped car's piston, radius and efficiency, some 15 %."""
 
     def share(car: Vehicle) -> float:
         (gain,) = (one for one in car.nuisances if one.name == "brake_gain_front")
         return gain.step[0] / float(car.p[gain.at[0]]) / HALF_WIDTH_TO_SIGMA
 
     assert share(load_vehicle(SIX)) == pytest.approx(0.01, rel=0.02)
-    told = load_vehicle({**SIX, "brake_gain_front_nm_pa_tolerance": 2.5e-5})
-    assert share(told) == pytest.approx(0.1, rel=0.02)
+    stated = load_vehicle({**SIX, "brake_gain_front_nm_pa_tolerance": 2.5e-5})
+    assert share(stated) == pytest.approx(0.1, rel=0.02)
 
 
 HYDRAULICS = {"ehb_build_rate_pa_s": 25e6, "ehb_release_rate_pa_s": 40e6}
@@ -253,22 +251,22 @@ REST = ("iwm_gain.unseen", "pad_mu_gain.gain", "tyre_radius.gain")
 ALL = (*BRAKES, "iwm_gain.gain", *REST)
 
 
-@pytest.mark.parametrize(("told", "off"), [
+@pytest.mark.parametrize(("stated", "off"), [
     ({}, (*BRAKES, *REST)), (MOTORS, ALL), ({"motor_time_constant_s": 0.02}, ALL), (HYDRAULICS | MOTORS, ALL),
     (HYDRAULICS | MOTORS | BATTERY, ()),
 ])  # fmt: skip
-def test_what_nobody_measured_whole_is_off_wheel_by_wheel(told, off):
-    """Of one pressure or brake 0.7 %, of a motor 0.4, of a radius 0.1, of a clock 46 ppm were told as causes."""
-    car = load_vehicle({**SIX, **told})
-    found = [n.name for n in car.nuisances if n.kind == "scatter"]
+def test_a_set_without_all_limits_has_side_to_side_variation(stated, off):
+    """Else 0.7 % of a pressure or brake, 0.4 of a motor, 0.1 of a radius, 46 ppm of a clock are named as causes."""
+    car = load_vehicle({**SIX, **stated})
+    nuisances = [n.name for n in car.nuisances if n.kind == "side_to_side"]
     clocks = [f"clock_drift.share_{node}" for node in ("wheel", "imu", "pressure", "motor") if off]
-    assert found == [f"{number}_{wheel}" for number in off for wheel in ("fl", "fr", "rl", "rr")] + clocks
+    assert nuisances == [f"{number}_{wheel}" for number in off for wheel in ("fl", "fr", "rl", "rr")] + clocks
 
 
-@pytest.mark.parametrize(("told", "known"), [({}, False), (HYDRAULICS | MOTORS | BATTERY, True)])
-def test_nobody_knows_to_a_mrad_where_a_wheel_points_straight_ahead(told, known):
-    """Sensors of the steering wheel half a degree to 0.8 off were told as causes, beside the right ones."""
-    car = load_vehicle({**SIX, **told, "steering_ratio": 20.0})
+@pytest.mark.parametrize(("stated", "known"), [({}, False), (HYDRAULICS | MOTORS | BATTERY, True)])
+def test_the_steering_zero_is_a_nuisance_unless_all_limits_are_stated(stated, known):
+    """Without it zeros of 0.5 to 0.8 degrees are named as causes, beside the right ones."""
+    car = load_vehicle({**SIX, **stated, "steering_ratio": 20.0})
     assert [one.step for one in car.nuisances if one.name == "zero_steering"] == ([] if known else [(5e-4,)])
     off = np.array([float(one.name == "zero_steering") for one in car.nuisances])
     theta = nominal(car).with_nuisances(car.nuisances, off).theta
@@ -276,22 +274,22 @@ def test_nobody_knows_to_a_mrad_where_a_wheel_points_straight_ahead(told, known)
     assert "zero_steering" not in {one.name for one in car.without_lateral_dynamics().nuisances}
 
 
-def _asks(torque_nm: float) -> Log:
+def _demands(torque_nm: float) -> Log:
     t_s = 0.01 * np.arange(300)
     return make_log("a.csv", t_s, {name: np.where(t_s > 1.0, torque_nm, np.nan) for name in MOTOR_DEMAND})
 
 
-def test_motors_of_unknown_strength_are_as_strong_as_they_are_asked() -> None:
-    """A fading that begins 3 m/s early did nothing to 315 N m: motors could do 5 kN m where nobody stated what."""
+def test_motors_without_a_stated_peak_torque_get_the_largest_demand() -> None:
+    """With a peak torque of 5 kN m a fade-out 3 m/s early would do nothing to 315 N m."""
     car = load_vehicle({**SIX, "motor_fade_start_mps": 3.2, "motor_fade_end_mps": 0.9})
-    told = car.with_motor_limits_from([_asks(-315.0), _asks(120.0)])
-    assert told.parameters.motor.peak_torque_nm == told.p[P.motor_peak_torque_nm] == 315.0
+    limited = car.with_motor_limits_from([_demands(-315.0), _demands(120.0)])
+    assert limited.parameters.motor.peak_torque_nm == limited.p[P.motor_peak_torque_nm] == 315.0
     assert car.with_motor_limits_from([]) is car
     stated = load_vehicle({**SIX, "motor_peak_torque_nm": 400.0})
-    assert stated.with_motor_limits_from([_asks(-315.0)]) is stated
+    assert stated.with_motor_limits_from([_demands(-315.0)]) is stated
 
 
-def test_motors_are_supported_as_brakes_are_where_a_set_says_nothing_else() -> None:
+def test_the_motors_support_is_that_of_the_brakes_unless_stated() -> None:
     at = PARAMETER.slice("suspension_drive_support_tangent")
     assert load_vehicle(SIX | SPRINGS).p[at].tolist() == SPRINGS["suspension_brake_support_tangent"]
     own = load_vehicle(SIX | SPRINGS | {"suspension_drive_support_tangent": [0.05, 0.1]})
