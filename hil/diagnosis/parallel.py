@@ -1,6 +1,6 @@
 """Work on parts that do not depend on each other, over the threads that are free."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from threading import Semaphore
@@ -28,3 +28,9 @@ def parallel_map(of: Callable[[Item], Of], items: Sequence[Item]) -> list[Of]:
     finally:
         if helped:
             _FREE.release()
+
+
+def thread_map(of: Callable[[Item], Of], items: Iterable[Item]) -> list[Of]:
+    """``of`` each item, in order, on one thread per processor."""
+    with ThreadPoolExecutor(WORKERS) as pool:
+        return list(pool.map(of, items))
