@@ -18,7 +18,7 @@ from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
 from hil.diagnosis.estimation.information import finite_difference_jacobian, information_blocks, solve
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation
 from hil.diagnosis.estimation.terms import Candidate
-from hil.diagnosis.isolation.intervals import DEVIATION_BY_FORM
+from hil.diagnosis.estimation.uncertainty import FORM_SD_SHARE
 from hil.diagnosis.noise.model import Noise
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from plant.effects.effect import Parameter
@@ -146,7 +146,7 @@ def _fitted(fitter: Fitter, bare: Model, begun: ShapedCandidate, law: FittedHypo
     minimize_scalar(cost, bounds=beyond, method="bounded", options={"maxiter": _ROUNDS})
     at, model = min(seen, key=lambda one: one[1].cost)
     by_noise = _deviation(at, model.cost, [(other, of.cost) for other, of in seen], begun.shape)
-    by_form = DEVIATION_BY_FORM * (beyond[1] - beyond[0])
+    by_form = FORM_SD_SHARE * (beyond[1] - beyond[0])
     deviation = hypot(
         by_noise * sqrt(variance_inflation(begun)), by_form, _by_numbers(fitter, model, law.noise, by_noise)
     )

@@ -13,7 +13,7 @@ from hil.diagnosis.detection.score_test import detection_threshold
 from hil.diagnosis.estimation.aliases import resolve_aliases
 from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation, with_uncertainty
-from hil.diagnosis.isolation.intervals import standard_deviations
+from hil.diagnosis.estimation.uncertainty import standard_deviations
 
 _FORM_DIFFERS = 4.0
 """Strain beyond which the car of the logs is of another form than the model's, as one of a page is: numbers that nobody
@@ -88,7 +88,9 @@ def eliminate_backward(found: Diagnosis, bare: Fitter, told: float, say: Progres
         if isinstance(term.candidate, BasisFunction):
             continue
         error = variance_inflation(term.candidate)
-        away = abs(term.value) / (float(standard_deviations(found)[k]) * float(np.sqrt(error)))
+        away = abs(term.value) / (
+            float(standard_deviations(fitter, found.final, found.noise)[k]) * float(np.sqrt(error))
+        )
         sure = away >= asked
         if sure and causes_in(model) == 1:
             return

@@ -4,7 +4,7 @@ import pytest
 
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation
 from hil.diagnosis.estimation.terms import candidates, columns
-from hil.diagnosis.isolation.intervals import DEVIATION_BY_FORM, half_width
+from hil.diagnosis.estimation.uncertainty import FORM_SD_SHARE, half_width
 
 ALL = candidates(columns())
 
@@ -18,5 +18,5 @@ def test_the_models_own_error_widens_what_noise_leaves(candidate):
 
 def test_no_data_tell_a_value_better_than_its_equation():
     candidate = ALL[0]
-    assert half_width(candidate, -3.0, 1e-9) == pytest.approx(1.96 * 3.0 * DEVIATION_BY_FORM)
+    assert half_width(candidate, -3.0, 1e-9) == pytest.approx(1.96 * 3.0 * FORM_SD_SHARE)
     assert half_width(candidate, 3.0, 0.1) > half_width(candidate, 0.0, 0.1)
