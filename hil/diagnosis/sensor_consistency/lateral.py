@@ -30,8 +30,6 @@ _PARAMETERS: Final[Mapping[str, Parameter]] = {
 }
 
 
-
-
 class LateralModel(SensorModel):
     """Axle, gyro and lateral accelerometer of one unknown yaw rate r.
 

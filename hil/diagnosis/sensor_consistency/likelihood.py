@@ -1,4 +1,4 @@
-"""Maximum likelihood of the parameters of a sensor model and its noise, and the standard deviations of the estimates."""
+"""Maximum-likelihood fit of a sensor model and its noise, and the standard deviations of the estimates."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -47,7 +47,8 @@ def typical_noise(model: SensorModel) -> Values:
 
 def fit(
     model: SensorModel, parameters: Mapping[str, float], noise: Mapping[str, float], *,
-    fixed: Mapping[str, float] = NO_VALUES, weights: Floats | None = None, iterations: int = 40, fix_noise: bool = False,
+    fixed: Mapping[str, float] = NO_VALUES, weights: Floats | None = None, iterations: int = 40,
+    fix_noise: bool = False,
 ) -> Fit:  # fmt: skip
     """Maximise the likelihood over ``parameters`` and all noise, from these values (L-BFGS-B).
 

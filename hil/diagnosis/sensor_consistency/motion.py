@@ -98,9 +98,7 @@ def motion_of(logs: Sequence[Log], radius_m: float) -> Motion:
     slow = np.convolve(speed < SLOW_MPS, np.ones(2 * margin + 1), mode="same") > 0.5
     moving_s = (~slow).sum() * cell_s
     if moving_s < 4.0:
-        raise UnusableError(
-            f"the car moves for {moving_s:.1f} s in all; expected 4 s or more above {SLOW_MPS:g} m/s"
-        )
+        raise UnusableError(f"the car moves for {moving_s:.1f} s in all; expected 4 s or more above {SLOW_MPS:g} m/s")
     segment_id = _segment_id(log_id, accel, cell_s)
     return Motion(tuple(logs), cell_s, t_s, log_start, log_id, channels, speed, accel, 1.0 * ~slow, segment_id)
 

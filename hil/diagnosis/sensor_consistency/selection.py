@@ -34,7 +34,7 @@ class SelectionStep:
     ----------
     gain : reduction of -2 log likelihood.
     others : parameter -> its fit in the place of this one.
-    substitutes : those of them that fit nearly as well -> the result with it, and its -2 log likelihood less this one's.
+    substitutes : those of them that fit nearly as well -> the result with it, and the difference in -2 log likelihood.
     """
 
     parameter: str
@@ -153,9 +153,7 @@ def _start_values(result: SelectionResult, name: str) -> list[float]:
     return [result.nominal.get(name, 0.0) + offset for offset in _START_OFFSETS.get(name, (0.0,))]
 
 
-def _iterate(
-    result: SelectionResult, name: str, parameters: Values, noise: Values, iterations: int
-) -> Fit:
+def _iterate(result: SelectionResult, name: str, parameters: Values, noise: Values, iterations: int) -> Fit:
     """A few iterations; a parameter that cells resolve stays: no gradient passes their edges far from the optimum."""
     if name not in result.model.resolution:
         return result.refit(parameters, noise, iterations)

@@ -53,7 +53,9 @@ def nominal_braking(vehicle: Vehicle) -> Values:
     }
 
 
-def fit_stops(model: BrakingModel, vehicle: Vehicle, nominal: Mapping[str, float], progress: Progress) -> SelectionResult:
+def fit_stops(
+    model: BrakingModel, vehicle: Vehicle, nominal: Mapping[str, float], progress: Progress
+) -> SelectionResult:
     """Fit all parameters that the stops support together; one that lies beyond its tolerance is a cause.
 
     Parameters
@@ -84,7 +86,7 @@ def fit_stops(model: BrakingModel, vehicle: Vehicle, nominal: Mapping[str, float
 
 
 def _add_pressure_offset(model: BrakingModel, result: SelectionResult, progress: Progress) -> None:
-    """The pressure's zero, which the model took off before its fit, as a cause if it is beyond doubt."""
+    """The pressure's zero, which the model took off before its fit, as a cause if it is significant."""
     offset = abs(model.offset_pa - result.nominal.get("offset_pa", 0.0))
     if offset > max(_MIN_OFFSET_PA, _OFFSET_SIGMAS * model.offset_sigma_pa):
         result.final.parameters["offset_pa"] = model.offset_pa
