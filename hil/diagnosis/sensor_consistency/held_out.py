@@ -93,7 +93,7 @@ def _error(
     low, high = bootstrap_interval(held_out[held_out[:, 1] > 0])
     return HeldOutError(
         channel, unit, measured, nominal, fitted,
-        *(root_mean_square(squares(predicted)) for predicted in (nominal, fitted, tuned)),
+        root_mean_square(squares(nominal)), root_mean_square(squares(fitted)), root_mean_square(squares(tuned)),
         root_mean_square(held_out), low, high,
         None if wrong is None else root_mean_square(squares(_held_out(result, predict, wrong))),
         _pattern(motion, measured - nominal, valid, bool(result.steps)),

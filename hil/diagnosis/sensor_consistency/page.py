@@ -151,7 +151,7 @@ def _parameters(answer: Consistency) -> Section:
         for kind, one in listed
         for name, entry in one["parameters"].items()
     ]  # fmt: skip
-    head = ("", "effect", "channel", "parameter", "value", "95 %", "unit", "probability %")
+    head: tuple[str, ...] = ("", "effect", "channel", "parameter", "value", "95 %", "unit", "probability %")
     tables = [Table("Causes and rivals", head, tuple(parameters))]
     errors: list[tuple[Cell, ...]] = [
         (
