@@ -22,7 +22,7 @@ class FormErrorAllowance:
 
     def __init__(self, explained: float, fitter: Fitter, model: Model, noise: Noise, columns: Tracks) -> None:
         self._explained, self._columns, self._frame, self._noise = explained, columns, fitter.masks, noise
-        self._joints = {joint for term in model.terms for joint in term.candidate.effect.joints}
+        self._joints = {joint for term in model.terms for joint in term.candidate.effect.injection_points}
         self._known: dict[str, float] = {}
         if model.terms:
             values = np.array(model.values())
@@ -41,7 +41,7 @@ class FormErrorAllowance:
         """Of chi-squared, for an effect with this signature, (samples, 1)."""
         if not self._joints:
             return 0.0
-        if self._joints.intersection(effect.joints):
+        if self._joints.intersection(effect.injection_points):
             return FORM_ERROR_SAME_POINT**2 * self._explained
         together = signature_overlap(self._energies, signature_energies(columns, self._frame, self._noise))
         return FORM_ERROR**2 * self._explained * together

@@ -1,7 +1,7 @@
 """Causes nobody listed: curves of one variable at a joint, in the same race as the listed effects.
 
 A law is ``c_1 f_1(v) + ... + c_5 f_5(v)`` with hats over the range that the logs cover, multiplied or added at a joint
-of the plant (`plant.effects.bank`). Listed effects alone would take a wrong name for what is in no list.
+of the plant (`plant.injection.bank`). Listed effects alone would take a wrong name for what is in no list.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,9 +14,9 @@ from hil.diagnosis.estimation.model_discrepancy import UNLISTED
 from hil.diagnosis.estimation.terms import LOCATIONS, Candidate
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator
-from plant.effects.bank import Shape, Variable, term
 from plant.effects.effect import Effect, Parameter, Scope
-from plant.effects.places import JOINTS
+from plant.injection.bank import Shape, Variable, term
+from plant.injection_points import INJECTION_POINTS
 
 BASIS_SIZE = 5
 _WHEELS = Scope.WHEEL.members
@@ -56,7 +56,7 @@ class NonparametricTerm:
     @property
     def scope(self) -> Scope:
         """Whether each wheel has its own."""
-        return Scope.WHEEL if JOINTS[self.injection_point][0] == 4 else Scope.CAR
+        return Scope.WHEEL if INJECTION_POINTS[self.injection_point][0] == 4 else Scope.CAR
 
 
 NONPARAMETRIC_TERMS = (
@@ -148,12 +148,13 @@ def at_each_location(curve: BasisExpansion) -> Iterator[BasisExpansion]:
 def basis_expansion(law: NonparametricTerm, low: float, high: float) -> BasisExpansion:
     """A law at all members, its hats evenly over a range of its variable."""
     centres = np.linspace(low, high, BASIS_SIZE)
-    unit = JOINTS[law.injection_point][1] if law.adds else ""
+    unit = INJECTION_POINTS[law.injection_point][1] if law.adds else ""
     bound = 20.0 * law.typical if law.adds else 0.9
     numbers = tuple(Parameter(f"c{k + 1}", unit, -bound, bound, law.typical) for k in range(BASIS_SIZE))
     effect = Effect(
         name=UNLISTED, row=0, title=f"{law.injection_point} depends on {_CALLED[law.variable]} in a way that no list has",
-        equation="sum c_k hat((v - v_k) / w)", joints=(law.injection_point,), scope=law.scope, parameters=numbers,
+        equation="sum c_k hat((v - v_k) / w)", injection_points=(law.injection_point,), scope=law.scope,
+        parameters=numbers,
         source="measured data", signature="", manoeuvre="",
     )  # fmt: skip
     width = float(centres[1] - centres[0])

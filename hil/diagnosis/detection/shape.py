@@ -22,7 +22,7 @@ from hil.diagnosis.estimation.uncertainty import FORM_SD_SHARE
 from hil.diagnosis.noise.model import Noise
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from plant.effects.effect import Parameter
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 _OFFERED = 9
 """Values of a shape that are looked at by one step, evenly between its bounds, in proportion where these are far
@@ -82,7 +82,7 @@ def fit_shape_parameters(
         )
         for one in listed
         for shape in one.effect.parameters
-        if shape.shape and piece.term.injection_point in one.effect.joints and one.location == piece.location
+        if shape.shape and piece.term.injection_point in one.effect.injection_points and one.location == piece.location
         for at in _values(shape)
     ]
     if not offered:

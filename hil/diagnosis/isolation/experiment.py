@@ -29,18 +29,18 @@ from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import paper_car
 from hil.diagnosis.vehicle.spec import Vehicle
 from hil.errors import BrakebenchError
-from hil.scenario import Scenario, find_scenario, load_scenario, scenario_names
+from hil.scenario.scenario import Scenario, find_scenario, load_scenario, scenario_names
 from plant.effects.effect import GROUND, Scope
-from plant.effects.manoeuvres import MANOEUVRES, ROW_S, Drive, Show, drive
-from plant.effects.signals import NAMES, noise, simulate
 from plant.model import pack
 from plant.node import PlantNode
+from plant.open_loop_manoeuvres import MANOEUVRES, ROW_S, Drive, Show, drive
+from plant.signals import NAMES, noise, simulate
 from plant.vectors import INPUT
 
 MAX_RECOMMENDATIONS = 3
 """Scenarios recommended, at most."""
 STRAIGHT_STOP = "straight_stop"
-"""Reference manoeuvre of every recommendation, one of `plant.effects.manoeuvres`."""
+"""Reference manoeuvre of every recommendation, one of `plant.open_loop_manoeuvres`."""
 FOLDER = "discriminating_manoeuvres"
 _MAX_DURATION_S, _SETTLE_S = 90.0, 0.4
 _MIN_SNR = 1.0

@@ -108,7 +108,7 @@ def _named(diagnosis: Diagnosis) -> set[str]:
 def _entry(candidate: Candidate) -> dict[str, Any]:
     """What causes and rivals have in common."""
     effect = candidate.effect
-    point = effect.joints[0] if effect.joints else ""
+    point = effect.injection_points[0] if effect.injection_points else ""
     return {"effect": effect.name, "title": effect.title, "injection_point": point, "location": candidate.location}
 
 

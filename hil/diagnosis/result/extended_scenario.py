@@ -9,7 +9,7 @@ from typing import Any
 
 from hil.diagnosis.data.log import UnusableError
 from hil.diagnosis.vehicle.extension_file import load_extension
-from hil.scenario import find_scenario
+from hil.scenario.scenario import find_scenario
 
 _SECTIONS = (
     "friction_brake", "vehicle", "suspension", "wheel", "tyre", "ehb", "pad", "motor", "battery", "sensor",
@@ -25,7 +25,7 @@ def extended_scenario(name: str, extension: Path, folder: Path) -> Path:
 
     Raises
     ------
-    UnusableError, hil.scenario_table.ScenarioError
+    UnusableError, hil.scenario.table.ScenarioError
         An extension file or a scenario that cannot be used, or nothing in the extension that a simulation can have.
     """
     load_extension(extension)  # refuses values that no car has

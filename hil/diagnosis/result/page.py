@@ -15,7 +15,7 @@ from hil.diagnosis.result.page_parts import EXTENDED, NOMINAL, binned_curve, com
 from hil.diagnosis.result.residual_patterns import UNITS, WORDS
 from hil.report.report import Chart, Curve, Number, Panel, Report, Section, Table, Verdict
 from hil.report.units import BAR, Display, Unit
-from plant.effects.places import JOINTS
+from plant.injection_points import INJECTION_POINTS
 
 _SENTENCE = {
     "none": "Nothing beyond noise and the stated tolerances.",
@@ -190,7 +190,7 @@ def _curves(answer: Answer) -> list[Section]:
         (variable,) = cause["variables"]
         unit = _VARIABLES.get(variable, "")
         curve = Curve("estimate", x, y, low, high, group="fl")
-        added = JOINTS[cause["injection_point"]][1] if cause["adds"] else ""
+        added = INJECTION_POINTS[cause["injection_point"]][1] if cause["adds"] else ""
         label = (
             f"added to {cause['injection_point']}" if cause["adds"] else f"change of {cause['injection_point']}, share"
         )

@@ -29,7 +29,7 @@ from hil.diagnosis.sensor_consistency.selection import Progress, SelectionResult
 from hil.diagnosis.sensor_consistency.stops import estimates, fit_stops, nominal_braking, relative_sigma
 from hil.diagnosis.sensor_consistency.wheel_radius import SPREAD, WheelRadiusModel
 from hil.diagnosis.vehicle.spec import Vehicle
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 _ROLL = 0.15
 """Scale error of a lateral accelerometer by the body's roll, standard deviation (effects, 56)."""

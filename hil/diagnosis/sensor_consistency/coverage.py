@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from hil.diagnosis.data.log import MOTOR_TORQUE, PRESSURE, PRESSURE_DEMAND
 from hil.diagnosis.sensor_consistency.motion import Motion, measured_channels
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 _CHANNELS_OF_NODE = {
     "pressure": "the pressure at every wheel",

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.diagnosis.sensor_consistency.selection import RARE, SelectionResult
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 GRAVITY_MPS2 = 9.80665
 INDISTINGUISHABLE = 4.6
@@ -97,7 +97,8 @@ class Cause:
         """As a cause or a rival, by one of its labels; ``share`` is the probability of this parameter."""
         label = self.labels[at]
         effect = THETA.effect(label.effect)
-        injection_point = next((j for j in effect.joints if j == f"sensor.{label.location}"), effect.joints[0])
+        points, at_sensor = effect.injection_points, f"sensor.{label.location}"
+        injection_point = at_sensor if at_sensor in points else points[0]
         low, high = sorted((label.factor * self.low, label.factor * self.high))
         parameter = {"value": label.factor * self.value, "unit": effect.parameter(label.parameter).unit}
         density = np.exp(self.log_density)

@@ -18,13 +18,13 @@ from hil.diagnosis.detection.nonparametric import (
 from hil.diagnosis.result.extended_scenario import extended_scenario
 from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.vehicle.load import paper_car
-from hil.effects import EffectError, read_laws, written_laws
-from hil.scenario import load_scenario
-from plant.effects.bank import term
+from hil.scenario.effects import EffectError, read_laws, written_laws
+from hil.scenario.scenario import load_scenario
+from plant.injection.bank import term
 
 LAW_TOML = """
 [[laws]]
-joint = "friction.mu"
+injection_point = "friction.mu"
 variable = "speed"
 adds = false
 centre = 15.0

@@ -6,8 +6,8 @@ import pytest
 
 from hil.diagnosis.data.log import UnusableError
 from hil.diagnosis.result.extended_scenario import extended_scenario
-from hil.scenario import load_scenario
-from plant.effects.theta import THETA
+from hil.scenario.scenario import load_scenario
+from plant.injection.theta import THETA
 
 EXTENSION = """
 [effects.imu_bias]
