@@ -11,9 +11,8 @@ from hil.diagnosis.detection.result import Diagnosis
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term, Tracks
 from hil.diagnosis.estimation.information import information_blocks
 from hil.diagnosis.noise.model import Noise, SampleMasks
+from hil.diagnosis.result.statistics import FOLDS, bootstrap_interval, root_mean_square, squares_by_segment
 
-FOLDS = 4
-_DRAWS = 400
 _TEMPERING = 1.5
 """Divisor of the criterion differences: two hypotheses differ less than an exact noise model would say."""
 
@@ -96,39 +95,21 @@ def held_out_error(diagnosis: Diagnosis) -> list[HeldOutError]:
     other = held_out_residual(fitter, noise, wrong.model) if wrong is not None else None
     errors = []
     for name in masks.names:
-        before = _by_segment(diagnosis.nominal.residual[name], masks, name)
-        own = _by_segment((after or tuned)[name], masks, name)
-        low, high = _interval(own)
+        before = _squares(diagnosis.nominal.residual[name], masks, name)
+        own = _squares((after or tuned)[name], masks, name)
+        low, high = bootstrap_interval(own)
         errors.append(
             HeldOutError(
-                name, _rms(before), _rms(own), low, high, _rms(_by_segment(tuned[name], masks, name)),
-                None if other is None else _rms(_by_segment(other[name], masks, name)),
+                name, root_mean_square(before), root_mean_square(own), low, high,
+                root_mean_square(_squares(tuned[name], masks, name)),
+                None if other is None else root_mean_square(_squares(other[name], masks, name)),
             )
         )  # fmt: skip
     return errors
 
 
-def _by_segment(values: Floats, masks: SampleMasks, name: str) -> Floats:
-    """Sums of squares and counts, (segments, 2)."""
-    known = masks.present[name] > 0.5
-    blocks = np.asarray(masks.segment_id, np.int64)[known]
-    count = int(np.max(masks.segment_id)) + 1
-    squares = np.bincount(blocks, values[known, 0].astype(np.float64) ** 2, count)
-    return np.column_stack((squares, np.bincount(blocks, minlength=count)))
-
-
-def _rms(sums_by: Floats) -> float:
-    return float(np.sqrt(sums_by[:, 0].sum() / max(sums_by[:, 1].sum(), 1.0)))
-
-
-def _interval(sums_by: Floats) -> tuple[float, float]:
-    """95 % interval by bootstrap over segments."""
-    rng = np.random.default_rng(0)
-    drawn = rng.integers(0, len(sums_by), (_DRAWS, len(sums_by)))
-    total = sums_by[drawn].sum(axis=1)
-    values = np.sqrt(total[:, 0] / np.maximum(total[:, 1], 1.0))
-    low, high = np.quantile(values, (0.025, 0.975))
-    return float(low), float(high)
+def _squares(values: Floats, masks: SampleMasks, name: str) -> Floats:
+    return squares_by_segment(values[:, 0], masks.present[name] > 0.5, masks.segment_id)
 
 
 def probabilities(hypotheses: Sequence[FittedHypothesis]) -> list[float]:

@@ -11,8 +11,9 @@ from hil.diagnosis.detection.result import INDISTINGUISHABLE
 from hil.diagnosis.estimation.gauss_newton import Model
 from hil.diagnosis.result.answer import Answer
 from hil.diagnosis.result.cross_validation import HeldOutError, probabilities
+from hil.diagnosis.result.page_parts import EXTENDED, NOMINAL, binned_curve, comparison_panels, limits, rounded
 from hil.diagnosis.result.residual_patterns import UNITS, WORDS
-from hil.report.report import Chart, Curve, Number, Panel, Report, Section, Table, Trace, Verdict
+from hil.report.report import Chart, Curve, Number, Panel, Report, Section, Table, Verdict
 from hil.report.units import BAR, Display, Unit
 from plant.injection_points import INJECTION_POINTS
 
@@ -108,7 +109,7 @@ def _comparison(answer: Answer) -> Section:
     diagnosis = answer.diagnosis
     t, gaps = _joined_time(answer)
     measured = diagnosis.fitter.simulator.measured()
-    panels = []
+    panels: list[Panel] = []
     for group, title in _PANELS:
         if group not in diagnosis.dataset.groups:
             continue
@@ -116,17 +117,10 @@ def _comparison(answer: Answer) -> Section:
         unit: Unit = _SHOWN.get(group, "m/s²")
         known = _mean(measured[group]) * factor
         shown = ~gaps & (diagnosis.fitter.masks.present.get("ax", ~gaps) > 0.5) if group == "ax" else ~gaps
-        traces = []
-        for name, model in _models(answer):
-            simulated = _mean(model.channels[group]) * factor
-            traces.append(Trace(name, t, np.where(shown, simulated, np.nan), group="rl" if name == "nominal" else "fl"))
-        traces.append(Trace("measured", t, np.where(shown, known, np.nan), "demand"))
-        panels.append(Panel(title, unit, tuple(traces)))
-        residuals = []
-        for name, model in _models(answer):
-            left = known - _mean(model.channels[group]) * factor
-            residuals.append(Trace(name, t, np.where(shown, left, np.nan), group="rl" if name == "nominal" else "fl"))
-        panels.append(Panel(f"{title.split(',')[0]}: measured less simulated", unit, tuple(residuals)))
+        simulated = {
+            name: np.where(shown, _mean(model.channels[group]) * factor, np.nan) for name, model in _models(answer)
+        }
+        panels += comparison_panels(title, unit, t, np.where(shown, known, np.nan), simulated)
     return Section(
         "Measured against simulated", panels=tuple(panels),
         text="All logs, one after the other, simulated open loop from measured inputs; every segment restarts the speed.",
@@ -159,8 +153,8 @@ def _missed(answer: Answer) -> Section:
 def _scaled(value: float, track: str) -> tuple[float, str]:
     group = track.split(".")[0]
     if group == "pressure":
-        return float(f"{value * 1e-5:.3g}"), "bar"
-    return float(f"{value:.3g}"), UNITS[group]
+        return rounded(value * 1e-5), "bar"
+    return rounded(value), UNITS[group]
 
 
 def _residual_charts(answer: Answer) -> list[Chart]:
@@ -176,29 +170,14 @@ def _residual_charts(answer: Answer) -> list[Chart]:
         ("Acceleration residual over pressure", pressure, known, "pressure", BAR),
         ("Acceleration residual over speed, braking", speed, known & (pressure > 3e5), "speed", Display("km/h", 3.6)),
     ):
-        curves = []
-        for name, model in _models(answer):
-            left = model.residual["ax"][:, 0]
-            curve = _binned(x[mask], left[mask], name)
-            if curve is not None:
-                curves.append(curve)
+        curves: list[Curve] = []
+        for (name, model), group in zip(_models(answer), (NOMINAL, EXTENDED), strict=True):
+            curves += binned_curve(
+                x[mask], model.residual["ax"][mask, 0], name, group, bins=12, min_samples=10, min_bins=3
+            )
         if curves:
             charts.append(Chart(title, label, unit, "measured less simulated", "m/s²", tuple(curves)))
     return charts
-
-
-def _binned(x: Floats, y: Floats, name: str) -> Curve | None:
-    if len(x) < 100 or np.ptp(x) <= 0.0:
-        return None
-    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, 13)))
-    at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
-    rows = [
-        (x[at == k].mean(), y[at == k].mean(), y[at == k].std()) for k in range(len(edges) - 1) if (at == k).sum() > 10
-    ]
-    if len(rows) < 3:
-        return None
-    centre, mean, spread = (np.array(v) for v in zip(*rows, strict=True))
-    return Curve(name, centre, mean, mean - spread, mean + spread, group="rl" if name == "nominal" else "fl")
 
 
 def _curves(answer: Answer) -> list[Section]:
@@ -317,14 +296,6 @@ def _held_out_charts(answer: Answer) -> tuple[Chart, ...]:
 
 def _limits(answer: Answer) -> Section:
     content = answer.json
-    rows = [("undetectable in these manoeuvres", ", ".join(content["undetectable_effects"]) or "-")]
-    rows += [("missing channel", text) for text in content["missing"]]
-    rows += [("remark", text) for text in content["remarks"]]
-    if content["discriminating_manoeuvres"]:
-        rows.append(
-            (
-                "drive this to decide",
-                ", ".join(Path(one["scenario"]).stem for one in content["discriminating_manoeuvres"]),
-            )
-        )
-    return Section("What these data cannot show", tables=(Table("Limits", ("what", "which"), tuple(rows)),))
+    undetectable = ", ".join(content["undetectable_effects"]) or "-"
+    manoeuvres = (Path(one["scenario"]).stem for one in content["discriminating_manoeuvres"])
+    return limits([("undetectable in these manoeuvres", undetectable)], content, manoeuvres)

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import spearmanr
 
 from hil.diagnosis.data.dataset import Dataset
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.result import Diagnosis
 from hil.diagnosis.noise.model import SampleMasks
+from hil.diagnosis.result.statistics import pattern
 from plant.vectors import INPUT
 
 WORDS = {
@@ -26,8 +26,6 @@ UNITS = {"wheel": "m/s", "ax": "m/s2", "ay": "m/s2", "yaw": "rad/s", "gps": "m/s
 """Units by group of channels; wheel speeds are compared as speeds at the rolling radius."""
 _NOISE_RATIO = 1.15
 """Root mean square over that of noise, below which a residual counts as noise."""
-_MIN_CORRELATION = 0.25
-"""Rank correlation (Spearman) from which on a variable is reported."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +50,8 @@ def residual_patterns(diagnosis: Diagnosis) -> list[ResidualPattern]:
         values = diagnosis.nominal.residual[name][:, 0]
         known = masks.present[name] > 0.5
         rms, noise = float(np.sqrt(np.mean(values[known] ** 2))), expected[name]
-        pattern = "noise" if rms < _NOISE_RATIO * noise else _pattern(name, values, known, variables, masks)
-        patterns.append(ResidualPattern(name, WORDS[name], UNITS[name.split(".")[0]], rms, noise, pattern))
+        text = "noise" if rms < _NOISE_RATIO * noise else _pattern(name, values, known, variables, masks)
+        patterns.append(ResidualPattern(name, WORDS[name], UNITS[name.split(".")[0]], rms, noise, text))
     return patterns
 
 
@@ -93,19 +91,4 @@ def _pattern(name: str, values: Floats, known: Floats, variables: dict[str, Floa
         restarts = np.convolve((masks.segment_start + masks.log_start) > 0.5, np.ones(2 * n + 1), mode="same") > 0.5
         shown = np.where(restarts, np.nan, slope)
     step = max(int(0.1 / masks.sample_s), 1)
-    correlations = []
-    for what, variable in variables.items():
-        good = (known > 0.5) & np.isfinite(shown) & np.isfinite(variable)
-        x, y = variable[good][::step], shown[good][::step]
-        if len(x) > 40 and np.ptp(x) > 0.0 and np.ptp(y) > 0.0:
-            correlations.append((float(spearmanr(x, y)[0]), what))
-    correlations.sort(key=lambda item: -abs(item[0]))
-    offset = float(np.nanmean(shown[known > 0.5])) / max(float(np.nanstd(shown[known > 0.5])), 1e-12)
-    if correlations and abs(correlations[0][0]) > _MIN_CORRELATION:
-        words = [
-            f"{'grows' if r > 0 else 'falls'} with {what} ({r:+.2f})"
-            for r, what in correlations[:2]
-            if abs(r) > _MIN_CORRELATION
-        ]
-        return "; ".join(words)
-    return "constant offset" if abs(offset) > 0.7 else "no simple pattern"
+    return pattern(shown, known, variables, step)

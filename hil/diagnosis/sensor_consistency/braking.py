@@ -1,4 +1,4 @@
-"""Pressure to deceleration: gain, delay, lag and drag that the motion supports, without any force being measured."""
+"""Braking model: deceleration from brake pressure, with gain, delay, lag and drag; no force is measured."""
 
 from collections.abc import Mapping
 from itertools import pairwise
@@ -8,8 +8,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.sensor_consistency.kalman import Linear, innovations
-from hil.diagnosis.sensor_consistency.longitudinal import lag
+from hil.diagnosis.sensor_consistency.kalman import StateSpace, log_likelihood
+from hil.diagnosis.sensor_consistency.longitudinal import first_order_lag
 from hil.diagnosis.sensor_consistency.model import Parameter, SensorModel
 from hil.diagnosis.sensor_consistency.motion import Motion
 
@@ -18,7 +18,7 @@ _NOISE: Final[Mapping[str, Parameter]] = {
     "force_mps2": Parameter(0.3, 1e-2, 10.0, 0.3, True, 1.5),
     "force_s": Parameter(2.0, 0.1, 100.0, 0.3, True, 1.0),
 }
-_NUMBERS: Final[Mapping[str, Parameter]] = {
+_PARAMETERS: Final[Mapping[str, Parameter]] = {
     "brake_mps2_pa": Parameter(0.0, -1e-4, 1e-4, 1e-6),
     "delay_s": Parameter(0.0, -2.0, 2.0, 0.05),
     "lag_s": Parameter(0.0, 0.0, 1.0, 0.05),
@@ -31,119 +31,120 @@ _NUMBERS: Final[Mapping[str, Parameter]] = {
     "by_speed": Parameter(0.0, -3.0, 3.0, 0.1),
     "by_pressure": Parameter(0.0, -3.0, 3.0, 0.1),
 }
-_OFF, _GAINING_MPS2 = 0.01, 0.4
-_REFERENCE = (20.0, 5e5)
-LEAST_PA = 2e5
-LEAST_STOPS = 3
+_CLOSED_THROTTLE, _GAINING_MPS2 = 0.01, 0.4
+_REFERENCE_SPEED_MPS, _REFERENCE_PA = 20.0, 5e5
+APPLIED_PA = 2e4
+"""Pressure from which the brake counts as applied."""
+_STOP_PA, _STOP_S = 2e5, 0.8
+"""A stop reaches this pressure and lasts longer than this."""
+MIN_STOPS = 3
 
 
 class BrakingModel(SensorModel):
-    """v' = -g p(t - delay) - engine - drag - c v^2 + drive throttle + force; force is coloured: slope, gear, model.
+    """dv/dt = -g p(t - delay) - drag - c v^2 - engine + drive throttle + coloured force (slope, gear, model error).
 
     ``brake_mps2_pa`` is g; ``by_speed`` and ``by_pressure`` change it in proportion to (v - 20 m/s)/20 and
-    (p - 5 bar)/5; ``engine_mps2`` counts while the throttle is closed.
+    (p - 5 bar)/5; ``engine_mps2`` acts while the throttle is closed.
+
+    Attributes
+    ----------
+    pressure : (cells,) Pa, less its zero ``offset_pa``, which is known to ``offset_sigma_pa``.
+    speed : (cells,) over ground, m/s.
+    stops : first cell and the one after the last of every brake application that counts.
     """
 
     noise = _NOISE
 
     def __init__(self, motion: Motion, slip_s2_m: float = 0.0) -> None:
-        """``slip_s2_m`` is how far the wheels slip per acceleration (`hil.diagnosis.sensor_consistency.longitudinal.SLIP`)."""
+        """``slip_s2_m`` is the wheels' slip per acceleration (`longitudinal.SLIP`)."""
         self.motion = motion
-        self.demanded = not motion.has("pressure")
-        pressure = motion.channels["pressure_demand" if self.demanded else "pressure"]
-        self.offset_pa, self.offset_sigma_pa = _zero(motion, pressure)
+        pressure = motion.channels["pressure" if motion.has("pressure") else "pressure_demand"]
+        self.offset_pa, self.offset_sigma_pa = _zero_pressure(motion, pressure)
         self.pressure = np.nan_to_num(pressure - self.offset_pa)
         rolled = motion.speed_mps * (1.0 - slip_s2_m * motion.accel_mps2)
         self.speed = motion.channels["speed_mps"] if motion.has("speed_mps") else rolled
         self.throttle = np.nan_to_num(motion.channels["throttle"]) if motion.has("throttle") else None
-        self._known = (np.isfinite(self.speed) * motion.moving)[:, None]
+        self._valid = (np.isfinite(self.speed) * motion.moving)[:, None]
         without = () if self.throttle is not None else ("drive_mps2", "drive_delay_s", "engine_mps2")
-        self.parameters = {n: v for n, v in _NUMBERS.items() if n not in without}
+        self.parameters = {n: v for n, v in _PARAMETERS.items() if n not in without}
         self.stops = _stops(motion, self.pressure)
 
-    def force(self, sensor: Mapping[str, float]) -> Floats:
-        """Acceleration that the numbers explain, m/s2."""
+    def acceleration(self, parameters: Mapping[str, float]) -> Floats:
+        """(cells,) acceleration that the parameters explain, m/s2; 0 where the car does not move."""
         motion, v = self.motion, self.motion.speed_mps
-        found = -sensor.get("brake_mps2_pa", 0.0) * self._clamped(sensor)
-        found -= sensor.get("drag_mps2", 0.0) + sensor.get("drag_1_m", 0.0) * v * v
+        accel = -parameters.get("brake_mps2_pa", 0.0) * self.effective_pressure(parameters)
+        accel -= parameters.get("drag_mps2", 0.0) + parameters.get("drag_1_m", 0.0) * v * v
         if self.throttle is not None:
-            throttle = self._later(self.throttle, sensor.get("drive_delay_s", 0.0))
-            found += sensor.get("drive_mps2", 0.0) * throttle
-            found -= sensor.get("engine_mps2", 0.0) * np.clip(1.0 - throttle / _OFF, 0.0, 1.0)
-        return np.asarray(found * motion.moving)
+            throttle = motion.delayed(self.throttle, parameters.get("drive_delay_s", 0.0))
+            accel += parameters.get("drive_mps2", 0.0) * throttle
+            closed = np.clip(1.0 - throttle / _CLOSED_THROTTLE, 0.0, 1.0)
+            accel -= parameters.get("engine_mps2", 0.0) * closed
+        return np.asarray(accel * motion.moving)
 
-    def _clamped(self, sensor: Mapping[str, float]) -> Floats:
-        """Pressure as the wheels feel it, with what speed and pressure make of the gain."""
+    def effective_pressure(self, parameters: Mapping[str, float]) -> Floats:
+        """(cells,) delayed and lagged pressure, times the gain's change with speed and pressure, Pa."""
         motion = self.motion
-        felt = self._later(self.pressure, sensor.get("delay_s", 0.0))
-        phi, old, new = lag(sensor.get("lag_s", 0.0), motion.cell_s)
+        pressure = motion.delayed(self.pressure, parameters.get("delay_s", 0.0))
+        phi, b0, b1 = first_order_lag(parameters.get("lag_s", 0.0), motion.cell_s)
         if phi > 0.0:
-            felt = _lagged(felt, motion.fresh, phi, old, new)
-        v, p = _REFERENCE
+            pressure = _lagged(pressure, motion.log_start, phi, b0, b1)
         change = (
-            sensor.get("by_speed", 0.0) * (motion.speed_mps - v) / v + sensor.get("by_pressure", 0.0) * (felt - p) / p
+            parameters.get("by_speed", 0.0) * (motion.speed_mps - _REFERENCE_SPEED_MPS) / _REFERENCE_SPEED_MPS
+            + parameters.get("by_pressure", 0.0) * (pressure - _REFERENCE_PA) / _REFERENCE_PA
         )
-        return np.asarray(felt * (1.0 + change))
+        return np.asarray(pressure * (1.0 + change))
 
-    def _later(self, values: Floats, delay_s: float) -> Floats:
-        found = np.empty_like(values)
-        for k in range(len(self.motion.logs)):
-            rows = self.motion.log == k
-            found[rows] = np.interp(self.motion.t_s[rows] - delay_s, self.motion.t_s[rows], values[rows])
-        return found
-
-    def score(self, sensor: Mapping[str, float], noise: Mapping[str, float]) -> tuple[Floats, Floats]:
-        """Innovations (cells, 1) and log-likelihood of every cell."""
+    def log_likelihood(self, parameters: Mapping[str, float], noise: Mapping[str, float]) -> Floats:
+        """(cells,) log-likelihood of the speed."""
         step = self.motion.cell_s
-        force = self.force(sensor)
-        explained = np.cumsum(0.5 * step * (force + np.concatenate((force[:1], force[:-1]))))
-        keep, size = float(np.exp(-step / noise["force_s"])), noise["force_mps2"] ** 2
-        transition = np.array([[1.0, 0.5 * step * (1.0 + keep)], [0.0, keep]])
+        accel = self.acceleration(parameters)
+        explained = np.cumsum(0.5 * step * (accel + np.concatenate((accel[:1], accel[:-1]))))
+        ar1, variance = float(np.exp(-step / noise["force_s"])), noise["force_mps2"] ** 2
+        transition = np.array([[1.0, 0.5 * step * (1.0 + ar1)], [0.0, ar1]])
         into = np.array([[0.5 * step], [1.0]])
-        model = Linear(
-            transition, into @ into.T * size * (1.0 - keep**2), np.diag([1e6, size]), np.array([[1.0, 0.0]]),
+        model = StateSpace(
+            transition, into @ into.T * variance * (1.0 - ar1**2), np.diag([1e6, variance]), np.array([[1.0, 0.0]]),
             np.array([noise["speed_mps"] ** 2]),
         )  # fmt: skip
-        return innovations((self.speed - explained)[:, None], self._known, self.motion.fresh, model)
+        return log_likelihood((self.speed - explained)[:, None], self._valid, self.motion.log_start, model)
 
-    def free_run(self, sensor: Mapping[str, float], offset: Floats | float = 0.0) -> Floats:
-        """Speed through every stop from its start, NaN elsewhere; ``offset`` is added to the force."""
-        found, force = np.full(len(self.speed), np.nan), self.force(sensor) + offset
-        for first, last in self.stops:
-            steps = 0.5 * self.motion.cell_s * (force[first + 1 : last] + force[first : last - 1])
-            found[first] = self.speed[first]
-            found[first + 1 : last] = self.speed[first] + np.cumsum(steps)
-        return found
-
-
-def _lagged(values: Floats, fresh: Floats, phi: float, old: float, new: float) -> Floats:
-    out = np.empty_like(values)
-    begins = [*np.flatnonzero(fresh > 0.5), len(values)]
-    for first, last in pairwise(begins):
-        part = values[first:last]
-        out[first:last], _ = lfilter([new, old], [1.0, -phi], part, zi=[old * part[0] + phi * part[0]])
-    return out
+    def predict(self, parameters: Mapping[str, float]) -> Floats:
+        """(cells,) speed simulated open loop through every stop from its measured start, m/s; NaN elsewhere."""
+        speed, accel = np.full(len(self.speed), np.nan), self.acceleration(parameters)
+        for first, end in self.stops:
+            steps = 0.5 * self.motion.cell_s * (accel[first + 1 : end] + accel[first : end - 1])
+            speed[first] = self.speed[first]
+            speed[first + 1 : end] = self.speed[first] + np.cumsum(steps)
+        return speed
 
 
-def _zero(motion: Motion, pressure: Floats) -> tuple[float, float]:
-    """What the pressure reads while the car gains speed, and how far the manoeuvres disagree on it."""
-    free = (motion.accel_mps2 > _GAINING_MPS2) & (motion.moving > 0.5) & np.isfinite(pressure)
+def _lagged(values: Floats, log_start: Floats, phi: float, b0: float, b1: float) -> Floats:
+    lagged = np.empty_like(values)
+    for first, end in pairwise([*np.flatnonzero(log_start > 0.5), len(values)]):
+        part = values[first:end]
+        lagged[first:end], _ = lfilter([b1, b0], [1.0, -phi], part, zi=[b0 * part[0] + phi * part[0]])
+    return lagged
+
+
+def _zero_pressure(motion: Motion, pressure: Floats) -> tuple[float, float]:
+    """Pressure while the car gains speed, Pa: median over the segments, and its standard deviation; 0 if too few."""
+    released = (motion.accel_mps2 > _GAINING_MPS2) & (motion.moving > 0.5) & np.isfinite(pressure)
     values = [
-        float(np.median(pressure[part])) for k in range(motion.blocks) if (part := free & (motion.block == k)).sum() > 5
+        float(np.median(pressure[rows]))
+        for k in range(motion.segments)
+        if (rows := released & (motion.segment_id == k)).sum() > 5
     ]
-    if len(values) < LEAST_STOPS:
+    if len(values) < MIN_STOPS:
         return 0.0, 0.0
-    return float(np.median(values)), float(np.subtract(*np.quantile(values, (0.84, 0.16)))) * 0.5 * (
-        len(values) - 1
-    ) ** -0.5
+    spread = float(np.subtract(*np.quantile(values, (0.84, 0.16))))
+    return float(np.median(values)), spread * 0.5 * (len(values) - 1) ** -0.5
 
 
 def _stops(motion: Motion, pressure: Floats) -> list[tuple[int, int]]:
-    """Applications of 0.8 s or more with ``LEAST_PA`` while the car moves, as cells from first to past the last."""
-    on = (pressure > 2e4) & (motion.moving > 0.5)
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], on.astype(np.int8), [0]))))
-    found = []
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
-        if (last - first) * motion.cell_s > 0.8 and pressure[first:last].max() > LEAST_PA:
-            found.append((int(first), int(last)))
-    return found
+    applied = (pressure > APPLIED_PA) & (motion.moving > 0.5)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], applied.astype(np.int8), [0]))))
+    return [
+        (int(first), int(end))
+        for first, end in zip(edges[::2], edges[1::2], strict=True)
+        if (end - first) * motion.cell_s > _STOP_S and pressure[first:end].max() > _STOP_PA
+    ]

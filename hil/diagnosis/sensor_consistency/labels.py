@@ -1,5 +1,6 @@
-"""What the numbers of the models are called in the list of effects, and which other effects would look the same."""
+"""Labels: which effects an accepted parameter may be, how likely each is, and the cause and rivals that follow."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,30 +13,48 @@ from plant.injection.theta import THETA
 
 GRAVITY_MPS2 = 9.80665
 INDISTINGUISHABLE = 4.6
-"""Twice the log of the odds (ten to one) below which two names are not told apart."""
-MISTAKES = (-1.0, 3.6, 1.0 / 3.6, GRAVITY_MPS2, 1.0 / GRAVITY_MPS2, -GRAVITY_MPS2, 0.1, 10.0, 256.0, 1.0 / 256.0)
-"""Factors that a database, not a sensor, is wrong by: sign, km/h, g, a decimal, a byte (effects, 69)."""
-_IMU_SCALE, _OF_A_SENSOR = 0.04, 0.2
+"""Difference in -2 log likelihood (a Bayes factor of ten) below which two explanations are not distinguished."""
+DATABASE_FACTORS = (
+    -1.0, 3.6, 1.0 / 3.6, GRAVITY_MPS2, 1.0 / GRAVITY_MPS2, -GRAVITY_MPS2, 0.1, 10.0, 256.0, 1.0 / 256.0,
+)  # fmt: skip
+"""Factors by which a signal database, not a sensor, is wrong: sign, km/h, g, a decimal, a byte (effects, 69)."""
+_IMU_SCALE, _MAX_SENSOR_SCALE = 0.04, 0.2
+"""Typical scale error of an accelerometer, and the largest that still counts as one of the sensor."""
 
 
 @dataclass(frozen=True)
 class Label:
-    """An effect that a number may be: value = factor * change, ``usual`` size in the number's own unit."""
+    """An effect that a model's parameter may be.
+
+    Attributes
+    ----------
+    effect, parameter, location : as in the list of effects.
+    factor : the effect's parameter per change of the model's parameter.
+    typical : standard deviation of the model's parameter if it is this effect.
+    """
 
     effect: str
     parameter: str
     location: str
     factor: float
-    usual: float
+    typical: float
 
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """A number with its names, most likely first; ``value``, ``low`` and ``high`` are what it has
-    changed by since it was handed in.
+    """An accepted parameter with its labels.
 
-    ``number`` is of ``model``; ``channels`` say where it shows; ``exact`` is the mistake that it equals. ``instead``
-    are other numbers that fit nearly as well in its place, each ``behind`` by what it has more of -2 log L.
+    Attributes
+    ----------
+    model, parameter : the sensor model and its parameter.
+    labels : the effects it may be, most likely first.
+    log_density : log prior density of the value under each label.
+    value, low, high : change from nominal, and its 95 % interval.
+    gain : reduction of -2 log likelihood.
+    channels : where it shows.
+    database_factor : the one of `DATABASE_FACTORS` within the interval.
+    substitutes : other parameters that fit nearly as well in its place.
+    delta_criterion : of a substitute, its -2 log likelihood less that of the accepted parameter.
     """
 
     model: str
@@ -47,156 +66,156 @@ class Cause:
     high: float
     gain: float
     channels: tuple[str, ...]
-    exact: float | None = None
+    database_factor: float | None = None
     substitutes: tuple["Cause", ...] = ()
     delta_criterion: float = 0.0
 
     @property
     def is_ambiguous(self) -> bool:
-        """Whether another effect does as well."""
-        return len(self._near) > 1 or any(other.delta_criterion < INDISTINGUISHABLE for other in self.substitutes)
+        """Whether another label or parameter explains the data as well."""
+        others = (other.delta_criterion < INDISTINGUISHABLE for other in self.substitutes)
+        return len(self._likely_labels()) > 1 or any(others)
 
     @property
-    def as_likely(self) -> tuple[str, ...]:
-        """The effects that are not told apart, its first name first."""
-        near = [
-            name
-            for cause in (self, *self.substitutes)
-            if cause.delta_criterion < INDISTINGUISHABLE
-            for name in cause._near
-        ]
-        return tuple(dict.fromkeys(name.effect for name in near))
+    def indistinguishable(self) -> tuple[str, ...]:
+        """The effects that these data do not distinguish, the most likely first."""
+        near = [one for one in (self, *self.substitutes) if one.delta_criterion < INDISTINGUISHABLE]
+        return tuple(dict.fromkeys(label.effect for one in near for label in one._likely_labels()))
 
     @property
-    def _near(self) -> tuple[Label, ...]:
-        """Names of the number itself that its size does not tell from the first."""
-        least = self.log_density[0] * np.exp(-0.5 * INDISTINGUISHABLE)
-        return tuple(name for k, name in enumerate(self.labels) if k == 0 or self.log_density[k] > least)
-
-    @property
-    def alternatives(self) -> tuple[str, ...]:
-        """Every effect it may be."""
-        return tuple(dict.fromkeys(n.effect for cause in (self, *self.substitutes) for n in cause.labels))
+    def effects(self) -> tuple[str, ...]:
+        """Every effect that it may be."""
+        return tuple(dict.fromkeys(label.effect for one in (self, *self.substitutes) for label in one.labels))
 
     def rivals(self) -> list[dict[str, object]]:
-        """All that it may be besides, but for what is a hundred times less likely."""
-        own = [self.as_json(k) for k in range(1, len(self.labels)) if self.log_density[k] > RARE * self.log_density[0]]
-        share = self._share
-        return own + [
-            other.as_json(k, share * float(np.exp(-0.5 * other.delta_criterion)))
+        """As JSON, the other labels and substitutes, but for those that are less likely by `RARE`."""
+        return [self.as_json(k) for k in self._reported()[1:]] + [
+            other.as_json(k, self._share * float(np.exp(-0.5 * other.delta_criterion)))
             for other in self.substitutes
-            for k in range(len(other.labels))
-            if other.log_density[k] > RARE * other.log_density[0]
+            for k in other._reported()
         ]
 
-    @property
-    def _share(self) -> float:
-        """How likely it is this number and none of those that fit in its place."""
-        return 1.0 / (1.0 + float(sum(np.exp(-0.5 * other.delta_criterion) for other in self.substitutes)))
-
     def as_json(self, at: int = 0, share: float | None = None) -> dict[str, object]:
-        """As a cause (its first name), or a rival; ``share`` as `_share` if None."""
-        name = self.labels[at]
-        effect = THETA.effect(name.effect)
-        joint = next((j for j in effect.injection_points if j == f"sensor.{name.location}"), effect.injection_points[0])
-        low, high = sorted((name.factor * self.low, name.factor * self.high))
-        parameter = {"value": name.factor * self.value, "unit": effect.parameter(name.parameter).unit}
-        probability = (self._share if share is None else share) * self.log_density[at] / sum(self.log_density)
+        """As a cause or a rival, by one of its labels; ``share`` is the probability of this parameter."""
+        label = self.labels[at]
+        effect = THETA.effect(label.effect)
+        points, at_sensor = effect.injection_points, f"sensor.{label.location}"
+        injection_point = at_sensor if at_sensor in points else points[0]
+        low, high = sorted((label.factor * self.low, label.factor * self.high))
+        parameter = {"value": label.factor * self.value, "unit": effect.parameter(label.parameter).unit}
+        density = np.exp(self.log_density)
+        probability = (self._share if share is None else share) * float(density[at] / density.sum())
         return {
-            "effect": name.effect, "title": effect.title, "injection_point": joint, "location": name.location,
-            "parameters": {name.parameter: parameter | {"ci95": [low, high]}},
+            "effect": label.effect, "title": effect.title, "injection_point": injection_point,
+            "location": label.location, "parameters": {label.parameter: parameter | {"ci95": [low, high]}},
             "probability": probability, "onset": None, "onset_s": None, "variables": [], "curve": [],
             "channels": list(self.channels),
         }  # fmt: skip
 
+    @property
+    def _share(self) -> float:
+        """Probability of this parameter, against its substitutes."""
+        return 1.0 / (1.0 + float(sum(np.exp(-0.5 * other.delta_criterion) for other in self.substitutes)))
 
-def causes_of(model: str, found: SelectionResult, to_ground: bool) -> list[Cause]:
-    """Every number that was taken up, by name."""
-    taken = {step.parameter for step in found.steps}
-    listed = []
-    for step in found.steps:
-        instead = tuple(
-            replace(_cause(model, other, number, to_ground), delta_criterion=behind)
-            for number, (other, behind) in step.substitutes.items()
-            if number not in taken
+    def _likely_labels(self) -> list[Label]:
+        """The first label, and those that the parameter's size does not distinguish from it."""
+        least = self.log_density[0] - 0.5 * INDISTINGUISHABLE
+        return [label for k, label in enumerate(self.labels) if k == 0 or self.log_density[k] > least]
+
+    def _reported(self) -> list[int]:
+        least = self.log_density[0] + math.log(RARE)
+        return [k for k, log_density in enumerate(self.log_density) if log_density > least]
+
+
+def causes_of(model: str, result: SelectionResult, to_ground: bool) -> list[Cause]:
+    """A cause for every accepted parameter of a model; ``to_ground`` says that the ground speed was measured."""
+    accepted = {step.parameter for step in result.steps}
+    causes = []
+    for step in result.steps:
+        substitutes = tuple(
+            replace(_cause(model, other, parameter, to_ground), delta_criterion=delta)
+            for parameter, (other, delta) in step.substitutes.items()
+            if parameter not in accepted
         )
-        listed.append(replace(_cause(model, found, step.parameter, to_ground), gain=step.gain, substitutes=instead))
-    return listed
+        cause = _cause(model, result, step.parameter, to_ground)
+        causes.append(replace(cause, gain=step.gain, substitutes=substitutes))
+    return causes
 
 
-def _cause(model: str, found: SelectionResult, number: str, to_ground: bool) -> Cause:
-    handed = found.given.get(number, 0.0)
-    value, low, high = (_change(number, v, handed) for v in (found.final.sensor[number], *found.interval(number)))
-    low, high = sorted((low, high))
-    names, channels, exact = _names(model, number, value, (low, high), to_ground)
-    odds = _odds(names, value)
-    order = sorted(range(len(names)), key=lambda k: -odds[k])
-    by_odds = tuple(names[k] for k in order), tuple(odds[k] for k in order)
-    return Cause(model, number, *by_odds, value, low, high, 0.0, channels, exact)
+def _cause(model: str, result: SelectionResult, parameter: str, to_ground: bool) -> Cause:
+    nominal = result.nominal.get(parameter, 0.0)
+    estimates = (result.final.parameters[parameter], *result.interval(parameter))
+    value, *interval = (_change(parameter, v, nominal) for v in estimates)
+    low, high = sorted(interval)
+    labels, channel, factor = _labels(model, parameter, value, (low, high), to_ground)
+    log_density = _log_density(labels, value)
+    order = sorted(range(len(labels)), key=lambda k: -log_density[k])
+    ordered = tuple(labels[k] for k in order), tuple(log_density[k] for k in order)
+    return Cause(model, parameter, *ordered, value, low, high, 0.0, (channel,), factor)
 
 
-def _change(number: str, value: float, handed: float) -> float:
-    """What a number has become, beside what was handed in: scales as ratios, all else as differences."""
-    if number.endswith("gain"):
-        return (1.0 + value) / (1.0 + handed) - 1.0
-    return value / handed - 1.0 if number == "brake_mps2_pa" else value - handed
+def _change(parameter: str, value: float, nominal: float) -> float:
+    """Change from nominal: of scales as a ratio less 1, of all else as a difference."""
+    if parameter.endswith("gain"):
+        return (1.0 + value) / (1.0 + nominal) - 1.0
+    return value / nominal - 1.0 if parameter == "brake_mps2_pa" else value - nominal
 
 
-def _odds(names: tuple[Label, ...], value: float) -> list[float]:
-    """Density of a number of this size, were it each of these: Gauss, but no name is ever ruled out by size alone."""
-    if len(names) == 1:
-        return [1.0]
-    return [float(np.exp(-0.5 * min((value / n.usual) ** 2, 60.0)) / n.usual) for n in names]
+def _log_density(labels: Sequence[Label], value: float) -> list[float]:
+    """Normal log density of the value under each label, without constants, cut so that size alone excludes none."""
+    return [-0.5 * min((value / label.typical) ** 2, 60.0) - math.log(label.typical) for label in labels]
 
 
-def _names(
-    model: str, number: str, value: float, interval: tuple[float, float], to_ground: bool
-) -> tuple[tuple[Label, ...], tuple[str, ...], float | None]:
-    if number in ("gain", "ay_gain", "yaw_gain"):
-        return _scale(number, value, interval, to_ground)
+def _labels(
+    model: str, parameter: str, value: float, interval: tuple[float, float], to_ground: bool
+) -> tuple[list[Label], str, float | None]:
+    """Labels of a parameter, the channel it shows in, and the database's factor if it is one."""
+    if parameter in ("gain", "ay_gain", "yaw_gain"):
+        return _scale(parameter, value, interval, to_ground)
     if model == "wheels":
-        return (Label("tyre_radius", "gain", number, -1.0, 0.01),), (f"wheel_speed_{number}_rad_s",), None
-    if number == "delay_s":
-        pressure = model == "braking"
-        late = "pressure" if pressure else ("imu" if value > 0.0 else "wheel")
-        channels = ("pressure",) if pressure else ("ax_mps2",) if value > 0.0 else ("wheel_speed",)
-        return (Label("timestamp_offset", "delay_s", late, 1.0 if late == "imu" else -1.0, 0.02),), channels, None
-    tied: dict[str, tuple[Label, ...]] = {
-        "bias_mps2": (
-            Label("imu_bias", "ax_mps2", "imu", 1.0, 0.1),
-            Label("road_grade", "grade", "car", 1.0 / GRAVITY_MPS2, 0.02 * GRAVITY_MPS2),
-            Label("imu_gain", "tilt_rad", "imu", 1.0 / GRAVITY_MPS2, 0.02 * GRAVITY_MPS2),
-        ),
-        "drift_mps3": (Label("imu_bias", "drift_mps3", "imu", 1.0, 0.002),),
-        "filter_s": (Label("imu_filter", "time_s", "imu", 1.0, 0.02),),
-        "cross": (Label("imu_gain", "cross", "imu", 1.0, 0.02),),
-        "ahead_m": (Label("imu_position", "x_m", "imu", 1.0, 0.3),),
-        "beside_m": (Label("imu_position", "y_m", "imu", 1.0, 0.15),),
-        "yaw_bias_rad_s": (Label("imu_bias", "yaw_rate_rad_s", "imu", 1.0, 0.005),),
-        "offset_pa": (Label("pressure_offset", "offset_pa", "pressure", 1.0, 1e5),),
-        "brake_mps2_pa": (
-            Label("pad_mu_gain", "gain", "car", 1.0, 0.15),
-            Label("pressure_gain", "gain", "car", 1.0, 0.15),
-            Label("mass_offset", "mass_kg", "car", -1.0, 0.1),
-        ),
-    }
-    seen = {"yaw_bias_rad_s": "yaw_rate_rad_s", "brake_mps2_pa": "pressure", "offset_pa": "pressure"}.get(
-        number, "ax_mps2"
-    )
-    return tied[number], (seen,), None
+        return [Label("tyre_radius", "gain", parameter, -1.0, 0.01)], f"wheel_speed_{parameter}_rad_s", None
+    if parameter == "delay_s":
+        location = "pressure" if model == "braking" else "imu" if value > 0.0 else "wheel"
+        channel = {"pressure": "pressure", "imu": "ax_mps2", "wheel": "wheel_speed"}[location]
+        sign = 1.0 if location == "imu" else -1.0
+        return [Label("timestamp_offset", "delay_s", location, sign, 0.02)], channel, None
+    channels = {"yaw_bias_rad_s": "yaw_rate_rad_s", "brake_mps2_pa": "pressure", "offset_pa": "pressure"}
+    return list(_LABELS[parameter]), channels.get(parameter, "ax_mps2"), None
+
+
+_LABELS: dict[str, tuple[Label, ...]] = {
+    "bias_mps2": (
+        Label("imu_bias", "ax_mps2", "imu", 1.0, 0.1),
+        Label("road_grade", "grade", "car", 1.0 / GRAVITY_MPS2, 0.02 * GRAVITY_MPS2),
+        Label("imu_gain", "tilt_rad", "imu", 1.0 / GRAVITY_MPS2, 0.02 * GRAVITY_MPS2),
+    ),
+    "drift_mps3": (Label("imu_bias", "drift_mps3", "imu", 1.0, 0.002),),
+    "filter_s": (Label("imu_filter", "time_s", "imu", 1.0, 0.02),),
+    "cross": (Label("imu_gain", "cross", "imu", 1.0, 0.02),),
+    "ahead_m": (Label("imu_position", "x_m", "imu", 1.0, 0.3),),
+    "beside_m": (Label("imu_position", "y_m", "imu", 1.0, 0.15),),
+    "yaw_bias_rad_s": (Label("imu_bias", "yaw_rate_rad_s", "imu", 1.0, 0.005),),
+    "offset_pa": (Label("pressure_offset", "offset_pa", "pressure", 1.0, 1e5),),
+    "brake_mps2_pa": (
+        Label("pad_mu_gain", "gain", "car", 1.0, 0.15),
+        Label("pressure_gain", "gain", "car", 1.0, 0.15),
+        Label("mass_offset", "mass_kg", "car", -1.0, 0.1),
+    ),
+}
+"""Labels by parameter; twins share a column of the Jacobian."""
 
 
 def _scale(
-    number: str, value: float, interval: tuple[float, float], to_ground: bool
-) -> tuple[tuple[Label, ...], tuple[str, ...], float | None]:
-    channel = {"gain": "ax_mps2", "ay_gain": "ay_mps2", "yaw_gain": "yaw_rate_rad_s"}[number]
-    exact = next((m for m in MISTAKES if interval[0] <= m - 1.0 <= interval[1]), None)
-    if exact is not None or abs(value) > _OF_A_SENSOR or number != "gain":
-        return (Label("wrong_scale", "factor", "imu", 1.0, 2.0),), (channel,), exact
-    names = [Label("imu_gain", "gain", "imu", 1.0, _IMU_SCALE)]
-    if not to_ground:  # nobody measured the ground: the wheels' radius would look the same
-        names.append(Label("tyre_radius", "gain", "car", 1.0, 0.015))
-    return tuple(names), (channel,), None
+    parameter: str, value: float, interval: tuple[float, float], to_ground: bool
+) -> tuple[list[Label], str, float | None]:
+    channel = {"gain": "ax_mps2", "ay_gain": "ay_mps2", "yaw_gain": "yaw_rate_rad_s"}[parameter]
+    factor = next((one for one in DATABASE_FACTORS if interval[0] <= one - 1.0 <= interval[1]), None)
+    if factor is not None or abs(value) > _MAX_SENSOR_SCALE or parameter != "gain":
+        return [Label("wrong_scale", "factor", "imu", 1.0, 2.0)], channel, factor
+    labels = [Label("imu_gain", "gain", "imu", 1.0, _IMU_SCALE)]
+    if not to_ground:  # without a ground speed the wheels' radius looks the same
+        labels.append(Label("tyre_radius", "gain", "car", 1.0, 0.015))
+    return labels, channel, None
 
 
 def simulated_effects(causes: Sequence[Cause]) -> tuple[dict[str, dict[str, Any]], list[str]]:

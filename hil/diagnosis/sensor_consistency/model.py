@@ -1,4 +1,4 @@
-"""A model that can be fitted: named numbers of sensors and car, named sizes of noise, and a likelihood."""
+"""The interface of a sensor model: parameters of sensors and car, noise parameters, and a log-likelihood."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -10,13 +10,18 @@ from hil.diagnosis.data.log import Floats
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of the model: usual value, where it may lie, and the step on which it changes something.
+    """One parameter of a model.
 
-    ``log`` numbers are positive and searched in their logarithm; ``prior`` is the standard deviation of that logarithm,
-    or of the number itself about its usual value, 0 where nothing is known.
+    Attributes
+    ----------
+    typical : value where nothing is wrong, mostly 0; of a noise parameter, its typical size.
+    low, high : bounds.
+    step : change that matters; the optimiser works in multiples of it.
+    log : the parameter is positive and searched in its logarithm.
+    prior : standard deviation before data, of that logarithm or of the value about ``typical``; 0 for a flat prior.
     """
 
-    usual: float
+    typical: float
     low: float
     high: float
     step: float
@@ -25,9 +30,12 @@ class Parameter:
 
 
 class SensorModel(ABC):
-    """What can be fitted: ``numbers`` are as usual, mostly 0, where nothing is wrong.
+    """A model that can be fitted to the cells of a `Motion`.
 
-    ``resolution`` is what the cells leave of some.
+    Attributes
+    ----------
+    noise, parameters : name -> what is known before data.
+    resolution : parameter -> half the width of its cells, where the likelihood has an edge at every cell.
     """
 
     noise: Mapping[str, Parameter]
@@ -35,5 +43,5 @@ class SensorModel(ABC):
     resolution: Mapping[str, float] = MappingProxyType({})
 
     @abstractmethod
-    def score(self, sensor: Mapping[str, float], noise: Mapping[str, float]) -> tuple[Floats, Floats]:
-        """Innovations (cells, channels) and log-likelihood of every cell."""
+    def log_likelihood(self, parameters: Mapping[str, float], noise: Mapping[str, float]) -> Floats:
+        """(cells,) log-likelihood of every cell; parameters that are not given are 0."""

@@ -1,4 +1,4 @@
-"""The car's motion as its channels have it: cell means of all logs on one clock, cut into manoeuvres."""
+"""The car's motion from its own channels: cell means of all logs on one clock, cut into segments (manoeuvres)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,10 +8,11 @@ import numpy as np
 from hil.diagnosis.data.log import PRESSURE, PRESSURE_DEMAND, WHEEL_SPEED, Floats, Log, UnusableError
 
 CELL_S = 0.04
-SLOW_MPS = 3.0  # below, wheel-speed sensors hold and drop
-MANOEUVRE_S = (6.0, 12.0)
-_GAP_S = 0.25
-_SMOOTH_S = 0.4
+SLOW_MPS = 3.0
+"""Speed below which wheel-speed sensors hold their value and drop to zero."""
+SEGMENT_S = (6.0, 12.0)
+"""A segment ends where the acceleration passes zero after the first time, and at the second at the latest."""
+_SLOPE_WINDOW_S = 0.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,91 +21,101 @@ class Motion:
 
     Attributes
     ----------
-    t_s : (cells,) time in the log.  fresh : 1 where a log begins.  log : number of the log.
+    t_s : (cells,) time in the log.
+    log_start : (cells,) 1 in the first cell of a log.
+    log_id : (cells,) number of the log.
     channels : name -> (cells,) mean over the cell, NaN where nothing was measured; wheel speeds in m/s at the rolling
-        radius, under ``wheel_fl`` and so on; pressure and pressure_demand are means over the wheels.
-    speed_mps : the median wheel's speed (the ground speed where there are no wheels).
-    accel_mps2 : its slope over 0.4 s, centred, for starts and pictures; no fit's truth.
-    moving : 1 where the car is fast enough to compare.
-    block : number of the manoeuvre.  radius_m : rolling radius used.
+        radius, under ``wheel_fl`` and so on; ``pressure`` and ``pressure_demand`` are means over the wheels.
+    speed_mps : (cells,) the median wheel's speed; the ground speed where there are no wheels.
+    accel_mps2 : (cells,) its slope over 0.4 s, centred, for start values and charts; no fit relies on it.
+    moving : (cells,) 1 where the car is fast enough to compare.
+    segment_id : (cells,) number of the segment.
     """
 
     logs: tuple[Log, ...]
     cell_s: float
     t_s: Floats
-    fresh: Floats
-    log: Floats
+    log_start: Floats
+    log_id: Floats
     channels: dict[str, Floats]
     speed_mps: Floats
     accel_mps2: Floats
     moving: Floats
-    block: Floats
-    radius_m: float
+    segment_id: Floats
 
     def has(self, *names: str) -> bool:
-        """Whether all these channels are there."""
+        """Whether all these channels were measured."""
         return all(name in self.channels for name in names)
 
-    def known(self, name: str) -> Floats:
-        """1 where a channel is measured while the car moves."""
-        return np.isfinite(self.channels[name]) * self.moving
-
-    def later(self, name: str, cells: int) -> Floats:
-        """A channel as it will be ``cells`` cells later; NaN beyond the ends of the log."""
+    def advanced(self, name: str, cells: int) -> Floats:
+        """A channel moved ``cells`` cells to the front; NaN beyond the ends of a log."""
         values = self.channels[name]
         at = np.arange(len(values)) + cells
         inside = np.clip(at, 0, len(values) - 1)
-        return np.where((at == inside) & (self.log[inside] == self.log), values[inside], np.nan)
+        return np.where((at == inside) & (self.log_id[inside] == self.log_id), values[inside], np.nan)
+
+    def delayed(self, values: Floats, delay_s: float) -> Floats:
+        """(cells,) values ``delay_s`` later, interpolated in each log, constant beyond its ends."""
+        delayed = np.empty_like(values)
+        for k in range(len(self.logs)):
+            rows = self.log_id == k
+            delayed[rows] = np.interp(self.t_s[rows] - delay_s, self.t_s[rows], values[rows])
+        return delayed
 
     @property
-    def blocks(self) -> int:
-        """How many manoeuvres there are."""
-        return int(self.block.max()) + 1
+    def segments(self) -> int:
+        """Number of segments."""
+        return int(self.segment_id.max()) + 1
+
+
+def measured_channels(logs: Sequence[Log]) -> set[str]:
+    """Channels that every log has."""
+    return set.intersection(*(set(log.channels) for log in logs))
 
 
 def motion_of(logs: Sequence[Log], radius_m: float) -> Motion:
-    """Cell means of all logs.
+    """Cell means of all logs; ``radius_m`` is the rolling radius.
 
     Raises
     ------
     UnusableError
-        Nothing says how the car moved, or it hardly moves.
+        No channel shows the speed, or the car moves for less than 4 s.
     """
-    there = set.intersection(*(set(log.channels) for log in logs))
-    if not (set(WHEEL_SPEED) <= there or "speed_mps" in there):
+    measured = measured_channels(logs)
+    if not (set(WHEEL_SPEED) <= measured or "speed_mps" in measured):
         raise UnusableError("neither all wheel speeds nor a speed in every log; nothing says how the car moved")
     step = max(float(np.median(np.diff(log.t_s))) for log in logs)
-    cell = CELL_S if step <= 1.05 * CELL_S else step
-    parts = [_cells(log, there, cell, radius_m) for log in logs]
+    cell_s = CELL_S if step <= 1.05 * CELL_S else step
+    parts = [_cell_means(log, measured, cell_s, radius_m) for log in logs]
     t_s = np.concatenate([t for t, _ in parts])
     channels = {name: np.concatenate([c[name] for _, c in parts]) for name in parts[0][1]}
-    number = np.concatenate([np.full(len(t), k) for k, (t, _) in enumerate(parts)])
-    fresh = np.concatenate([np.eye(1, len(t))[0] for t, _ in parts])
+    log_id = np.concatenate([np.full(len(t), k) for k, (t, _) in enumerate(parts)])
+    log_start = np.concatenate([np.eye(1, len(t))[0] for t, _ in parts])
     wheels = [channels[f"wheel_{w}"] for w in ("fl", "fr", "rl", "rr") if f"wheel_{w}" in channels]
-    speed = _filled(np.median(wheels, axis=0) if wheels else channels["speed_mps"])
-    accel = slope_of(speed, number, cell)
-    near = round(0.5 / cell)
-    slow = np.convolve(speed < SLOW_MPS, np.ones(2 * near + 1), mode="same") > 0.5
-    if (~slow).sum() * cell < 4.0:
-        raise UnusableError(
-            f"the car moves for {(~slow).sum() * cell:.1f} s in all; expected 4 s or more above {SLOW_MPS:g} m/s"
-        )
-    block = _blocks(number, accel, cell)
-    return Motion(tuple(logs), cell, t_s, fresh, number, channels, speed, accel, 1.0 * ~slow, block, radius_m)
+    speed = _without_gaps(np.median(wheels, axis=0) if wheels else channels["speed_mps"])
+    accel = slope_of(speed, log_id, cell_s)
+    margin = round(0.5 / cell_s)
+    slow = np.convolve(speed < SLOW_MPS, np.ones(2 * margin + 1), mode="same") > 0.5
+    moving_s = (~slow).sum() * cell_s
+    if moving_s < 4.0:
+        raise UnusableError(f"the car moves for {moving_s:.1f} s in all; expected 4 s or more above {SLOW_MPS:g} m/s")
+    segment_id = _segment_id(log_id, accel, cell_s)
+    return Motion(tuple(logs), cell_s, t_s, log_start, log_id, channels, speed, accel, 1.0 * ~slow, segment_id)
 
 
-def _cells(log: Log, there: set[str], cell: float, radius_m: float) -> tuple[Floats, dict[str, Floats]]:
-    begin = float(log.t_s[0])
-    count = int((float(log.t_s[-1]) - begin) / cell + 0.5)
-    at = np.clip(((log.t_s - begin) / cell + 1e-6).astype(np.int64), 0, count - 1)
-    found = {name: _mean(log.channels[name], at, count) for name in sorted(there)}
+def _cell_means(log: Log, names: set[str], cell_s: float, radius_m: float) -> tuple[Floats, dict[str, Floats]]:
+    """Times and channels of one log."""
+    origin_s = float(log.t_s[0])
+    count = int((float(log.t_s[-1]) - origin_s) / cell_s + 0.5)
+    at = np.clip(((log.t_s - origin_s) / cell_s + 1e-6).astype(np.int64), 0, count - 1)
+    means = {name: _mean(log.channels[name], at, count) for name in sorted(names)}
     for name in WHEEL_SPEED:
-        if name in found:
-            found[f"wheel_{name.split('_')[2]}"] = found.pop(name) * radius_m
-    for stem, names in (("pressure", PRESSURE), ("pressure_demand", PRESSURE_DEMAND)):
-        if set(names) <= there:
-            found[stem] = np.mean([found.pop(name) for name in names], axis=0)
-    return (np.arange(count) + 0.5) * cell, found
+        if name in means:
+            means[f"wheel_{name.split('_')[2]}"] = means.pop(name) * radius_m
+    for mean, members in (("pressure", PRESSURE), ("pressure_demand", PRESSURE_DEMAND)):
+        if set(members) <= names:
+            means[mean] = np.mean([means.pop(name) for name in members], axis=0)
+    return (np.arange(count) + 0.5) * cell_s, means
 
 
 def _mean(values: Floats, at: Floats, count: int) -> Floats:
@@ -114,32 +125,32 @@ def _mean(values: Floats, at: Floats, count: int) -> Floats:
     return np.where(weight > 0, total / np.maximum(weight, 1), np.nan)
 
 
-def _filled(values: Floats) -> Floats:
+def _without_gaps(values: Floats) -> Floats:
     good = np.isfinite(values)
     return np.interp(np.arange(len(values)), np.flatnonzero(good), values[good])
 
 
-def slope_of(speed: Floats, log: Floats, cell: float) -> Floats:
-    """Slope of every log's speed."""
-    return np.concatenate([_slope(speed[log == k], cell) for k in range(int(log.max()) + 1)])
+def slope_of(speed: Floats, log_id: Floats, cell_s: float) -> Floats:
+    """(cells,) slope of the speed in each log, m/s2: least squares over a centred window of 0.4 s."""
+    return np.concatenate([_slope(speed[log_id == k], cell_s) for k in range(int(log_id.max()) + 1)])
 
 
-def _slope(speed: Floats, cell: float) -> Floats:
-    """Least-squares slope over a centred window; the same weights for every place where it is whole."""
-    half = max(round(0.5 * _SMOOTH_S / cell), 1)
+def _slope(speed: Floats, cell_s: float) -> Floats:
+    half = max(round(0.5 * _SLOPE_WINDOW_S / cell_s), 1)
     x = np.arange(-half, half + 1)
     padded = np.concatenate((np.repeat(speed[:1], half), speed, np.repeat(speed[-1:], half)))
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
-    return np.asarray(windows @ x / (float(x @ x) * cell))
+    return np.asarray(windows @ x / (float(x @ x) * cell_s))
 
 
-def _blocks(number: Floats, accel: Floats, cell: float) -> Floats:
-    """Manoeuvres: cut where the acceleration passes zero after 6 s, at 12 s at the latest."""
-    block, since, begun = np.zeros(len(number), np.int64), 0.0, 0
-    for k in range(1, len(number)):
-        since += cell
-        quiet = accel[k - 1] * accel[k] <= 0.0
-        if number[k] != number[k - 1] or (since > MANOEUVRE_S[0] and quiet) or since > MANOEUVRE_S[1]:
-            begun, since = begun + 1, 0.0
-        block[k] = begun
-    return block
+def _segment_id(log_id: Floats, accel: Floats, cell_s: float) -> Floats:
+    """Cut at `SEGMENT_S` and at every start of a log."""
+    segment_id, since_s, current = np.zeros(len(log_id), np.int64), 0.0, 0
+    for k in range(1, len(log_id)):
+        since_s += cell_s
+        passes_zero = accel[k - 1] * accel[k] <= 0.0
+        new_log = log_id[k] != log_id[k - 1]
+        if new_log or (since_s > SEGMENT_S[0] and passes_zero) or since_s > SEGMENT_S[1]:
+            current, since_s = current + 1, 0.0
+        segment_id[k] = current
+    return segment_id

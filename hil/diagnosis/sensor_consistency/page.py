@@ -1,22 +1,22 @@
-"""The report of a comparison of sensors: measured against foretold, before and after, and what cannot be told."""
+"""The report of a comparison of sensors: measured against predicted, the stops, parameters, relations, limits."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.sensor_consistency.braking import BrakingModel
+from hil.diagnosis.result.page_parts import EXTENDED, NOMINAL, binned_curve, comparison_panels, limits, rounded
+from hil.diagnosis.sensor_consistency.braking import APPLIED_PA, BrakingModel
 from hil.diagnosis.sensor_consistency.check import Consistency
 from hil.diagnosis.sensor_consistency.held_out import HeldOutError
-from hil.diagnosis.sensor_consistency.motion import Motion
 from hil.diagnosis.sensor_consistency.selection import THRESHOLD
 from hil.report.report import Cell, Chart, Curve, Number, Panel, Report, Section, Table, Trace, Verdict
 from hil.report.units import BAR, Display, Unit
 
 _SENTENCE = {
     "none": "The sensors agree with the car's own motion within noise.",
-    "named": "What is wrong between the sensors and the car's own motion has a name.",
-    "cannot_tell_apart": "Something is wrong, and more than one name explains it.",
+    "named": "An effect explains how the sensors differ from the car's own motion.",
+    "cannot_tell_apart": "Several effects explain equally well how the sensors differ from the car's own motion.",
 }
 _TITLE = {
     "ax_mps2": "Longitudinal acceleration", "ay_mps2": "Lateral acceleration", "yaw_rate_rad_s": "Yaw rate",
@@ -24,263 +24,207 @@ _TITLE = {
 }  # fmt: skip
 _UNIT: dict[str, Unit] = {"m/s": Display("km/h", 3.6), "rad/s": Display("deg/s", 180.0 / np.pi), "m/s2": "m/s²"}
 _WINDOW_S = 25.0
+_STOPS_SHOWN = 6
 
 
 def build_report(answer: Consistency, sources: Sequence[str]) -> Report:
-    """Build the report."""
+    """Build the report; ``sources`` are the names of the logs."""
     content = answer.json
-    sections = [_overview(answer), *_windows(answer), _numbers_section(answer), _relations(answer), _limits(answer)]
     return Report(
         title="Measured sensors against the car's own motion",
         verdict={"none": Verdict.PASSED, "named": None}.get(content["verdict"], Verdict.INCOMPLETE),
         reason=_headline(answer) or _SENTENCE[content["verdict"]],
-        numbers=tuple(_cards(answer)),
-        sections=tuple(sections),
+        numbers=tuple(_numbers(answer)),
+        sections=(_overview(answer), *_details(answer), _parameters(answer), _relations(answer), _limits(answer)),
         provenance={
-            "logs": list(sources), "manoeuvres": answer.motion.blocks,
+            "logs": list(sources), "segments": answer.motion.segments,
             "seconds": round(len(answer.motion.t_s) * answer.motion.cell_s, 1),
-            "extension": content["extension"] or "not written",
-            "remarks": content["remarks"],
+            "extension": content["extension"] or "not written", "remarks": content["remarks"],
         },
     )  # fmt: skip
 
 
-def _cards(answer: Consistency) -> list[Number]:
-    cards = [Number("Verdict", answer.json["verdict"].replace("_", " "))]
+def _numbers(answer: Consistency) -> list[Number]:
+    numbers = [Number("Verdict", answer.json["verdict"].replace("_", " "))]
     for cause in answer.json["causes"]:
         for name, entry in cause["parameters"].items():
-            low, high = entry["ci95"]
             label = f"{', '.join(cause['channels'])}: {cause['effect'].replace('_', ' ')}"
-            note = f"{name.replace('_', ' ')}; 95 %: {low:.3g} to {high:.3g}"
-            cards.append(Number(label, _short(entry["value"]), entry["unit"], note=note))
-    for miss in answer.misses:
-        if miss.before > 0.0 and miss.held_out < 0.8 * miss.before:
-            note = "on manoeuvres that no fit saw"
-            cards.append(
-                Number(
-                    f"{_title(miss)}: error removed",
-                    round(100.0 * (1.0 - miss.held_out / miss.before), 1),
-                    "%",
-                    note=note,
-                )
-            )
-    return cards
+            note = f"{name.replace('_', ' ')}; 95 %: {_interval(entry)}"
+            numbers.append(Number(label, rounded(entry["value"]), entry["unit"], note=note))
+    for error in answer.errors:
+        if error.before > 0.0 and error.held_out < 0.8 * error.before:
+            removed = round(100.0 * (1.0 - error.held_out / error.before), 1)
+            label, note = f"{_title(error)}: held-out error removed", "on manoeuvres that no fit saw"
+            numbers.append(Number(label, removed, "%", note=note))
+    return numbers
 
 
 def _headline(answer: Consistency) -> str:
-    """The channels and what is wrong with them; the numbers follow as cards."""
+    """Channels with the effects that explain their error."""
     by_channel: dict[str, list[str]] = {}
     for cause in answer.causes:
-        words = " or ".join(effect.replace("_", " ") for effect in cause.as_likely)
+        effects = " or ".join(effect.replace("_", " ") for effect in cause.indistinguishable)
         if cause.labels[0].effect == "wrong_scale":
-            words = "wrong sign" if cause.exact == -1.0 else "wrong scale or sign"
-        by_channel.setdefault(", ".join(cause.channels), []).append(words)
-    said = "; ".join(f"{channel}: {', '.join(words)}" for channel, words in by_channel.items())
-    return f"{said}." if said else ""
+            effects = "wrong sign" if cause.database_factor == -1.0 else "wrong scale or sign"
+        by_channel.setdefault(", ".join(cause.channels), []).append(effects)
+    headline = "; ".join(f"{channel}: {', '.join(effects)}" for channel, effects in by_channel.items())
+    return f"{headline}." if headline else ""
 
 
-def _short(value: float) -> float:
-    return float(f"{value:.3g}")
+def _title(error: HeldOutError) -> str:
+    return _TITLE.get(error.channel, error.channel.replace("_", " "))
 
 
-def _title(miss: HeldOutError) -> str:
-    return _TITLE.get(miss.channel, miss.channel.replace("_", " "))
+def _interval(entry: dict[str, list[float]]) -> str:
+    low, high = entry["ci95"]
+    return f"{low:.3g} to {high:.3g}"
 
 
-def _time(motion: Motion) -> Floats:
-    """All logs in a row."""
-    return np.arange(len(motion.t_s)) * motion.cell_s
+def _error_of(answer: Consistency, channel: str) -> HeldOutError | None:
+    return next((error for error in answer.errors if error.channel == channel), None)
 
 
-def _panels(miss: HeldOutError, t: Floats, rows: Floats) -> list[Panel]:
-    unit = _UNIT[miss.unit]
-    shown = [("measured", miss.measured, "line", ""), ("as handed in", miss.nominal, "line", "rl")]
-    shown.append(("extended", miss.fitted, "line", "fl"))
-    # mypy takes the style for any string
-    traces = tuple(Trace(n, t[rows], y[rows], style, group) for n, y, style, group in shown)  # type: ignore[arg-type]
-    return [Panel(_title(miss), unit, traces)]
+def _braking(answer: Consistency) -> BrakingModel | None:
+    result = answer.models.get("braking")
+    return result.model if result is not None and isinstance(result.model, BrakingModel) else None
 
 
-def _left(miss: HeldOutError, t: Floats, rows: Floats) -> Panel:
-    traces = [
-        Trace(name, t[rows], (miss.measured - y)[rows], group=group)
-        for name, y, group in (("as handed in", miss.nominal, "rl"), ("extended", miss.fitted, "fl"))
-    ]
-    return Panel(f"{_title(miss)}: what is missed", _UNIT[miss.unit], tuple(traces))
+def _time(answer: Consistency) -> Floats:
+    """(cells,) all logs, one after the other."""
+    return np.arange(len(answer.motion.t_s)) * answer.motion.cell_s
+
+
+def _panels(error: HeldOutError, t_s: Floats, rows: slice) -> list[Panel]:
+    models = {"nominal": error.nominal[rows], "extended": error.fitted[rows]}
+    return comparison_panels(_title(error), _UNIT[error.unit], t_s[rows], error.measured[rows], models)
 
 
 def _overview(answer: Consistency) -> Section:
-    motion, t = answer.motion, _time(answer.motion)
-    rows = np.ones(len(t), bool)
-    speed = Trace("wheels", t, motion.speed_mps, group="fl")
-    panels = [Panel("Speed", _UNIT["m/s"], (speed,))]
-    for miss in answer.misses:
-        if miss.channel != "speed_in_stops":
-            panels += [*_panels(miss, t, rows), _left(miss, t, rows)]
+    t_s, rows = _time(answer), slice(None)
+    panels = [Panel("Speed", _UNIT["m/s"], (Trace("wheels", t_s, answer.motion.speed_mps, group=EXTENDED),))]
+    for error in answer.errors:
+        if error.channel != "speed_in_stops":
+            panels += _panels(error, t_s, rows)
     return Section(
-        "Before and after", panels=tuple(panels),
-        text="What each sensor should have shown, foretold from the wheels' motion alone (flat road), with the numbers "
-        "as handed in and with what was learnt. What is left after that goes with the road's slope and the noise.",
+        "Measured against predicted", panels=tuple(panels),
+        text="Each sensor predicted from the wheels' motion alone on a flat road, with nominal and with fitted "
+        "parameters. The residual of the extended model is the road's slope and noise.",
     )  # fmt: skip
 
 
-def _windows(answer: Consistency) -> list[Section]:
-    """A close look where the acceleration changes most, and every stop."""
-    motion, t = answer.motion, _time(answer.motion)
+def _details(answer: Consistency) -> list[Section]:
+    """The window in which the acceleration changes most, and the stops with the highest pressure."""
+    motion, t_s = answer.motion, _time(answer)
     sections = []
-    miss = next((m for m in answer.misses if m.channel == "ax_mps2"), None)
-    if miss is not None and t[-1] > 1.5 * _WINDOW_S:
+    error = _error_of(answer, "ax_mps2")
+    if error is not None and t_s[-1] > 1.5 * _WINDOW_S:
         size = int(_WINDOW_S / motion.cell_s)
         power = np.convolve(np.gradient(motion.accel_mps2) ** 2 * motion.moving, np.ones(size), "valid")
         first = int(np.argmax(power))
-        rows = (np.arange(len(t)) >= first) & (np.arange(len(t)) < first + size)
-        sections.append(Section("A close look", panels=(*_panels(miss, t, rows), _left(miss, t, rows))))
-    braking = answer.models.get("braking")
-    stops = next((m for m in answer.misses if m.channel == "speed_in_stops"), None)
-    if braking is not None and stops is not None and isinstance(braking.model, BrakingModel):
-        charts, model = [], braking.model
-        for first, last in sorted(model.stops, key=lambda s: -float(model.pressure[slice(*s)].max()))[:6]:
-            rows = np.zeros(len(t), bool)
-            rows[first:last] = True
-            curves = [
-                Curve("measured", t[rows], stops.measured[rows]),
-                Curve("as handed in", t[rows], stops.nominal[rows], group="rl"),
-                Curve("extended", t[rows], stops.fitted[rows], group="fl"),
-            ]
-            bar = float(model.pressure[first:last].max()) * 1e-5
-            charts.append(
-                Chart(f"Stop at {t[first]:.0f} s, {bar:.1f} bar", "time", "s", "speed", _UNIT["m/s"], tuple(curves))
+        panels = _panels(error, t_s, slice(first, first + size))
+        sections.append(Section("Detail: the largest changes of acceleration", panels=tuple(panels)))
+    model, error = _braking(answer), _error_of(answer, "speed_in_stops")
+    if model is not None and error is not None:
+        charts = []
+        for stop in sorted(model.stops, key=lambda s: -float(model.pressure[slice(*s)].max()))[:_STOPS_SHOWN]:
+            rows = slice(*stop)
+            curves = (
+                Curve("measured", t_s[rows], error.measured[rows]),
+                Curve("nominal", t_s[rows], error.nominal[rows], group=NOMINAL),
+                Curve("extended", t_s[rows], error.fitted[rows], group=EXTENDED),
             )
-        text = "Each stop runs freely from its measured start: no speed is fed back."
-        sections.append(Section("Stops: simulated before and after, and measured", charts=tuple(charts), text=text))
+            title = f"Stop at {t_s[stop[0]]:.0f} s, {float(model.pressure[rows].max()) * 1e-5:.1f} bar"
+            charts.append(Chart(title, "time", "s", "speed", _UNIT["m/s"], curves))
+        text = "Each stop is simulated open loop from its measured initial speed."
+        sections.append(Section("Stops: measured, nominal and extended", charts=tuple(charts), text=text))
     return sections
 
 
-def _numbers_section(answer: Consistency) -> Section:
-    rows: list[tuple[Cell, ...]] = []
-    for at, cause in enumerate(answer.json["causes"] + answer.json["rivals"]):
-        for name, entry in cause["parameters"].items():
-            low, high = entry["ci95"]
-            kind = "cause" if at < len(answer.json["causes"]) else "rival"
-            rows.append((
-                kind, cause["effect"], ", ".join(cause["channels"]), name, _short(entry["value"]),
-                f"{low:.3g} to {high:.3g}", entry["unit"], round(100.0 * cause["probability"], 1),
-            ))  # fmt: skip
-    head = ("", "effect", "channel", "number", "value", "95 %", "unit", "probability %")
-    tables = [Table("What is wrong, by name", head, tuple(rows))]
-    gains: tuple[tuple[Cell, ...], ...] = tuple(
+def _parameters(answer: Consistency) -> Section:
+    content = answer.json
+    listed = [("cause", one) for one in content["causes"]] + [("rival", one) for one in content["rivals"]]
+    parameters: list[tuple[Cell, ...]] = [
         (
-            w["channel"], w["unit"], _short(w["rms"]), _short(g["after"]), f"{g['ci95'][0]:.3g} to {g['ci95'][1]:.3g}",
-            None if g["best_wrong"] is None else _short(g["best_wrong"]), w["pattern"],
+            kind, one["effect"], ", ".join(one["channels"]), name, rounded(entry["value"]), _interval(entry),
+            entry["unit"], round(100.0 * one["probability"], 1),
         )
-        for w, g in zip(answer.json["residual_patterns"], answer.json["held_out_error"].values(), strict=True)
-    )  # fmt: skip
-    heads = ("channel", "unit", "handed in", "extended, held out", "95 %", "best wrong effect", "the error handed in")
-    tables.append(Table("Error (root mean square) on manoeuvres that no fit saw", heads, gains))
-    if answer.json["estimates"]:
-        estimates: tuple[tuple[Cell, ...], ...] = tuple(
+        for kind, one in listed
+        for name, entry in one["parameters"].items()
+    ]  # fmt: skip
+    head: tuple[str, ...] = ("", "effect", "channel", "parameter", "value", "95 %", "unit", "probability %")
+    tables = [Table("Causes and rivals", head, tuple(parameters))]
+    errors: list[tuple[Cell, ...]] = [
+        (
+            residual["channel"], residual["unit"], rounded(residual["rms"]), rounded(error["after"]), _interval(error),
+            None if error["best_wrong"] is None else rounded(error["best_wrong"]), residual["pattern"],
+        )
+        for residual, error in zip(content["residual_patterns"], content["held_out_error"].values(), strict=True)
+    ]  # fmt: skip
+    head = ("channel", "unit", "nominal", "extended, held out", "95 %", "best wrong effect", "nominal residual")
+    tables.append(Table("Error on manoeuvres that no fit saw (root mean square)", head, tuple(errors)))
+    if content["estimates"]:
+        estimates: list[tuple[Cell, ...]] = [
             (
-                name.replace("hint_", "and further: ").replace("_", " "), _short(e["value"]),
-                f"{e['ci95'][0]:.3g} to {e['ci95'][1]:.3g}", e["unit"],
-                None if e["handed_in"] is None else _short(e["handed_in"]),
+                name.replace("hint_", "if added: ").replace("_", " "), rounded(entry["value"]), _interval(entry),
+                entry["unit"], None if entry["nominal"] is None else rounded(entry["nominal"]),
             )
-            for name, e in answer.json["estimates"].items()
-        )  # fmt: skip
-        names = ("number", "value", "95 %", "unit", "handed in")
-        tables.append(Table("What the stops support", names, estimates, note="Student's t over the stops."))
-    return Section("Numbers", tables=(*tables, *_race(answer)))
+            for name, entry in content["estimates"].items()
+        ]  # fmt: skip
+        head = ("parameter", "value", "95 %", "unit", "nominal")
+        note = "Student's t over the stops."
+        tables.append(Table("Parameters that the stops support", head, tuple(estimates), note=note))
+    return Section("Parameters", tables=(*tables, *_candidates(answer)))
 
 
-def _race(answer: Consistency) -> list[Table]:
-    """What each number would have gained in the place of the first one taken up."""
-    found = answer.models.get("along")
-    if found is None or not found.steps:
+def _candidates(answer: Consistency) -> list[Table]:
+    """Gain of each parameter of the accelerometer in place of the first accepted one."""
+    result = answer.models.get("along")
+    if result is None or not result.steps:
         return []
-    step = found.steps[0]
-    gains = {step.parameter: step.gain} | {n: found.base.cost - f.cost for n, f in step.others.items()}
+    step = result.steps[0]
+    gains = {step.parameter: step.gain} | {n: result.base.cost - f.cost for n, f in step.others.items()}
     rows = tuple((n.replace("_", " "), round(g, 1)) for n, g in sorted(gains.items(), key=lambda item: -item[1]))
-    note = f"Twice the log-likelihood, each number alone in the first place; {THRESHOLD:g} is asked of a cause."
-    return [Table("Who else was in the race (accelerometer)", ("number", "gain"), rows, note)]
+    note = f"Reduction of -2 log likelihood by each parameter alone; the detection threshold is {THRESHOLD:g}."
+    return [Table("Candidates for the first cause (accelerometer)", ("parameter", "gain"), rows, note)]
 
 
 def _relations(answer: Consistency) -> Section:
-    """The acceleration measured over the wheels' own, and over pressure."""
-    motion = answer.motion
+    """Accelerometer over the wheels' acceleration, and that over the pressure."""
+    motion, moving = answer.motion, answer.motion.moving > 0.5
     charts = []
-    miss = next((m for m in answer.misses if m.channel == "ax_mps2"), None)
-    good = motion.moving > 0.5
-    if miss is not None:
+    error = _error_of(answer, "ax_mps2")
+    if error is not None:
+        x = motion.accel_mps2[moving]
+        ends = np.array([x.min(), x.max()])
         curves = [
-            c for c in (
-                _binned(motion.accel_mps2[good], miss.measured[good], "measured", "fl"),
-                _binned(motion.accel_mps2[good], miss.fitted[good], "extended", "rl"),
-            ) if c is not None
-        ]  # fmt: skip
-        ends = np.array([motion.accel_mps2[good].min(), motion.accel_mps2[good].max()])
-        curves.append(Curve("if nothing were wrong", ends, ends, style="demand"))
-        charts.append(
-            Chart(
-                "Accelerometer over the wheels' acceleration",
-                "wheels' acceleration",
-                "m/s²",
-                "accelerometer",
-                "m/s²",
-                tuple(curves),
-            )
-        )
-    braking = answer.models.get("braking")
-    if braking is not None and isinstance(braking.model, BrakingModel):
-        model = braking.model
-        later = {
-            **braking.parameters,
-            "brake_mps2_pa": -1.0,
-            "drag_mps2": 0.0,
-            "drag_1_m": 0.0,
-            "drive_mps2": 0.0,
-            "engine_mps2": 0.0,
-        }
-        felt = model.force(later)
-        on = good & (felt > 2e4)
+            *_binned(x, error.measured[moving], "measured", EXTENDED),
+            *_binned(x, error.fitted[moving], "extended", NOMINAL),
+            Curve("nominal", ends, ends, style="demand"),
+        ]
+        title = "Accelerometer over the wheels' acceleration"
+        charts.append(Chart(title, "wheels' acceleration", "m/s²", "accelerometer", "m/s²", tuple(curves)))
+    model = _braking(answer)
+    if model is not None:
+        pressure = model.effective_pressure(answer.models["braking"].parameters)
+        on = moving & (pressure > APPLIED_PA)
         curves = [
-            c for c in (
-                _binned(model.pressure[on], motion.accel_mps2[on], "pressure as stamped", "rl"),
-                _binned(felt[on], motion.accel_mps2[on], "pressure at the learnt time", "fl"),
-            ) if c is not None
-        ]  # fmt: skip
-        charts.append(
-            Chart("Deceleration over pressure", "pressure", BAR, "wheels' acceleration", "m/s²", tuple(curves))
-        )
-    return Section(
-        "One channel over another",
-        charts=tuple(charts),
-        text="Means of equal numbers of samples, and one standard deviation.",
-    )
+            *_binned(model.pressure[on], motion.accel_mps2[on], "pressure as logged", NOMINAL),
+            *_binned(pressure[on], motion.accel_mps2[on], "pressure with fitted delay and lag", EXTENDED),
+        ]
+        title = "Deceleration over pressure"
+        charts.append(Chart(title, "pressure", BAR, "wheels' acceleration", "m/s²", tuple(curves)))
+    text = "Means of equal numbers of samples, and one standard deviation."
+    return Section("One channel over another", charts=tuple(charts), text=text)
 
 
-def _binned(x: Floats, y: Floats, name: str, group: str) -> Curve | None:
-    good = np.isfinite(x) & np.isfinite(y)
-    x, y = x[good], y[good]
-    if len(x) < 100 or np.ptp(x) <= 0.0:
-        return None
-    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, 17)))
-    at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
-    rows = [
-        (x[at == k].mean(), y[at == k].mean(), y[at == k].std()) for k in range(len(edges) - 1) if (at == k).sum() > 5
-    ]
-    centre, mean, spread = (np.array(v) for v in zip(*rows, strict=True))
-    return Curve(name, centre, mean, mean - spread, mean + spread, group=group)
+def _binned(x: Floats, y: Floats, name: str, group: str) -> list[Curve]:
+    return binned_curve(x, y, name, group, bins=16, min_samples=5)
 
 
 def _limits(answer: Consistency) -> Section:
     content = answer.json
-    grouped: dict[str, list[str]] = {}
+    by_channels: dict[str, list[str]] = {}
     for effect, text in content["needs"].items():
-        grouped.setdefault(text.split("; drive ")[0], []).append(effect)
-    rows = [(f"not testable: {text}", ", ".join(names)) for text, names in grouped.items()]
-    rows += [("missing channel", text) for text in content["missing"]]
-    rows += [("remark", text) for text in content["remarks"]]
-    if content["discriminating_manoeuvres"]:
-        rows.append(
-            ("drive this to decide", ", ".join(one["scenario"] for one in content["discriminating_manoeuvres"]))
-        )
-    return Section("What these data cannot show", tables=(Table("Limits", ("what", "which"), tuple(rows)),))
+        by_channels.setdefault(text.split("; drive ")[0], []).append(effect)
+    undetectable = [(f"undetectable: {text}", ", ".join(effects)) for text, effects in by_channels.items()]
+    return limits(undetectable, content, (one["scenario"] for one in content["discriminating_manoeuvres"]))

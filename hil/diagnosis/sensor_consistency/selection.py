@@ -1,25 +1,25 @@
-"""One number at a time: which of a model's numbers the data ask for, and which others would have done as well."""
+"""Forward selection with backward elimination: the parameters that the data need, and which would fit as well."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 from scipy.stats import t as student
 
-from hil.diagnosis.compiled import WORKERS
 from hil.diagnosis.data.log import Floats
+from hil.diagnosis.parallel import thread_map
 from hil.diagnosis.sensor_consistency.likelihood import Fit, Values, fit, standard_deviations, typical_noise
 from hil.diagnosis.sensor_consistency.model import SensorModel
 
 THRESHOLD = 20.0
-"""Gain in -2 log likelihood asked of a number: noise gives it once in 100,000 looks, were the model true."""
-_WORTH_A_FIT = 0.5
-"""Share of that from which a number that was tried for a few rounds is fitted to the end: it may gain more then."""
+"""Detection threshold, of the gain in -2 log likelihood: noise passes it once in 100,000 tests of a true model."""
+_CONVERGE_SHARE = 0.5
+"""Share of the threshold from which a fit of a few iterations is converged: it may gain more then."""
 ALPHA = 0.003
+"""Probability at which a parameter of nominal value is called significant, two-sided."""
 RARE = 0.01
-"""How much less likely than another name, or number, one is that is not told beside it."""
-_STARTS: Mapping[str, Sequence[float]] = {
+"""Relative likelihood below which a rival is not reported."""
+_START_OFFSETS: Mapping[str, Sequence[float]] = {
     "gain": (0.0, -0.5, 0.5, -2.0), "filter_s": (0.02, 0.1, 0.5, 2.0),
     "yaw_gain": (0.0, -2.0), "ay_gain": (0.0, -2.0),
 }  # fmt: skip
@@ -28,9 +28,13 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class SelectionStep:
-    """A number that was taken up, its gain, and what the others would have gained in its place (one fit each).
+    """One accepted parameter.
 
-    ``instead`` are those that fit nearly as well: what was found with each, and how far behind in -2 log likelihood.
+    Attributes
+    ----------
+    gain : reduction of -2 log likelihood.
+    others : parameter -> its fit in the place of this one.
+    substitutes : those of them that fit nearly as well -> the result with it, and the difference in -2 log likelihood.
     """
 
     parameter: str
@@ -41,154 +45,177 @@ class SelectionStep:
 
 @dataclass(eq=False)
 class SelectionResult:
-    """What a model learnt.
+    """The fitted model.
 
-    ``base`` has the numbers as handed in, ``final`` those taken up; ``deviation`` their standard deviations,
-    ``tolerance`` what each may be off without being wrong, ``degrees`` the degrees of freedom of the intervals.
+    Attributes
+    ----------
+    nominal : values that were given; all other parameters are nominally 0.
+    base, final : fits before any parameter is accepted, and of the accepted ones.
+    segment_id : (cells,) number of the segment.
+    deviation : standard deviation of the fitted parameters.
+    tolerance : standard deviation by which a parameter may be off without being wrong.
+    informative_segments : how many segments bear on the parameters; 0 for all.
     """
 
     model: SensorModel
-    given: Values
+    nominal: Values
     base: Fit
     final: Fit
-    block: Floats
+    segment_id: Floats
     deviation: Values
     tolerance: Mapping[str, float]
     steps: list[SelectionStep] = field(default_factory=list)
-    evidence: int = 0
+    informative_segments: int = 0
 
     @property
-    def degrees(self) -> int:
-        """Manoeuvres less one; fewer where only some of them (``evidence``) say anything."""
-        return max((self.evidence or int(self.block.max()) + 1) - 1, 1)
+    def degrees_of_freedom(self) -> int:
+        """Informative segments less one."""
+        return max((self.informative_segments or int(self.segment_id.max()) + 1) - 1, 1)
 
     @property
     def parameters(self) -> Values:
-        """All numbers, as handed in and as learnt."""
-        return {**self.given, **self.final.sensor}
+        """All values, nominal or fitted."""
+        return {**self.nominal, **self.final.parameters}
 
-    def interval(self, number: str) -> tuple[float, float]:
-        """95 % of a number, Student's t over the manoeuvres."""
-        half = float(student.ppf(0.975, self.degrees)) * self.deviation[number]
-        value, of = self.final.sensor[number], self.model.parameters[number]
-        return max(value - half, of.low), min(value + half, of.high)
+    def quantile(self, probability: float) -> float:
+        """Quantile of Student's t over the informative segments."""
+        return float(student.ppf(probability, self.degrees_of_freedom))
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """95 % interval of a parameter within its bounds."""
+        half = self.quantile(0.975) * self.deviation[name]
+        value, bounds = self.final.parameters[name], self.model.parameters[name]
+        return max(value - half, bounds.low), min(value + half, bounds.high)
+
+    def is_significant(self, name: str, fitted: Fit, deviation: Mapping[str, float]) -> bool:
+        """Whether a parameter differs from nominal by more than chance and tolerance; a segment is one observation."""
+        difference = abs(fitted.parameters[name] - self.nominal.get(name, 0.0))
+        spread = (deviation[name] ** 2 + self.tolerance.get(name, 0.0) ** 2) ** 0.5
+        return bool(difference > self.quantile(1.0 - 0.5 * ALPHA) * spread)
+
+    def refit(self, parameters: Mapping[str, float], noise: Mapping[str, float], iterations: int = 40) -> Fit:
+        """Fit these parameters, the others nominal."""
+        return fit(self.model, parameters, noise, fixed=self.nominal, iterations=iterations)
+
+    def deviations_of(self, fitted: Fit) -> Values:
+        """Standard deviations of a fit's parameters."""
+        return standard_deviations(self.model, fitted, self.segment_id, self.nominal)
 
 
 def select_parameters(
-    model: SensorModel, block: Floats, handed: Mapping[str, float], tolerance: Mapping[str, float], say: Progress,
-    candidates: Sequence[str] | None = None, always: Sequence[str] = (), most: int = 6,
+    model: SensorModel, segment_id: Floats, nominal: Mapping[str, float], tolerance: Mapping[str, float],
+    progress: Progress, candidates: Sequence[str] | None = None, nuisances: Sequence[str] = (), max_steps: int = 6,
 ) -> SelectionResult:  # fmt: skip
-    """Take up numbers one at a time, the one with the largest gain first; take out again what is not missed.
+    """Accept parameters one at a time, the one with the largest gain first; then eliminate those not needed.
 
     Parameters
     ----------
-    handed : numbers as handed in; the others are 0.  tolerance : see `SelectionResult`.
-    always : numbers that nobody knows and that are no cause.
+    nominal, tolerance : see `SelectionResult`.
+    candidates : parameters that may be accepted; all of the model if None.
+    nuisances : parameters that are always fitted and are no cause.
     """
-    start = fit(model, {n: model.parameters[n].usual for n in always}, typical_noise(model), fixed=handed)
-    found = SelectionResult(model, dict(handed), start, start, block, {}, tolerance)
-    names = [n for n in (candidates or model.parameters) if n not in always]
-    while len(found.steps) < most:
-        left = [n for n in names if n not in found.final.sensor]
-        with ThreadPoolExecutor(WORKERS) as pool:
-            tried = dict(zip(left, pool.map(lambda n: _with(found, n), left), strict=True))
-        taken = _take(found, tried)
-        if taken is None:
+    base = fit(model, {n: model.parameters[n].typical for n in nuisances}, typical_noise(model), fixed=nominal)
+    result = SelectionResult(model, dict(nominal), base, base, segment_id, {}, tolerance)
+    names = [n for n in (candidates or model.parameters) if n not in nuisances]
+    while len(result.steps) < max_steps:
+        remaining = [n for n in names if n not in result.final.parameters]
+        tried = thread_map(lambda n: _multi_start(result, n), remaining)
+        accepted = _accept(result, dict(zip(remaining, tried, strict=True)))
+        if accepted is None:
             break
-        step, found.final, found.deviation = taken
-        found.steps.append(step)
-        say(f"{step.parameter} = {found.final.sensor[step.parameter]:.4g}, gains {step.gain:.0f}")
-    _prune(found)
-    return found
+        step, result.final, result.deviation = accepted
+        result.steps.append(step)
+        progress(f"{step.parameter} = {result.final.parameters[step.parameter]:.4g}, gains {step.gain:.0f}")
+    _eliminate_backward(result)
+    return result
 
 
-def _with(found: SelectionResult, number: str) -> Fit:
-    """The model with one more number free, from several starts: a few rounds, then more for those near the best."""
-    noises = [found.final.noise]
-    if not found.steps:  # what was taken for noise is none with the cause in place
-        noises.append(typical_noise(found.model))
-    firsts = []
-    for start in _starts(found, number):
-        sensor = {**found.final.sensor, number: start}
-        firsts.append(min((_some_rounds(found, number, sensor, n, 3) for n in noises), key=lambda f: f.cost))
-    firsts.sort(key=lambda f: f.cost)
-    near = [f for k, f in enumerate(firsts) if k < 2 or f.cost < firsts[0].cost + THRESHOLD]
-    return min((_some_rounds(found, number, f.sensor, f.noise, 12) for f in near), key=lambda f: f.cost)
+def _multi_start(result: SelectionResult, name: str) -> Fit:
+    """Best fit with one more parameter: a few iterations from every start value, more for those near the best."""
+    noises = [result.final.noise]
+    if not result.steps:  # noise fitted without the cause contains the cause
+        noises.append(typical_noise(result.model))
+    short = []
+    for start in _start_values(result, name):
+        parameters = {**result.final.parameters, name: start}
+        short.append(min((_iterate(result, name, parameters, noise, 3) for noise in noises), key=lambda f: f.cost))
+    short.sort(key=lambda f: f.cost)
+    near = [f for k, f in enumerate(short) if k < 2 or f.cost < short[0].cost + THRESHOLD]
+    return min((_iterate(result, name, f.parameters, f.noise, 12) for f in near), key=lambda f: f.cost)
 
 
-def _starts(found: SelectionResult, number: str) -> list[float]:
-    """Where a number begins: in the middle of every cell, of what cells resolve."""
-    of, cell = found.model.parameters[number], 2.0 * found.model.resolution.get(number, 0.0)
+def _start_values(result: SelectionResult, name: str) -> list[float]:
+    """Start values of a parameter; the middle of every cell if cells resolve it."""
+    bounds, cell = result.model.parameters[name], 2.0 * result.model.resolution.get(name, 0.0)
     if cell:
-        return [float(cell * (k + 0.5)) for k in range(math.ceil(of.low / cell), math.floor(of.high / cell))]
-    return [found.given.get(number, 0.0) + start for start in _STARTS.get(number, (0.0,))]
+        cells = range(math.ceil(bounds.low / cell), math.floor(bounds.high / cell))
+        return [float(cell * (k + 0.5)) for k in cells]
+    return [result.nominal.get(name, 0.0) + offset for offset in _START_OFFSETS.get(name, (0.0,))]
 
 
-def _some_rounds(found: SelectionResult, number: str, sensor: Values, noise: Values, rounds: int) -> Fit:
-    """A fit that is not ended. What cells resolve stays where it is: far from an end, no search passes their edges."""
-    if number not in found.model.resolution:
-        return fit(found.model, sensor, noise, fixed=found.given, rounds=rounds)
-    others = {n: v for n, v in sensor.items() if n != number}
-    held = fit(found.model, others, noise, fixed={**found.given, number: sensor[number]}, rounds=rounds)
-    return replace(held, sensor=held.sensor | {number: sensor[number]})
+def _iterate(result: SelectionResult, name: str, parameters: Values, noise: Values, iterations: int) -> Fit:
+    """A few iterations; a parameter that cells resolve stays: no gradient passes their edges far from the optimum."""
+    if name not in result.model.resolution:
+        return result.refit(parameters, noise, iterations)
+    others = {n: v for n, v in parameters.items() if n != name}
+    fixed = {**result.nominal, name: parameters[name]}
+    fitted = fit(result.model, others, noise, fixed=fixed, iterations=iterations)
+    return replace(fitted, parameters=fitted.parameters | {name: parameters[name]})
 
 
-def _ended(found: SelectionResult, number: str, begun: Fit) -> Fit:
-    """A fit to its end. What cells resolve is fitted from the next cells as well, and on while that is better."""
-    best = fit(found.model, begun.sensor, begun.noise, fixed=found.given)
-    of, cell = found.model.parameters[number], 2.0 * found.model.resolution.get(number, 0.0)
-    for beside in (-cell, cell) if cell else ():
-        at = cell * (math.floor(best.sensor[number] / cell) + 0.5) + beside
-        while of.low < at < of.high:
-            middle = _some_rounds(found, number, {**best.sensor, number: at}, best.noise, 12)
-            there = fit(found.model, middle.sensor, middle.noise, fixed=found.given)
-            if there.cost >= best.cost:
+def _converge(result: SelectionResult, name: str, start: Fit) -> Fit:
+    """Converged fit; for a parameter that cells resolve, also from the neighbouring cells while that is better."""
+    best = result.refit(start.parameters, start.noise)
+    bounds, cell = result.model.parameters[name], 2.0 * result.model.resolution.get(name, 0.0)
+    for direction in (-cell, cell) if cell else ():
+        at = cell * (math.floor(best.parameters[name] / cell) + 0.5) + direction
+        while bounds.low < at < bounds.high:
+            short = _iterate(result, name, {**best.parameters, name: at}, best.noise, 12)
+            neighbour = result.refit(short.parameters, short.noise)
+            if neighbour.cost >= best.cost:
                 break
-            best, at = there, at + beside
+            best, at = neighbour, at + direction
     return best
 
 
-def _take(found: SelectionResult, tried: Mapping[str, Fit]) -> tuple[SelectionStep, Fit, Values] | None:
-    worth = [n for n in tried if found.final.cost - tried[n].cost >= _WORTH_A_FIT * THRESHOLD]
-    most = min((tried[n].cost for n in worth), default=0.0)
-    near = [n for n in worth if tried[n].cost < most + THRESHOLD]  # a few rounds more may change which is first
-    with ThreadPoolExecutor(WORKERS) as pool:
-        fitted = dict(zip(near, pool.map(lambda n: _ended(found, n, tried[n]), near), strict=True))
-    for number in sorted(worth, key=lambda n: fitted[n].cost if n in fitted else tried[n].cost):
-        better = fitted.get(number) or _ended(found, number, tried[number])
-        if found.final.cost - better.cost < THRESHOLD:
+def _accept(result: SelectionResult, tried: Mapping[str, Fit]) -> tuple[SelectionStep, Fit, Values] | None:
+    """The significant parameter with the largest gain, its fit and standard deviations; None if none is above."""
+    cost = result.final.cost
+    promising = [n for n in tried if cost - tried[n].cost >= _CONVERGE_SHARE * THRESHOLD]
+    lowest = min((tried[n].cost for n in promising), default=0.0)
+    near = [n for n in promising if tried[n].cost < lowest + THRESHOLD]  # their order may change on convergence
+    converged = dict(zip(near, thread_map(lambda n: _converge(result, n, tried[n]), near), strict=True))
+    for name in sorted(promising, key=lambda n: converged.get(n, tried[n]).cost):
+        fitted = converged.get(name) or _converge(result, name, tried[name])
+        if cost - fitted.cost < THRESHOLD:
             continue
-        deviation = standard_deviations(found.model, better, found.block, found.given)
-        if _beyond(found, better, deviation, number):
-            others = {n: f for n, f in {**tried, **fitted}.items() if n != number}
-            instead = _instead(found, others, better.cost)
-            return SelectionStep(number, found.final.cost - better.cost, others, instead), better, deviation
+        deviation = result.deviations_of(fitted)
+        if result.is_significant(name, fitted, deviation):
+            others = {n: f for n, f in {**tried, **converged}.items() if n != name}
+            substitutes = _substitutes(result, others, fitted.cost)
+            return SelectionStep(name, cost - fitted.cost, others, substitutes), fitted, deviation
     return None
 
 
-def _instead(
-    found: SelectionResult, others: Mapping[str, Fit], cost: float
+def _substitutes(
+    result: SelectionResult, others: Mapping[str, Fit], cost: float
 ) -> dict[str, tuple[SelectionResult, float]]:
-    near = {}
-    for number, fitted in others.items():
-        if fitted.cost < min(cost - 2.0 * math.log(RARE), found.final.cost - THRESHOLD):
-            deviation = standard_deviations(found.model, fitted, found.block, found.given)
-            if _beyond(found, fitted, deviation, number):
-                near[number] = replace(found, final=fitted, deviation=deviation), fitted.cost - cost
-    return near
+    """Significant parameters that fit nearly as well as the accepted one, whose -2 log likelihood is ``cost``."""
+    limit = min(cost - 2.0 * math.log(RARE), result.final.cost - THRESHOLD)
+    substitutes = {}
+    for name, fitted in others.items():
+        if fitted.cost < limit:
+            deviation = result.deviations_of(fitted)
+            if result.is_significant(name, fitted, deviation):
+                substitutes[name] = replace(result, final=fitted, deviation=deviation), fitted.cost - cost
+    return substitutes
 
 
-def _beyond(found: SelectionResult, fitted: Fit, deviation: Mapping[str, float], number: str) -> bool:
-    """Whether a number is off by more than chance and tolerance: every manoeuvre is one piece of evidence."""
-    off = abs(fitted.sensor[number] - found.given.get(number, 0.0))
-    spread = (deviation[number] ** 2 + found.tolerance.get(number, 0.0) ** 2) ** 0.5
-    return bool(off > float(student.ppf(1.0 - 0.5 * ALPHA, found.degrees)) * spread)
-
-
-def _prune(found: SelectionResult) -> None:
-    for step in list(found.steps):
-        if len(found.steps) > 1 and not _beyond(found, found.final, found.deviation, step.parameter):
-            rest = {n: v for n, v in found.final.sensor.items() if n != step.parameter}
-            found.final = fit(found.model, rest, found.final.noise, fixed=found.given)
-            found.deviation = standard_deviations(found.model, found.final, found.block, found.given)
-            found.steps.remove(step)
+def _eliminate_backward(result: SelectionResult) -> None:
+    """Remove accepted parameters that are not significant given the others; one always stays."""
+    for step in list(result.steps):
+        if len(result.steps) > 1 and not result.is_significant(step.parameter, result.final, result.deviation):
+            rest = {n: v for n, v in result.final.parameters.items() if n != step.parameter}
+            result.final = result.refit(rest, result.final.noise)
+            result.deviation = result.deviations_of(result.final)
+            result.steps.remove(step)

@@ -1,4 +1,4 @@
-"""Sensors against the motion, on motion made here: nothing in nothing, what was put in by its name and size."""
+"""Sensors compared with synthetic motion: nothing is named where nothing is wrong, and errors by name and size."""
 
 import numpy as np
 import pytest
@@ -9,16 +9,17 @@ from hil.diagnosis.explain import explain
 from hil.diagnosis.sensor_consistency.check import Consistency, _rivals, why_not_simulatable
 from hil.diagnosis.sensor_consistency.labels import Cause, Label
 from hil.diagnosis.sensor_consistency.likelihood import fit
-from hil.diagnosis.sensor_consistency.longitudinal import SLIP, LongitudinalModel, known_slip
+from hil.diagnosis.sensor_consistency.longitudinal import SLIP, LongitudinalModel, slip_prior
 from hil.diagnosis.sensor_consistency.model import Parameter, SensorModel
 from hil.diagnosis.sensor_consistency.motion import motion_of
 from hil.diagnosis.sensor_consistency.page import _headline
-from hil.diagnosis.sensor_consistency.selection import select_parameters
+from hil.diagnosis.sensor_consistency.selection import SelectionResult, select_parameters
 
 
-def _found(log: Log):
+def _select(log: Log, slip: Parameter | None = None) -> SelectionResult:
     motion = motion_of([log], RADIUS_M)
-    return select_parameters(LongitudinalModel(motion), motion.block, {}, {}, lambda _: None)
+    model = LongitudinalModel(motion, slip)
+    return select_parameters(model, motion.segment_id, {}, {}, lambda _: None, nuisances=[SLIP] if slip else [])
 
 
 class _Cells(SensorModel):
@@ -29,67 +30,70 @@ class _Cells(SensorModel):
         self.parameters = {"delay_s": Parameter(0.0, -0.5, 0.5, 0.02), "gain": Parameter(0.0, -1.0, 1.0, 0.05)}
         self.resolution = {"delay_s": 0.02}
 
-    def score(self, sensor, noise):
-        late = sensor["delay_s"]
-        return np.zeros((1, 1)), np.array([(late if late < 0.12 else -10.0) - 100.0 * (sensor["gain"] - 0.5) ** 2])
+    def log_likelihood(self, parameters, noise):
+        delay = parameters["delay_s"]
+        return np.array([(delay if delay < 0.12 else -10.0) - 100.0 * (parameters["gain"] - 0.5) ** 2])
 
 
-def test_a_delay_at_the_edge_of_a_cell_holds_no_other_number_back():
-    found = fit(_Cells(), {"delay_s": 0.11998, "gain": 0.0}, {})
-    assert found.sensor["gain"] == pytest.approx(0.5, abs=1e-3)
-    assert found.sensor["delay_s"] == pytest.approx(0.12, abs=1e-4)
+def test_a_delay_at_the_edge_of_a_cell_holds_no_other_parameter_back():
+    fitted = fit(_Cells(), {"delay_s": 0.11998, "gain": 0.0}, {})
+    assert fitted.parameters["gain"] == pytest.approx(0.5, abs=1e-3)
+    assert fitted.parameters["delay_s"] == pytest.approx(0.12, abs=1e-4)
 
 
 class _Stairs(SensorModel):
-    """A delay whose likelihood has an edge at every cell: 0.16 to 0.20 is likeliest, by noise that takes long to find
-    (Rosenbrock, The Computer Journal 3 (1960)), and 0.08 to 0.16 are found in no time."""
+    """A delay whose likelihood has an edge at every cell.
+
+    0.16 to 0.20 is likeliest, with noise that takes long to fit (Rosenbrock, The Computer Journal 3 (1960)); for 0.08
+    to 0.16 it is fitted at once.
+    """
 
     def __init__(self):
         self.noise = {"a": Parameter(1.8, 0.1, 9.0, 1.0, False, 1e6), "b": Parameter(4.0, 0.1, 9.0, 1.0, False, 1e6)}
         self.parameters = {"delay_s": Parameter(0.0, -0.5, 0.5, 0.02)}
         self.resolution = {"delay_s": 0.02}
 
-    def score(self, sensor, noise):
-        cell, within = divmod(sensor.get("delay_s", 0.0) / 0.04, 1.0)
+    def log_likelihood(self, parameters, noise):
+        cell, within = divmod(parameters.get("delay_s", 0.0) / 0.04, 1.0)
         a, b = noise["a"] - 3.0, noise["b"] - 3.0
-        found = 40.0 - 25.0 * ((1.0 - a) ** 2 + 100.0 * (b - a**2) ** 2) if cell == 4.0 else -200.0
+        value = 40.0 - 25.0 * ((1.0 - a) ** 2 + 100.0 * (b - a**2) ** 2) if cell == 4.0 else -200.0
         if cell in (2.0, 3.0):
-            found = 6.0 * cell - (1.0 - a) ** 2 - (1.0 - b) ** 2
-        return np.zeros((8, 1)), np.full(8, (found - 10.0 * (within - 0.5) ** 2) / 8.0)
+            value = 6.0 * cell - (1.0 - a) ** 2 - (1.0 - b) ** 2
+        return np.full(8, (value - 10.0 * (within - 0.5) ** 2) / 8.0)
 
 
-def test_what_cells_resolve_is_fitted_from_the_next_cells_too():
-    """A delay of 0.2 s was told as 0.14 s, and lost to a filter."""
-    found = select_parameters(_Stairs(), np.arange(8), {}, {}, lambda _: None)
-    assert found.final.sensor["delay_s"] == pytest.approx(0.18, abs=0.005)
+def test_what_cells_resolve_is_fitted_from_the_neighbouring_cells_too():
+    """Otherwise a delay of 0.2 s is estimated as 0.14 s, and loses to a filter."""
+    result = select_parameters(_Stairs(), np.arange(8), {}, {}, lambda _: None)
+    assert result.final.parameters["delay_s"] == pytest.approx(0.18, abs=0.005)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_nothing_is_found_in_nothing(seed):
-    assert _found(motion_log(seed)).steps == []
+def test_nothing_is_accepted_where_nothing_is_wrong(seed):
+    assert _select(motion_log(seed)).steps == []
 
 
 @pytest.mark.slow
-def test_a_sign_is_found_with_its_interval():
-    found = _found(motion_log(4, gain=-2.0))
-    assert [step.number for step in found.steps] == ["gain"]
-    low, high = found.interval("gain")
+def test_a_sign_is_accepted_with_its_interval():
+    result = _select(motion_log(4, gain=-2.0))
+    assert [step.parameter for step in result.steps] == ["gain"]
+    low, high = result.interval("gain")
     assert low < -2.0 < high
     assert high - low < 0.5
 
 
 @pytest.mark.slow
-def test_a_delay_is_found_with_its_interval():
-    found = _found(motion_log(5, late=15))
-    assert [step.number for step in found.steps] == ["delay_s"]
-    low, high = found.interval("delay_s")
+def test_a_delay_is_accepted_with_its_interval():
+    result = _select(motion_log(5, late=15))
+    assert [step.parameter for step in result.steps] == ["delay_s"]
+    low, high = result.interval("delay_s")
     assert low < 0.15 < high
 
 
-def test_the_way_is_chosen_by_the_channels():
+def test_the_channels_decide_whether_the_car_is_simulated():
     log = motion_log(6)
-    assert "forces cannot be replayed" in why_not_simulatable([log], RADIUS_M)
+    assert "cannot be simulated" in why_not_simulatable([log], RADIUS_M)
     torque = {f"motor_torque_{w}_nm": np.zeros(6000) for w in ("fl", "fr", "rl", "rr")}
     assert why_not_simulatable([make_log("made", log.t_s, {**log.channels, **torque})], RADIUS_M) == ""
 
@@ -101,8 +105,8 @@ def test_a_car_that_stands_is_unusable():
 
 
 @pytest.mark.slow
-def test_a_delay_is_tied_with_a_filter_in_slow_manoeuvres():
-    """A sine that takes 10 s is as late behind a low-pass. It was told as a filter for certain."""
+def test_a_delay_and_a_filter_are_indistinguishable_in_slow_manoeuvres():
+    """A sine of 10 s is as late behind a low-pass."""
     rng, n = np.random.default_rng(9), 12000
     t = np.arange(n) * STEP_S
     accel = 2.0 * np.sin(2.0 * np.pi * t / 10.0) + np.sin(2.0 * np.pi * t / 17.0 + 1.0)
@@ -110,12 +114,12 @@ def test_a_delay_is_tied_with_a_filter_in_slow_manoeuvres():
     speed = 25.0 + np.cumsum(accel) * STEP_S
     wheels = {name: (speed + 0.01 * rng.standard_normal(n)) / RADIUS_M for name in WHEEL_SPEED}
     late = np.concatenate((felt[:1].repeat(10), felt[:-10])) + 0.05 * rng.standard_normal(n)
-    found = explain({"t_s": t, **wheels, "ax_mps2": late}).json
-    assert found["verdict"] == "cannot_tell_apart"
-    told = {c["effect"]: c for c in found["causes"] + found["rivals"]}
-    assert set(told) == {"timestamp_offset", "imu_filter"}
-    assert sum(c["probability"] for c in told.values()) == pytest.approx(1.0)
-    low, high = told["timestamp_offset"]["parameters"]["delay_s"]["ci95"]
+    answer = explain({"t_s": t, **wheels, "ax_mps2": late}).json
+    assert answer["verdict"] == "cannot_tell_apart"
+    named = {c["effect"]: c for c in answer["causes"] + answer["rivals"]}
+    assert set(named) == {"timestamp_offset", "imu_filter"}
+    assert sum(c["probability"] for c in named.values()) == pytest.approx(1.0)
+    low, high = named["timestamp_offset"]["parameters"]["delay_s"]["ci95"]
     assert low < 0.1 < high
 
 
@@ -127,40 +131,28 @@ def test_slip_of_the_tyres_is_no_filter_of_the_accelerometer():
     smooth = np.convolve(accel, np.ones(15) / 15, mode="same")
     slip = 0.01
     channels = {n: v * (1.0 + slip * smooth) if n in WHEEL_SPEED else v for n, v in made.channels.items()}
-    motion = motion_of([make_log("made", made.t_s, channels)], RADIUS_M)
-    blind = select_parameters(LongitudinalModel(motion), motion.block, {}, {}, lambda _: None)
-    assert {step.parameter for step in blind.steps} & {"filter_s", "delay_s"}
-    model = LongitudinalModel(motion, known_slip(10.0, 0.2))
-    found = select_parameters(model, motion.block, {}, {}, lambda _: None, always=[SLIP])
-    assert found.steps == []
-    assert found.parameters[SLIP] == pytest.approx(slip, rel=0.3)
+    log = make_log("made", made.t_s, channels)
+    assert {step.parameter for step in _select(log).steps} & {"filter_s", "delay_s"}
+    result = _select(log, slip_prior(10.0, 0.2))
+    assert result.steps == []
+    assert result.parameters[SLIP] == pytest.approx(slip, rel=0.3)
+
+
+def _cause(parameter: str, label: Label, channel: str, substitutes: tuple[Cause, ...] = ()) -> Cause:
+    return Cause(
+        "along", parameter, (label,), (0.0,), 0.1, 0.08, 0.12, 50.0, (channel,), substitutes=substitutes,
+        delta_criterion=1.0,
+    )  # fmt: skip
 
 
 def _late_or_filtered() -> tuple[Cause, Cause]:
     """An accelerometer that is filtered or, as likely, late; and pressures that are late."""
-
-    def cause(number, name, channel, instead=()):
-        return Cause(
-            "along",
-            number,
-            (name,),
-            (1.0,),
-            0.1,
-            0.08,
-            0.12,
-            50.0,
-            (channel,),
-            substitutes=instead,
-            delta_criterion=1.0,
-        )
-
-    late = cause("delay_s", Label("timestamp_offset", "delay_s", "imu", 1.0, 0.02), "ax_mps2")
-    filtered = cause("filter_s", Label("imu_filter", "time_s", "imu", 1.0, 0.02), "ax_mps2", (late,))
-    return filtered, cause("delay_s", Label("timestamp_offset", "delay_s", "pressure", -1.0, 0.02), "pressure")
+    late = _cause("delay_s", Label("timestamp_offset", "delay_s", "imu", 1.0, 0.02), "ax_mps2")
+    filtered = _cause("filter_s", Label("imu_filter", "time_s", "imu", 1.0, 0.02), "ax_mps2", (late,))
+    return filtered, _cause("delay_s", Label("timestamp_offset", "delay_s", "pressure", -1.0, 0.02), "pressure")
 
 
-def test_a_rival_stays_where_its_effect_is_told_of_another_channel():
-    """It was dropped, though the verdict counted the two as tied."""
+def test_a_rival_is_reported_though_its_effect_is_a_cause_in_another_channel():
     causes = _late_or_filtered()
     assert causes[0].is_ambiguous
     assert not causes[1].is_ambiguous
@@ -169,7 +161,6 @@ def test_a_rival_stays_where_its_effect_is_told_of_another_channel():
     assert _rivals(causes[:1], [*(c.as_json() for c in causes), causes[0].substitutes[0].as_json()]) == []
 
 
-def test_the_headline_names_all_that_are_tied():
-    """It named the first alone."""
-    told = _headline(Consistency({}, None, {}, _late_or_filtered(), ()))
-    assert told == "ax_mps2: imu filter or timestamp offset; pressure: timestamp offset."
+def test_the_headline_names_all_indistinguishable_effects():
+    headline = _headline(Consistency({}, None, {}, _late_or_filtered(), ()))
+    assert headline == "ax_mps2: imu filter or timestamp offset; pressure: timestamp offset."
