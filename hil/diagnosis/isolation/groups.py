@@ -10,10 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
+from hil.diagnosis.detection.threshold import ISOLABILITY_SIGMA
 from hil.diagnosis.estimation.terms import Candidate
 
-ISOLABILITY_SIGMA = 2.0
-"""Standard deviations that must be left of a signature for it to be told from its imitation."""
 MOST_RIVALS = 4
 _LEAST_SHARE = 0.02
 

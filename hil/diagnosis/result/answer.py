@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from hil.diagnosis.detection.candidates import candidate_key
 from hil.diagnosis.detection.nonparametric import BasisFunction, estimate_curve
-from hil.diagnosis.detection.onset import nearest, segment_starts
+from hil.diagnosis.detection.onset import nearest
 from hil.diagnosis.detection.profile_fit import FittedHypothesis, delta_chi2, delta_criterion, rival_hypotheses
-from hil.diagnosis.detection.result import INDISTINGUISHABLE, Diagnosis
+from hil.diagnosis.detection.result import Diagnosis
+from hil.diagnosis.detection.score_test import candidate_key, segment_starts
 from hil.diagnosis.detection.shape import ShapedCandidate
+from hil.diagnosis.detection.threshold import CERTAIN, INDISTINGUISHABLE, UNDETECTABLE_SHARE
 from hil.diagnosis.estimation.gauss_newton import Term
 from hil.diagnosis.estimation.information import marginalise
 from hil.diagnosis.estimation.model_discrepancy import UNLISTED, variance_inflation_nonparametric
@@ -22,10 +23,6 @@ from hil.diagnosis.result.cross_validation import HeldOutError, probabilities
 from hil.diagnosis.result.residual_patterns import WORDS, ResidualPattern
 
 _MOST_TIED = 5
-_SILENT = 0.5
-"""Share of the effects that the manoeuvres would not show, beyond which finding nothing says nothing."""
-_CERTAIN = 4.6
-"""Twice the log of the odds (ten to one) below which a cause of another name is not told apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +73,9 @@ def _verdict(found: Diagnosis, causes: list[dict[str, Any]], tied: IsolabilityGr
     if not causes:
         effects = {item.candidate.effect.name for item in found.scores}
         return (
-            "not_testable" if len(effects.intersection(found.undetectable_effects)) > _SILENT * len(effects) else "none"
+            "not_testable"
+            if len(effects.intersection(found.undetectable_effects)) > UNDETECTABLE_SHARE * len(effects)
+            else "none"
         )
     if any(isinstance(term.candidate, BasisFunction) for term in found.final.terms):
         return "unlisted"
@@ -87,7 +86,7 @@ def _verdict(found: Diagnosis, causes: list[dict[str, Any]], tied: IsolabilityGr
         best, *others = rival_hypotheses(listed, named)
         for other in others:
             another = other.term.candidate.effect.name != best.term.candidate.effect.name
-            if another and delta_criterion(other, best) < _CERTAIN:
+            if another and delta_criterion(other, best) < CERTAIN:
                 return "cannot_tell_apart"
     return "named"
 

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from hil.diagnosis.detection.threshold import ISOLABILITY_SIGMA
 from hil.diagnosis.isolation.experiment import (
     FOLDER,
     MAX_RECOMMENDATIONS,
@@ -12,7 +13,6 @@ from hil.diagnosis.isolation.experiment import (
     separation,
     write,
 )
-from hil.diagnosis.isolation.groups import ISOLABILITY_SIGMA
 from hil.errors import BrakebenchError
 from hil.result import measure
 from hil.scenario import load_scenario, scenario_names

@@ -2,9 +2,10 @@
 
 import pytest
 
+from hil.diagnosis.detection.threshold import DEVIATION_BY_FORM
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation
 from hil.diagnosis.estimation.terms import candidates, columns
-from hil.diagnosis.isolation.intervals import DEVIATION_BY_FORM, half_width
+from hil.diagnosis.isolation.intervals import half_width
 
 ALL = candidates(columns())
 
