@@ -230,9 +230,9 @@ def try_single_cause(
     """Single causes fitted from the nuisance parameters of a model of several, best first; empty where all of the model
     together, the ``accepted``, have the better criterion.
 
-    A cause selected given biased nuisance parameters may be made of others: a drag of one wheel, which they had absorbed,
-    was named as a steering offset and a radius of that wheel. Given those the nuisance parameters are right again, and
-    what they hid shows.
+    A cause selected given biased nuisance parameters may be made of others: a drag of one wheel, which they had
+    absorbed, was named as a steering offset and a radius of that wheel. Given those the nuisance parameters are right
+    again, and what they hid shows.
     """
     bare = fitter.at(model.z, (), noise)
     onsets: list[OnsetTime | None] = list(dict.fromkeys(term.onset for term in model.terms))
