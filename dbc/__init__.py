@@ -1,1 +1,1 @@
-"""The contract on the wire: frames, brake.dbc, bench.dbc, codec, end-to-end protection."""
+"""Takes messages in SI units and gives frames, and the way back: the contract on the wire, `brake.dbc`, `bench.dbc`."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dbc.lean_cantools import cantools
-from dbc.sieve import Sieved, sieve
+from dbc.supported_subset import SupportedText, supported_subset
 
 MAX_TEXT_BYTES = 16 * 1024 * 1024
 
@@ -102,14 +102,14 @@ def parse_database(content: bytes | str, source: str = "database") -> Database:
     text = content if isinstance(content, str) else _decoded(content, warnings)
     if "\0" in text:
         raise DatabaseError(f"{source}: zero bytes in it, so it is no DBC text; give a Vector DBC file")
-    sieved = sieve(text)
-    warnings += sieved.warnings
-    if not sieved.blocks:
+    supported = supported_subset(text)
+    warnings += supported.warnings
+    if not supported.blocks:
         shown = (text.lstrip()[:40].splitlines() or ["nothing"])[0]
         raise DatabaseError(f"{source}: no message in it; expected a Vector DBC with BO_ lines, got {shown!r}")
     messages: dict[tuple[int, bool], Message] = {}
     names: set[str] = set()
-    for foreign in _load(sieved, warnings):
+    for foreign in _load(supported, warnings):
         message = _message(foreign, names, warnings)
         key = message.can_id, message.extended
         if key in messages:
@@ -120,7 +120,7 @@ def parse_database(content: bytes | str, source: str = "database") -> Database:
         names.add(message.name)
         _overlaps(message, warnings)
     if not messages:
-        raise DatabaseError(f"{source}: none of its {len(sieved.blocks)} messages can be read: {warnings[-1]}")
+        raise DatabaseError(f"{source}: none of its {len(supported.blocks)} messages can be read: {warnings[-1]}")
     return Database(source, messages, tuple(warnings))
 
 
@@ -148,17 +148,17 @@ def _quiet() -> Iterator[None]:
         logger.setLevel(level)
 
 
-def _load(sieved: Sieved, warnings: list[str]) -> list[Any]:
+def _load(supported: SupportedText, warnings: list[str]) -> list[Any]:
     """Messages as cantools reads them: the whole text, else message by message."""
     with _quiet():
         try:
-            return list(_cantools(sieved.text))
+            return list(_cantools(supported.text))
         except Exception as error:  # cantools raises whatever its parser trips over
             warnings.append(f"the text as a whole cannot be read ({_short(error)}); read message by message")
         messages: list[Any] = []
-        for block in sieved.blocks:
+        for block in supported.blocks:
             try:
-                messages += _cantools(sieved.alone(block))
+                messages += _cantools(supported.alone(block))
             except Exception as error:
                 warnings.append(f"message {block.name}: {_short(error)}; left out")
         return messages

@@ -1,9 +1,10 @@
-# ruff: noqa: E402 (what stands below must be imported after the tester was made to wait)
 """cantools without its tester, which nobody here uses.
 
 ``import cantools`` imports its tester, and with it python-can and, where they are installed, asammdf and pandas: half a
 second of processor time at the start of each of our processes. So the tester waits until somebody asks for it.
 """
+
+# ruff: noqa: E402 (what stands below must be imported after the tester was made to wait)
 
 import importlib
 import sys

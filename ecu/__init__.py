@@ -1,1 +1,1 @@
-"""The controller: pure control law and its node. No I/O in here."""
+"""Takes frames of the sensors and gives demands to brakes and motors: the controller. No I/O in here."""

@@ -17,10 +17,10 @@ from dbc.messages import (
     MotorDemandFront,
     MotorDemandRear,
 )
-from hil.node_process import ECU, serve
-from hil.result import measure
-from hil.scenario import load_scenario
-from hil.virtual import simulate
+from hil.bench.node_process import ECU, serve
+from hil.bench.result import measure
+from hil.bench.virtual import simulate
+from hil.scenario.scenario import load_scenario
 
 FULL_PRESSURE_PA = 70e5
 

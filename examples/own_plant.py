@@ -28,10 +28,10 @@ from dbc.messages import (
     WheelSpeedFront,
     WheelSpeedRear,
 )
-from hil.node_process import PLANT, serve
-from hil.result import measure
-from hil.scenario import load_scenario
-from hil.virtual import simulate
+from hil.bench.node_process import PLANT, serve
+from hil.bench.result import measure
+from hil.bench.virtual import simulate
+from hil.scenario.scenario import load_scenario
 
 MASS_KG, RADIUS_M, STEP_S = 1500.0, 0.32, 0.01
 TORQUE_PER_PRESSURE = {"front": 2.0e-4, "rear": 0.85e-4}  # N m/Pa, one wheel

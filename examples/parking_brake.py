@@ -10,7 +10,7 @@ is compiled alone when a run first needs it; nothing of brakebench is compiled a
 """
 
 from plant.effects.effect import Effect, Parameter, Scope, slots
-from plant.effects.joints import J
+from plant.inject import J
 from plant.layout import Vector
 from plant.vectors import X
 
@@ -21,8 +21,8 @@ L = slots(Scope.CAR, PARAMETERS)
 def dynamic(x: Vector, u: Vector, q: Vector, k: int, y: Vector) -> None:
     """T' = T + T_p at the rear wheels, a little less once the wheels turn fast: T_p / (1 + omega / 200).
 
-    ``x`` is the state, ``u`` the inputs, ``q[k + ...]`` the effect's own numbers, ``y`` the outputs and joints: the
-    factor of a joint of four begins at ``J.name``, its addend (used here) four places later.
+    ``x`` is the state, ``u`` the inputs, ``q[k + ...]`` the effect's own numbers, ``y`` the outputs and injection
+    points: the factor of a point of four begins at ``J.name``, its addend (used here) four places later.
     """
     for i in range(2, 4):
         slower = 1.0 + abs(x[X.wheel_speed_rad_s + i]) / 200.0
@@ -34,7 +34,7 @@ EFFECT = Effect(
     row=0,
     title="The parking brake was left on",
     equation="T' = T + T_p / (1 + omega / 200)",
-    joints=("brake.torque",),
+    injection_points=("brake.torque",),
     scope=Scope.CAR,
     parameters=PARAMETERS,
     source="C: an example",

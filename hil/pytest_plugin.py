@@ -23,8 +23,8 @@ import pytest
 if TYPE_CHECKING:
     from dbc.contract import Message
     from dbc.frame import Frame
-    from hil.result import Floats, Signals
-    from hil.session import Session
+    from hil.bench.result import Floats, Signals
+    from hil.bench.session import Session
 
 STOPPED_MPS = 0.05
 _SESSION: "pytest.StashKey[Session]" = pytest.StashKey()
@@ -83,7 +83,7 @@ class FaultAccess:
     @property
     def names(self) -> tuple[str, ...]:
         """Faults by name."""
-        from hil.scenario import FAULT_NAMES
+        from hil.faults.physical import FAULT_NAMES
 
         return FAULT_NAMES
 
@@ -156,13 +156,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture
 def bench(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> "Iterator[Session]":
-    """A bench of the test's own: see `hil.session.Session`."""
-    from hil.session import Session, real_rig, virtual_rig
+    """A bench of the test's own: see `hil.bench.session.Session`."""
+    from hil.bench.session import Session, real_run, virtual_run
 
     options = request.config.option
     bus, no_ecu = options.brakebench_bus, options.brakebench_no_ecu
     real = bool(bus or options.brakebench_realtime or no_ecu)
-    make = real_rig(bus or "auto", ("ecu",) if no_ecu else ()) if real else virtual_rig
+    make = real_run(bus or "auto", ("ecu",) if no_ecu else ()) if real else virtual_run
     session = Session(make, _folder(request, tmp_path_factory), f"Test {request.node.nodeid}", options.brakebench_limit)
     request.node.stash[_SESSION] = session
     running = request.config.stash[_OPEN]

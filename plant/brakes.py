@@ -1,15 +1,16 @@
+"""Friction brakes of all wheels: demand -> pressure -> clamping force -> torque, pad and disc."""
+
 # mypy: disable-error-code=no-any-return
 # (elements of a vector are Any to the type checker)
-"""Friction brakes of all wheels: demand -> pressure -> clamping force -> torque, pad and disc."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from plant.brake_thermal import disc_temperature_rate
 from plant.compiled import equation
-from plant.effects.joints import J, at_wheel
 from plant.friction import mu_rate, temperature_rate
 from plant.hydraulics import pad_force, pressure_jerk, sliding_torque, windup_held
+from plant.inject import J, inject_wheel
 from plant.vectors import C, P, U, X, Y
 
 Vector = NDArray[np.float64]
@@ -31,8 +32,8 @@ def brakes(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, wheels: int)
         omega = x[X.wheel_speed_rad_s + i]
         rate = x[X.pressure_rate_pa_s + i]
         held_rate = min(max(rate, -p[P.ehb_release_rate_pa_s]), p[P.ehb_build_rate_pa_s])
-        y[Y.rate + X.pressure_pa + i] = at_wheel(held_rate, y, J.hydraulics_rate, i)
-        demand = at_wheel(u[U.pressure_demand_pa + i], y, J.hydraulics_demand, i)
+        y[Y.rate + X.pressure_pa + i] = inject_wheel(held_rate, y, J.hydraulics_rate, i)
+        demand = inject_wheel(u[U.pressure_demand_pa + i], y, J.hydraulics_demand, i)
         y[Y.rate + X.pressure_rate_pa_s + i] = pressure_jerk(
             min(max(demand, 0.0), p[P.ehb_max_pressure_pa]), x[X.pressure_pa + i], rate,
             p[P.ehb_natural_frequency_hz], p[P.ehb_damping_ratio], p[P.ehb_build_rate_pa_s],
@@ -42,15 +43,15 @@ def brakes(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, wheels: int)
         pressure = measured if cut[C.pressure + i] > 0.5 else own
         y[Y.pressure_pa + i] = pressure
 
-        clamping = at_wheel(pressure, y, J.brake_pressure, i)
+        clamping = inject_wheel(pressure, y, J.brake_pressure, i)
         force = pad_force(
             clamping, per_axle(i, p, P.friction_brake_piston_area_m2),
             per_axle(i, p, P.friction_brake_threshold_pressure_pa), p[P.friction_brake_efficiency],
         )  # fmt: skip
         radius = per_axle(i, p, P.friction_brake_effective_radius_m)
         mu = x[X.pad_friction + i]
-        sliding = sliding_torque(max(at_wheel(mu, y, J.friction_mu, i), 0.0), force, radius)
-        limit = max(at_wheel(sliding, y, J.brake_torque, i), 0.0) / stiffness
+        sliding = sliding_torque(max(inject_wheel(mu, y, J.friction_mu, i), 0.0), force, radius)
+        limit = max(inject_wheel(sliding, y, J.brake_torque, i), 0.0) / stiffness
         held = windup_held(x[X.windup_rad + i], omega, windup_s, limit)
         sticks = abs(held) < limit
         torque = -stiffness * held

@@ -16,7 +16,11 @@ from typing import Any, TypeVar, cast
 import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
-PACKAGES = ("plant", "plant.parameters", "plant.effects", "plant.effects.sensing")
+PACKAGES = (
+    "plant", "plant.parameters", "plant.injection", "plant.effects", "plant.effects.road_air", "plant.effects.chassis",
+    "plant.effects.tyres", "plant.effects.pads", "plant.effects.hydraulics", "plant.effects.motors",
+    "plant.effects.sensing",
+)  # fmt: skip
 """Where the plant's sources are."""
 EFFECTS = os.environ.get("BRAKEBENCH_EFFECTS", "1") != "0"
 """False compiles the effects out: the build that the neutral one is compared with."""
@@ -57,7 +61,7 @@ def equation(function: F) -> F:
     return _equation(function, forceinline=True)
 
 
-def joint(function: F) -> F:
+def unfused(function: F) -> F:
     """As `equation`, but no product of the function is fused with what stands before or behind it."""
     return _equation(function, forceinline=True, fastmath=False)
 

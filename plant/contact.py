@@ -1,6 +1,7 @@
+"""Contact of the tyres with the road: loads, relaxed slips, forces, down to standstill."""
+
 # mypy: disable-error-code=no-any-return
 # (elements of a vector are Any to the type checker)
-"""Contact of the tyres with the road: loads, relaxed slips, forces, down to standstill."""
 
 from math import pi
 
@@ -9,8 +10,8 @@ from numpy.typing import NDArray
 
 from plant.brakes import per_axle
 from plant.compiled import equation
-from plant.effects.joints import J, at_wheel
 from plant.fastmath import atan, sin
+from plant.inject import J, inject_wheel
 from plant.suspension import link_force, spring_force
 from plant.tyre import (
     combined_at,
@@ -66,13 +67,13 @@ def wheel_load(i: int, braking: float, driving: float, cos_grade: float, x: Vect
         per_axle(i, p, P.suspension_brake_support_tangent), per_axle(i, p, P.suspension_drive_support_tangent),
         per_axle(i, p, P.suspension_roll_centre_height_m),
     )  # fmt: skip
-    return max(at_wheel(static_load(i, cos_grade, p) + spring + links, y, J.wheel_load, i), 0.0)
+    return max(inject_wheel(static_load(i, cos_grade, p) + spring + links, y, J.wheel_load, i), 0.0)
 
 
 @equation
 def rolling_radius(i: int, p: Vector, y: Vector) -> float:
     """Rolling radius of one wheel, m."""
-    return at_wheel(p[P.wheel_rolling_radius_m], y, J.wheel_radius, i)
+    return inject_wheel(p[P.wheel_rolling_radius_m], y, J.wheel_radius, i)
 
 
 @equation
@@ -96,7 +97,7 @@ def slip_decay(slip: float, transport_mps: float, bleeding_mps: float, gain_1_m:
 
 
 @equation
-def left_of_slope(force_n: float, peak_n: float) -> float:
+def tangent_stiffness_share(force_n: float, peak_n: float) -> float:
     """Share of the slip stiffness that is left at a force: 1 - (F/D)^2, within 0.1 of the magic formula's."""
     used = force_n / peak_n
     return max(1.0 - used * used, 0.0)
@@ -133,7 +134,7 @@ def contacts(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, cos_grade:
         loaded = max(load, LOAD_FLOOR_N)
         grip = max(y[Y.road_friction + i], FRICTION_FLOOR)
         dfz = load_offset(loaded, p)
-        stiffness_x = at_wheel(slip_stiffness(loaded, dfz, p), y, J.tyre_stiffness, i)
+        stiffness_x = inject_wheel(slip_stiffness(loaded, dfz, p), y, J.tyre_stiffness, i)
         stiffness_y = -cornering_stiffness(loaded, p)
         least = p[P.tyre_relaxation_least_m]
         held_x = peak_longitudinal(loaded, dfz, grip, p) / stiffness_x
@@ -157,18 +158,18 @@ def contacts(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, cos_grade:
             stiffness_x, side, p,
         )  # fmt: skip
         carried = load / loaded
-        given, made = u[U.longitudinal_force_n + i], at_wheel(force * carried, y, J.tyre_force, i)
+        given, made = u[U.longitudinal_force_n + i], inject_wheel(force * carried, y, J.tyre_force, i)
         free = 0.0 if cut[C.force + i] > 0.5 else carried
-        y[Y.slip_stiffness_n + i] = free * stiffness_x * left_of_slope(force, held_x * stiffness_x)
-        y[Y.side_stiffness_n + i] = free * stiffness_y * left_of_slope(cross, held_y * stiffness_y)
+        y[Y.slip_stiffness_n + i] = free * stiffness_x * tangent_stiffness_share(force, held_x * stiffness_x)
+        y[Y.side_stiffness_n + i] = free * stiffness_y * tangent_stiffness_share(cross, held_y * stiffness_y)
         force = given if cut[C.force + i] > 0.5 else made
         y[Y.longitudinal_force_n + i] = force
-        y[Y.lateral_force_n + i] = at_wheel(cross * carried, y, J.tyre_side_force, i)
+        y[Y.lateral_force_n + i] = inject_wheel(cross * carried, y, J.tyre_side_force, i)
 
         coefficient = rolling_resistance(
             omega * radius, p[P.vehicle_rolling_resistance], p[P.vehicle_rolling_resistance_speed_s2_m2]
         )  # fmt: skip
-        rolling = at_wheel(load * radius * coefficient, y, J.wheel_rolling_torque, i)
+        rolling = inject_wheel(load * radius * coefficient, y, J.wheel_rolling_torque, i)
         y[Y.rolling_torque_nm + i] = rolling
         y[Y.rate + X.wheel_speed_rad_s + i] = (torque - radius * force - rolling) / inertia
         y[Y.rate + X.wheel_angle_rad + i] = omega

@@ -1,7 +1,7 @@
 """The one right-hand side: all submodels put together.
 
-The joints, in the order of the way of the brake: demand -> pressure -> friction torque and motor torque -> wheel torque
--> tyre force -> body. A cut lets a measured value enter at a joint in place of the simulated one.
+Cut points, in the order of the way of the brake: demand -> pressure -> friction torque and motor torque -> wheel torque
+-> tyre force -> body. A cut lets a measured value enter at a cut point in place of the simulated one.
 """
 
 from math import cos, pi, sin, sqrt
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from plant.brakes import brakes
 from plant.compiled import block, equation
 from plant.contact import contacts, static_load
-from plant.effects.apply import after, before
-from plant.effects.joints import J, at_car, at_wheel
+from plant.inject import J, inject_car, inject_wheel
+from plant.injection.apply import after, before
 from plant.motors import motors
 from plant.road import segment_at
 from plant.vectors import CUT_PARTS, P, U, X, Y
@@ -25,7 +25,7 @@ Vector = NDArray[np.float64]
 @equation
 def road_wheel_angle(u: Vector, p: Vector, y: Vector) -> float:
     """Steering angle of the front wheels, rad."""
-    return at_car(u[U.steering_wheel_rad] / p[P.vehicle_steering_ratio], y, J.steering_angle)
+    return inject_car(u[U.steering_wheel_rad] / p[P.vehicle_steering_ratio], y, J.steering_angle)
 
 
 @equation
@@ -40,11 +40,11 @@ def over_the_road(
         ground_x = x[X.speed_mps] - x[X.yaw_rate_rad_s] * wheel_y
         ground_y = x[X.lateral_speed_mps] + x[X.yaw_rate_rad_s] * wheel_x
         c, s = (cos_steer, sin_steer) if i < 2 else (1.0, 0.0)
-        y[Y.along_mps + i] = at_wheel(ground_x * c + ground_y * s, y, J.contact_speed, i)
+        y[Y.along_mps + i] = inject_wheel(ground_x * c + ground_y * s, y, J.contact_speed, i)
         y[Y.across_mps + i] = ground_y * c - ground_x * s
         row = segment_at(road, x[X.x_m] + wheel_x * cos_yaw - wheel_y * sin_yaw)
         left = x[X.y_m] + wheel_x * sin_yaw + wheel_y * cos_yaw > 0.0
-        y[Y.road_friction + i] = at_wheel(road[row, 1] if left else road[row, 2], y, J.road_friction, i)
+        y[Y.road_friction + i] = inject_wheel(road[row, 1] if left else road[row, 2], y, J.road_friction, i)
 
 
 @equation
@@ -61,7 +61,7 @@ def body(
     height = p[P.vehicle_cog_height_m]
     speed, lateral, yaw_rate = x[X.speed_mps], x[X.lateral_speed_mps], x[X.yaw_rate_rad_s]
     pitch, roll = x[X.pitch_rad], x[X.roll_rad]
-    against_air = at_car(speed, y, J.air_speed)
+    against_air = inject_car(speed, y, J.air_speed)
     aero = dynamic_pressure_area(against_air, p[P.vehicle_air_density_kg_m3], p[P.vehicle_frontal_area_m2])
     drag = p[P.vehicle_drag_coefficient] * aero
     sum_x, sum_y, sum_yaw, sum_up, sum_pitch, sum_roll = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -83,7 +83,7 @@ def body(
 
     sum_pitch += height * drag
     rate = Y.rate
-    specific_x, specific_y = at_car(sum_x - drag, y, J.body_force) / mass, sum_y / mass
+    specific_x, specific_y = inject_car(sum_x - drag, y, J.body_force) / mass, sum_y / mass
     sprung = mass - p[P.vehicle_unsprung_mass_kg] - p[P.vehicle_unsprung_mass_kg + 1]
     y[rate + X.x_m] = speed * cos_yaw - lateral * sin_yaw
     y[rate + X.y_m] = speed * sin_yaw + lateral * cos_yaw
@@ -100,12 +100,12 @@ def body(
     y[rate + X.distance_m] = sqrt(speed * speed + lateral * lateral)
 
     up_body = GRAVITY_MPS2 * cos_grade + y[rate + X.heave_rate_mps]
-    measured_x = at_car(specific_x * cos(pitch) - up_body * sin(pitch), y, J.imu_ax)
-    measured_y = at_car(specific_y * cos(roll) + up_body * sin(roll), y, J.imu_ay)
+    measured_x = inject_car(specific_x * cos(pitch) - up_body * sin(pitch), y, J.imu_ax)
+    measured_y = inject_car(specific_y * cos(roll) + up_body * sin(roll), y, J.imu_ay)
     imu = 2.0 * pi * p[P.sensor_imu_cutoff_hz]
     y[rate + X.imu_longitudinal_mps2] = imu * (measured_x - x[X.imu_longitudinal_mps2])
     y[rate + X.imu_lateral_mps2] = imu * (measured_y - x[X.imu_lateral_mps2])
-    y[rate + X.imu_yaw_rate_rad_s] = imu * (at_car(yaw_rate, y, J.imu_yaw_rate) - x[X.imu_yaw_rate_rad_s])
+    y[rate + X.imu_yaw_rate_rad_s] = imu * (inject_car(yaw_rate, y, J.imu_yaw_rate) - x[X.imu_yaw_rate_rad_s])
     y[Y.decay_1_s + X.imu_longitudinal_mps2] = imu
     y[Y.decay_1_s + X.imu_lateral_mps2] = imu
     y[Y.decay_1_s + X.imu_yaw_rate_rad_s] = imu
@@ -133,9 +133,9 @@ def energy(x: Vector, p: Vector, y: Vector) -> None:
 def sensed(x: Vector, y: Vector) -> None:
     """What the sensors of the wheels stand at, from the other outputs."""
     for i in range(4):
-        y[Y.sensed_wheel_speed_rad_s + i] = at_wheel(x[X.wheel_speed_rad_s + i], y, J.sensor_wheel_speed, i)
-        y[Y.sensed_pressure_pa + i] = at_wheel(y[Y.pressure_pa + i], y, J.sensor_pressure, i)
-        y[Y.sensed_motor_nm + i] = at_wheel(y[Y.motor_current_nm + i], y, J.sensor_motor_torque, i)
+        y[Y.sensed_wheel_speed_rad_s + i] = inject_wheel(x[X.wheel_speed_rad_s + i], y, J.sensor_wheel_speed, i)
+        y[Y.sensed_pressure_pa + i] = inject_wheel(y[Y.pressure_pa + i], y, J.sensor_pressure, i)
+        y[Y.sensed_motor_nm + i] = inject_wheel(y[Y.motor_current_nm + i], y, J.sensor_motor_torque, i)
 
 
 @block
@@ -146,11 +146,11 @@ def derivative(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, roa
     ----------
     x : state (``STATE``).  u : inputs (``INPUT``), pressure demand already delayed.
     cut : ``CUT``, above 0.5 where a measured value in ``u`` replaces the simulated one.  switch : ``SWITCH``.
-    p : as of `plant.effects.apply.Q`.  road : rows of `plant.road.road_table`.  y : ``OUTPUT``, written.
+    p : as of `plant.injection.apply.Q`.  road : rows of `plant.road.road_table`.  y : ``OUTPUT``, written.
     """
     wheels = cut.size // CUT_PARTS  # 4, but unknown to the compiler: it puts four wheels in one register
     before(x, u, cut, p, y)
-    slope = at_car(road[segment_at(road, x[X.x_m]), 3], y, J.road_grade)
+    slope = inject_car(road[segment_at(road, x[X.x_m]), 3], y, J.road_grade)
     cos_grade = 1.0 / sqrt(1.0 + slope * slope)
     y[Y.grade] = slope
     yaw, steer = x[X.yaw_rad], road_wheel_angle(u, p, y)

@@ -1,7 +1,7 @@
 """Pad friction: Ostermeyer's dynamic model, equations (3) and (4) of the paper.
 
-What the print leaves open, and what we take (docs/decisions/0010): T in kelvin; N the force on one pad and v the
-sliding speed at the effective radius; T0 the ambient temperature; heating with N v as printed or with mu N v.
+What the print leaves open, and what we take (docs/decisions/pad-friction.md): T in kelvin; N the force on one pad and
+v the sliding speed at the effective radius; T0 the ambient temperature; heating with N v as printed or with mu N v.
 """
 
 from plant.compiled import equation

@@ -39,11 +39,21 @@ def sliding_torque(mu: float, pad_force_n: float, radius_m: float) -> float:
 
 
 @equation
+def brake_gain(mu: float, area_m2: float, radius_m: float, efficiency: float) -> float:
+    """Torque of the sliding brake per pressure above the threshold, N m/Pa: 2 mu eta A r.
+
+    The slope of `sliding_torque` over the pressure in `pad_force`; for what needs the ratio alone.
+    """
+    return 2.0 * mu * efficiency * area_m2 * radius_m
+
+
+@equation
 def windup_held(windup_rad: float, speed_rad_s: float, time_s: float, limit_rad: float) -> float:
     """Wind-up that acts now, rad: z + tau omega, at most the sliding limit either way.
 
     The torque is -K times it and z follows with time constant tau: Coulomb friction while the wheel turns, a damped
-    spring at rest. So the brake holds on a grade without creeping, and the equations stay smooth (decision 0011).
+    spring at rest. So the brake holds on a grade without creeping, and the equations stay smooth
+    (docs/decisions/vehicle-model-and-effects.md).
     """
     return min(max(windup_rad + time_s * speed_rad_s, -limit_rad), limit_rad)
 

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from plant.compiled import equation, section
 from plant.contact import rolling_radius
-from plant.effects.apply import extra_states_move
 from plant.equations import derivative
 from plant.fastmath import exp
-from plant.phi import GONE, SMALL, phi_1, phi_2
+from plant.injection.apply import extra_states_move
+from plant.phi import EXPONENT_LIMIT, SMALL, phi_1, phi_2
 from plant.vectors import BASE_RATES, OUTPUT, RATES, STATE, P, X, Y
 
 Vector = NDArray[np.float64]
@@ -24,7 +24,10 @@ WORK_SHAPE = (5, max(STATE.size, OUTPUT.size))
 
 @equation
 def hold_pressure_rates(x: Vector, p: Vector) -> None:
-    """Bring rates of pressure back to their limits: one passes its limit within a step (docs/decisions/0091)."""
+    """Bring rates of pressure back to their limits: one passes its limit within a step.
+
+    See docs/decisions/simulation-speed.md.
+    """
     build, release = p[P.ehb_build_rate_pa_s], p[P.ehb_release_rate_pa_s]
     for i in range(4):
         x[X.pressure_rate_pa_s + i] = min(max(x[X.pressure_rate_pa_s + i], -release), build)
@@ -80,7 +83,7 @@ def exponential_step(
     derivative(x, u, cut, switch, p, road, y)
     for i in range(last):
         z = 0.5 * step_s * y[Y.decay_1_s + i]
-        half[i] = exp(-min(z, GONE))
+        half[i] = exp(-min(z, EXPONENT_LIMIT))
         mean[i] = 0.5 * step_s * phi_1(z, half[i])
         trial[i] = x[i] + mean[i] * y[Y.rate + i]
     derivative(trial, u, cut, switch, p, road, stage)

@@ -1,19 +1,24 @@
-"""The vehicle as functions on flat vectors: start, advance (live), replay (measured inputs, batches)."""
+"""The vehicle as functions on flat vectors: start, advance (live), replay (measured inputs, batches).
+
+`simulate` is the compiled kernel, flat on purpose: a compiler passes no values of other kinds. `advance` and `replay`
+are its faces for Python.
+"""
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from math import floor, pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from plant.compiled import entry, section
-from plant.effects import apply
-from plant.effects.bank import NO_TERMS
-from plant.effects.plugin import NO_PLUGINS
-from plant.effects.theta import THETA
 from plant.equations import derivative, sensed
 from plant.friction import mu_equilibrium
+from plant.injection import apply
+from plant.injection.bank import NO_TERMS
+from plant.injection.plugin import NO_PLUGINS
+from plant.injection.theta import THETA
 from plant.integrate import (
     EXPONENTIAL,
     SEMI_IMPLICIT,
@@ -25,7 +30,7 @@ from plant.integrate import (
 from plant.layout import flatten
 from plant.parameters.plant import PlantParameters
 from plant.road import DRY, road_table
-from plant.rolling import CREEPING_S, rolling_step, rolls_on
+from plant.rolling import CREEPING_S, long_step_valid, rolling_step
 from plant.vectors import CUT, DELAY_SLOTS, INPUT, OUTPUT, PARAMETER, STATE, SWITCH, P, U, X
 
 Vector = NDArray[np.float64]
@@ -45,6 +50,26 @@ def pack(parameters: PlantParameters) -> Vector:
 def healthy() -> Vector:
     """Switches of a car without physical faults (``SWITCH``)."""
     return np.ones(SWITCH.size)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """What stays as it is while a car is driven: where measured values enter, faults, road, what is injected.
+
+    Attributes
+    ----------
+    cut, switch : vectors ``CUT`` and ``SWITCH``; nothing measured and no fault by default.
+    road : rows of `plant.road.road_table`, dry and flat by default.
+    theta : numbers of all effects (`plant.injection.theta`), neutral by default; in `replay` also one row a car.
+    terms, plugins : tables of `plant.injection.bank` and `plant.injection.plugin`.
+    """
+
+    cut: Vector = field(default_factory=CUT.zeros)
+    switch: Vector = field(default_factory=healthy)
+    road: Vector = field(default_factory=lambda: road_table(DRY))
+    theta: Vector = field(default_factory=lambda: NEUTRAL)
+    terms: Vector = field(default_factory=lambda: NO_TERMS)
+    plugins: Vector = field(default_factory=lambda: NO_PLUGINS)
 
 
 def initial_state(
@@ -124,8 +149,8 @@ def simulate(
     method : `plant.integrate.SEMI_IMPLICIT`, `RUNGE_KUTTA_4` or `EXPONENTIAL`.
     columns : what to note at the start of each row, as indices into the state followed by the outputs.
     table : the notes, shape (rows, columns), written.  y : outputs (``OUTPUT``) at the end, written.
-    theta : numbers of all effects (`plant.effects.theta`); onsets act from row to row.
-    terms, plugins : tables of `plant.effects.bank` and `plant.effects.plugin`, a row each.
+    theta : numbers of all effects (`plant.injection.theta`); onsets act from row to row.
+    terms, plugins : tables of `plant.injection.bank` and `plant.injection.plugin`, a row each.
     """
     work = np.empty(WORK_SHAPE)
     now = np.empty(inputs.shape[1])
@@ -161,7 +186,7 @@ def simulate(
             if method == SEMI_IMPLICIT:
                 semi_implicit_step(x, now, cut, switch, q, road, long_s, y)
             elif method == EXPONENTIAL:
-                if rolls_on(x, now, q, long_s):
+                if long_step_valid(x, now, q, long_s):
                     rolling_step(x, now, cut, switch, q, road, long_s, work, y)
                 else:
                     parts = 2 if long_s > CREEPING_S else 1
@@ -177,17 +202,16 @@ def simulate(
 
 
 def advance(
-    x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, y: Vector, steps: int,
-    step_s: float = STEP_S, method: int = SEMI_IMPLICIT, theta: Vector = NEUTRAL, terms: Vector = NO_TERMS,
-    plugins: Vector = NO_PLUGINS,
+    x: Vector, u: Vector, p: Vector, y: Vector, steps: int, scene: Scene, step_s: float = STEP_S,
+    method: int = SEMI_IMPLICIT,
 ) -> None:  # fmt: skip
     """Advance the state ``x`` in place under constant inputs; ``y`` holds the outputs at its end.
 
     ``steps`` 0 only evaluates the outputs. The vectors are those of `simulate`, ``u`` one ``INPUT``.
     """
     simulate(
-        x, u.reshape(1, -1), cut, switch, p, road, step_s, steps, _ONE_BY_ONE, method, _NOTHING, _NO_ROWS, y, theta,
-        terms, plugins,
+        x, u.reshape(1, -1), scene.cut, scene.switch, p, scene.road, step_s, steps, _ONE_BY_ONE, method, _NOTHING,
+        _NO_ROWS, y, scene.theta, scene.terms, scene.plugins,
     )  # fmt: skip
 
 
@@ -212,10 +236,8 @@ def column_indices(names: Sequence[str]) -> NDArray[np.int64]:
 
 
 def replay(
-    start: Vector, inputs: Vector, parameters: Vector, columns: Sequence[str], *, cut: Vector | None = None,
-    switch: Vector | None = None, road: Vector | None = None, steps: int = 10, step_s: float = STEP_S,
-    method: int = SEMI_IMPLICIT, workers: int = 1, theta: Vector = NEUTRAL, terms: Vector = NO_TERMS,
-    plugins: Vector = NO_PLUGINS,
+    start: Vector, inputs: Vector, parameters: Vector, columns: Sequence[str], scene: Scene | None = None, *,
+    steps: int = 10, step_s: float = STEP_S, method: int = SEMI_IMPLICIT, workers: int = 1,
 ) -> Vector:  # fmt: skip
     """Run cars through the same rows of inputs, each with its own parameters and start.
 
@@ -224,30 +246,27 @@ def replay(
     start : one state for all, or one a car, shape (STATE.size,) or (cars, STATE.size).
     inputs : shape (rows, INPUT.size); a row lasts ``steps`` times ``step_s``.
     parameters : shape (PARAMETER.size,) or (cars, PARAMETER.size).
-    columns : names as for `column_indices`.  cut, switch, road : none, healthy and dry by default.
+    columns : names as for `column_indices`.
+    scene : the same for all, but for theta of shape (cars, THETA.size); as many cars as parameters or theta have rows.
     workers : threads; the cars are shared out among them.
-    theta : effects, shape (THETA.size,) or (cars, THETA.size); as many cars as parameters or theta have rows.
-    terms, plugins : basis terms and effects from outside, the same for all.
 
     Returns
     -------
     Values at the start of each row, shape (cars, rows, columns).
     """
-    number = max(parameters.size // PARAMETER.size, theta.size // THETA.size)
+    scene = Scene() if scene is None else scene
+    number = max(parameters.size // PARAMETER.size, scene.theta.size // THETA.size)
     cars = np.broadcast_to(parameters, (number, PARAMETER.size))
-    thetas = np.broadcast_to(theta, (number, THETA.size))
+    thetas = np.broadcast_to(scene.theta, (number, THETA.size))
     starts = np.broadcast_to(start, (number, STATE.size))
     rows = np.ascontiguousarray(inputs, dtype=np.float64)
-    cut = CUT.zeros() if cut is None else cut
-    switch = healthy() if switch is None else switch
-    road = road_table(DRY) if road is None else road
     indices, at_once = column_indices(columns), np.ones(len(rows), np.int64)
     table = np.empty((len(cars), len(rows), len(indices)))
 
     def one(k: int) -> None:  # copies, because for read-only vectors the model would be compiled once more
         simulate(
-            starts[k].copy(), rows, cut, switch, cars[k].copy(), road, step_s, steps, at_once, method, indices,
-            table[k], OUTPUT.zeros(), thetas[k].copy(), terms, plugins,
+            starts[k].copy(), rows, scene.cut, scene.switch, cars[k].copy(), scene.road, step_s, steps, at_once, method,
+            indices, table[k], OUTPUT.zeros(), thetas[k].copy(), scene.terms, scene.plugins,
         )  # fmt: skip
 
     if workers == 1:
@@ -262,4 +281,4 @@ def replay(
 def compile_model() -> None:
     """Compile the model now, or load it from disk; else the first call does."""
     p = np.ones(PARAMETER.size)
-    advance(STATE.zeros(), INPUT.zeros(), CUT.zeros(), healthy(), p, road_table(DRY), OUTPUT.zeros(), 0)
+    advance(STATE.zeros(), INPUT.zeros(), p, OUTPUT.zeros(), 0, Scene())

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from plant.battery import charge_limit
 from plant.compiled import equation
-from plant.effects.joints import J, at_wheel
+from plant.inject import J, inject_wheel
 from plant.motor import derating, fade_out, torque_limit, torque_rate, winding_rate
 from plant.vectors import C, P, S, U, X, Y
 
@@ -34,11 +34,11 @@ def motors(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, y: Vect
         omega = _turning(x, u, cut, i)
         hot = derating(x[X.winding_temperature_k + i], p[P.motor_derating_start_k], p[P.motor_derating_end_k])
         able = torque_limit(omega, p[P.motor_peak_torque_nm], p[P.motor_peak_power_w], p[P.motor_max_speed_rad_s])
-        able = max(at_wheel(able * (switch[S.motor_alive + i] * hot), y, J.motor_available, i), 0.0)
+        able = max(inject_wheel(able * (switch[S.motor_alive + i] * hot), y, J.motor_available, i), 0.0)
         fade = fade_out(omega * p[P.wheel_rolling_radius_m], p[P.motor_fade_end_mps], p[P.motor_fade_start_mps])
         y[Y.motor_derating + i] = hot
         y[Y.motor_available_nm + i] = min(able * fade, 0.25 * limit / max(abs(omega), 1e-3))
-        demand = at_wheel(u[U.motor_demand_nm + i], y, J.motor_demand, i)
+        demand = inject_wheel(u[U.motor_demand_nm + i], y, J.motor_demand, i)
         able *= fade if demand * omega < 0.0 else 1.0
         y[Y.motor_target_nm + i] = min(max(demand, -able), able)
 
@@ -61,7 +61,7 @@ def motors(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, y: Vect
         y[Y.decay_1_s + X.motor_torque_nm + i] = 1.0 / p[P.motor_time_constant_s] if lagging else 0.0
         current = measured if cut[C.motor_torque + i] > 0.5 else own
         y[Y.motor_current_nm + i] = current
-        torque = at_wheel(current, y, J.motor_torque, i)
+        torque = inject_wheel(current, y, J.motor_torque, i)
         y[Y.motor_torque_nm + i] = torque
         y[Y.rate + X.winding_temperature_k + i] = winding_rate(
             x[X.winding_temperature_k + i], p[P.motor_copper_loss_w_nm2] * torque * torque,

@@ -1,6 +1,7 @@
 """The plant as a node: demands in, sensor and truth frames out. No I/O."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from dbc.bench_messages import FaultCommand, ManoeuvreState, PhysicalFault, StimulusDriver, StimulusRoad
 from dbc.contract import Message, spec_of
@@ -9,15 +10,15 @@ from dbc.frame import Frame, Received
 from dbc.messages import BatteryStatus
 from plant import driver, reports
 from plant.demands import DEMANDS, Demands
-from plant.effects.bank import NO_TERMS
-from plant.effects.plugin import NO_PLUGINS
-from plant.effects.sensing.chain import Chain
-from plant.effects.theta import THETA, Theta
+from plant.external_nodes import ExternalNodes
+from plant.injection.bank import NO_TERMS
+from plant.injection.plugin import NO_PLUGINS
+from plant.injection.sensing_chain import Chain
+from plant.injection.theta import THETA, Theta
 from plant.layout import Vector
 from plant.manoeuvre import Manoeuvre, value_at
-from plant.model import NEUTRAL, STEP_S, advance, healthy, initial_state, pack
+from plant.model import NEUTRAL, STEP_S, Scene, advance, healthy, initial_state, pack
 from plant.parameters.plant import PlantParameters
-from plant.partners import Partners
 from plant.road import road_table
 from plant.sensors import Sensors
 from plant.vectors import INPUT, OUTPUT, STATE, S, U, X, Y
@@ -79,16 +80,16 @@ class PlantNode:
             manoeuvre.initial_pad_friction,
         )
         self._start = self._x.copy()
-        self._partners = Partners(play, parameters.motor.torque_constant_nm_a)
-        self._u, self._y, self._cut, self._switch = INPUT.zeros(), OUTPUT.zeros(), self._partners.cut(), healthy()
-        self._own_road = self._road = road_table(manoeuvre.road)
+        self._external_nodes = ExternalNodes(play, parameters.motor.torque_constant_nm_a)
+        self._u, self._y, self._switch = INPUT.zeros(), OUTPUT.zeros(), healthy()
+        self._own_road = road_table(manoeuvre.road)
+        self._scene = Scene(self._external_nodes.cut(), self._switch, self._own_road, theta, terms, plugins)
         first_speed = manoeuvre.initial_speed_mps / parameters.wheel.rolling_radius_m
         self._sensors = Sensors(parameters.sensor, parameters.motor.torque_constant_nm_a, seed, self._x, first_speed)
         self.manoeuvre_start_ns: int | None = None
         self._last_ns: int | None = None
         self._notice_ends_ns = 0
-        self._layout, self._terms, self._plugins = layout, terms, plugins
-        self._theta = self._of_manoeuvre = theta
+        self._layout, self._of_manoeuvre = layout, theta
         self.switch_effects(theta)
         self._receiver = Receiver((*DEMANDS, StimulusDriver, StimulusRoad))
         self._faults = Receiver((FaultCommand,))
@@ -107,7 +108,7 @@ class PlantNode:
         self._last_ns = now_ns
         self._advance(elapsed_ns)
         self._receiver.accept(now_ns, inbox)
-        self._partners.accept(now_ns, inbox)
+        self._external_nodes.accept(now_ns, inbox)
         self._take_faults(now_ns, inbox)
         if now_ns >= self._notice_ends_ns:
             self._switch[S.battery_accepts] = self._switch[S.battery_announces]
@@ -135,18 +136,16 @@ class PlantNode:
         """Change the effects' numbers from this tick on; their times are of the manoeuvre's clock."""
         self._of_manoeuvre = theta
         if self.manoeuvre_start_ns is None:  # what has a time waits for the clock
-            self._theta = self._layout.shifted(theta, 1e9) if self._layout.timed(theta) else theta
+            shifted = self._layout.shifted(theta, 1e9) if self._layout.timed(theta) else theta
         else:
             begun_s = ((self._last_ns or 0) - self.manoeuvre_start_ns) * 1e-9
-            self._theta = self._layout.shifted(theta, float(self._x[X.time_s]) - begun_s)
-        self._sensors.chain = Chain(self._theta, self._layout)
+            shifted = self._layout.shifted(theta, float(self._x[X.time_s]) - begun_s)
+        self._scene = replace(self._scene, theta=shifted)
+        self._sensors.chain = Chain(shifted, self._layout)
 
     def _advance(self, elapsed_ns: int) -> None:
         steps = elapsed_ns // STEP_NS
-        advance(
-            self._x, self._u, self._cut, self._switch, self._p, self._road, self._y, steps, theta=self._theta,
-            terms=self._terms, plugins=self._plugins,
-        )  # fmt: skip
+        advance(self._x, self._u, self._p, self._y, steps, self._scene)
 
     def _take_faults(self, now_ns: int, inbox: Sequence[Received]) -> None:
         """Fault commands one by one: two may come in one tick."""
@@ -202,7 +201,7 @@ class PlantNode:
             pedal = pedal if live.pedal_travel is None else live.pedal_travel
             target = target if live.target_speed_mps is None else live.target_speed_mps
             steering = steering if live.steering_wheel_angle_rad is None else live.steering_wheel_angle_rad
-        theirs = self._partners.pedal_travel(), self._partners.steering_wheel_rad()
+        theirs = self._external_nodes.pedal_travel(), self._external_nodes.steering_wheel_rad()
         self._pedal = pedal if theirs[0] is None else theirs[0]
         self._steering_rad = steering if theirs[1] is None else theirs[1]
         self._override_road(now_ns)
@@ -216,7 +215,7 @@ class PlantNode:
             motor = [value_at(t, time_s) if t else v for t, v in zip(direct.motor_nm, motor, strict=True)]
         u[U.pressure_demand_pa : U.pressure_demand_pa + 4] = pressure
         u[U.motor_demand_nm : U.motor_demand_nm + 4] = motor
-        self._partners.enter(now_ns, u)
+        self._external_nodes.enter(now_ns, u)
 
     def _hold_torque_nm(self, target_mps: float | None) -> float:
         if target_mps is None or self._pedal > driver.PEDAL_FREE:
@@ -229,12 +228,14 @@ class PlantNode:
 
     def _override_road(self, now_ns: int) -> None:
         live = self._stimulus(StimulusRoad, now_ns)
-        self._road = self._own_road
+        road = self._own_road
         if isinstance(live, StimulusRoad) and any(value is not None for value in live):
-            self._road = self._own_road.copy()
+            road = self._own_road.copy()
             for column, value in enumerate(live, start=1):
                 if value is not None:
-                    self._road[:, column] = value
+                    road[:, column] = value
+        if road is not self._scene.road:
+            self._scene = replace(self._scene, road=road)
 
     def _tell(self, now_ns: int) -> list[Message]:
         """Frames of the played nodes, and the truth."""

@@ -6,7 +6,7 @@ Of a decay, z = -rate times step, and of 2x2 matrices, which are a I + b M for a
 from plant.compiled import equation
 
 SMALL = 1e-3
-GONE = 30.0  # of what decays no more than exp(-30) is left
+EXPONENT_LIMIT = 30.0  # exponents beyond are held here: of what decays no more than exp(-30) is left
 _HALVINGS = 4
 
 

@@ -1,6 +1,7 @@
+"""Long steps of a car that rolls: exact in each state's own decay, and in what swings in pairs."""
+
 # mypy: disable-error-code=no-any-return
 # (elements of a vector are Any to the type checker)
-"""Long steps of a car that rolls: exact in each state's own decay, and in what swings in pairs."""
 
 from math import pi
 
@@ -10,12 +11,12 @@ from numpy.typing import NDArray
 from plant.brakes import per_axle
 from plant.compiled import EFFECTS, equation, section
 from plant.contact import rolling_radius
-from plant.effects.apply import extra_states_move
 from plant.equations import derivative
 from plant.fastmath import exp
 from plant.hydraulics import pressure_jerk
+from plant.injection.apply import extra_states_move
 from plant.integrate import N_ALL, N, hold_pressure_rates
-from plant.phi import GONE, phi_1, phi_2, phi_of_pair
+from plant.phi import EXPONENT_LIMIT, phi_1, phi_2, phi_of_pair
 from plant.vectors import CUT_PARTS, P, U, X, Y
 
 Vector = NDArray[np.float64]
@@ -33,7 +34,7 @@ _WHEEL, _PRESSURE, _HUB = 0, 24, 48  # where a pair's numbers lie: phi_2 and the
 
 
 @equation
-def rolls_on(x: Vector, u: Vector, p: Vector, step_s: float) -> bool:
+def long_step_valid(x: Vector, u: Vector, p: Vector, step_s: float) -> bool:
     """Whether `rolling_step` is good for this step: `plant.integrate.exponential_step` is where a car creeps, a
     wheel may lock, or a pressure comes to its limits."""
     free = (abs(x[X.speed_mps]) > ROLLING_MPS) | ((step_s > CREEPING_S) & _stands(x))
@@ -80,7 +81,7 @@ def rolling_step(
     derivative(x, u, cut, switch, p, road, y)
     for i in range(last):
         z = step_s * y[Y.decay_1_s + i]
-        one = phi_1(z, exp(-min(z, GONE)))
+        one = phi_1(z, exp(-min(z, EXPONENT_LIMIT)))
         mean[i] = phi_2(z, one)
         trial[i] = x[i] + step_s * one * y[Y.rate + i]
     for i in range(wheels):

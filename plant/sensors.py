@@ -5,7 +5,7 @@ from math import pi
 
 import numpy as np
 
-from plant.effects.sensing.chain import Chain
+from plant.injection.sensing_chain import Chain
 from plant.layout import Vector
 from plant.parameters.sensing import SensorParameters
 from plant.vectors import X, Y

@@ -1,5 +1,3 @@
-# mypy: disable-error-code=no-any-return
-# (elements of a vector are Any to the type checker)
 """Tyre forces: PAC2002 Magic Formula without camber, relaxed slip.
 
 Source: Pacejka, Tyre and Vehicle Dynamics, 2nd ed. 2006, section 4.3.2, in the form of MSC Adams/Tire PAC2002.
@@ -7,6 +5,9 @@ Symbols as there. Vehicle axes: a positive longitudinal slip drives, a positive 
 negative side force. ``side`` is 1 on the left and -1 on the right, where the tyre is mounted mirrored.
 cos(atan(q)) is written 1/sqrt(1 + q^2). No branches: four wheels go through at once.
 """
+
+# mypy: disable-error-code=no-any-return
+# (elements of a vector are Any to the type checker)
 
 from math import pi, sqrt
 

@@ -5,8 +5,8 @@ negative. Compiled code reads ``x[X.speed_mps]``; Python reads ``x[STATE.slice("
 """
 
 from plant.compiled import EFFECTS
-from plant.effects.places import FIELDS
-from plant.effects.states import EXTRA_STATES
+from plant.extra_states import EXTRA_STATES
+from plant.injection_points import FIELDS
 from plant.layout import Layout, dataclass_sizes
 from plant.parameters.plant import PlantParameters
 
@@ -109,7 +109,7 @@ STATE = Layout("State", CONTINUOUS | EXTRA_STATES | MEMORY)
 INPUT = Layout("Input", INPUTS)
 CUT = Layout("Cut", CUTS)
 SWITCH = Layout("Switch", SWITCHES)
-OUTPUT = Layout("Output", OUTPUTS | ({"joints": sum(FIELDS.values())} if EFFECTS else {}))
+OUTPUT = Layout("Output", OUTPUTS | ({"injection_points": sum(FIELDS.values())} if EFFECTS else {}))
 PARAMETER = Layout("Parameter", dataclass_sizes(PlantParameters))
 
 X, U, C, S, Y, P = STATE.at, INPUT.at, CUT.at, SWITCH.at, OUTPUT.at, PARAMETER.at

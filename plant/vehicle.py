@@ -3,6 +3,8 @@
 from plant.compiled import equation
 
 GRAVITY_MPS2 = 9.81
+"""Gravity of the plant's road, usual in engineering. The controller computes with standard gravity, 9.80665
+(`ecu.law.gravity.GRAVITY_MPS2`): 0.03 % less."""
 
 
 @equation

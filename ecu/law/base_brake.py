@@ -3,11 +3,10 @@
 import math
 from typing import NamedTuple
 
+from ecu.law.gravity import GRAVITY_MPS2
 from ecu.law.types import Four, Inputs
 from ecu.parameters.control import PedalParameters
 from ecu.parameters.vehicle import VehicleParameters
-
-GRAVITY_MPS2 = 9.80665
 
 
 class PedalReading(NamedTuple):
@@ -16,7 +15,7 @@ class PedalReading(NamedTuple):
     travel: float
     channel_1_lost: bool
     channel_2_lost: bool
-    apart: bool
+    channels_disagree: bool
 
 
 def read_pedal(inputs: Inputs, lost: bool, disagreement: float) -> PedalReading:
@@ -37,8 +36,8 @@ def read_pedal(inputs: Inputs, lost: bool, disagreement: float) -> PedalReading:
         return PedalReading(math.nan, True, True, False)
     if lost_1 or lost_2:
         return PedalReading(two if lost_1 else one, lost_1, lost_2, False)
-    apart = abs(one - two) > disagreement
-    return PedalReading(max(one, two) if apart else 0.5 * (one + two), False, False, apart)
+    channels_disagree = abs(one - two) > disagreement
+    return PedalReading(max(one, two) if channels_disagree else 0.5 * (one + two), False, False, channels_disagree)
 
 
 def reference_deceleration(travel: float, p: PedalParameters) -> float:

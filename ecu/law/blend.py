@@ -44,7 +44,9 @@ def wanted_torque(demand_nm: Four, factor: float, available_nm: Four, motor: Mot
     )
 
 
-def hand_over(held: ChargePower, announced_w: float, power_w: float, p: BlendParameters, dt_s: float) -> ChargePower:
+def ramp_charge_limit(
+    held: ChargePower, announced_w: float, power_w: float, p: BlendParameters, dt_s: float
+) -> ChargePower:
     """Follow the battery's announced limit so that the work changes hands evenly, the slower actuator first.
 
     A battery announces a limit before it enforces it. Where the new limit binds, ``soon_w`` goes there from the power
@@ -85,7 +87,7 @@ def blend(
     Parameters
     ----------
     demand_nm : brake torque of each wheel, positive.  wanted_nm : part of it asked of each motor.
-    power_w : electrical power of ``wanted_nm``.  charge : from `hand_over`.
+    power_w : electrical power of ``wanted_nm``.  charge : from `ramp_charge_limit`.
     """
     if power_w <= 0.0:
         now, soon = fade(speed_mps, p), fade(speed_mps - p.friction_lead_s * deceleration_mps2, p)

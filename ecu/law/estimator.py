@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ecu.law import friction
 from ecu.law import paper_observer as paper
 from ecu.law.joint import layout as joint
-from ecu.law.joint.belief import believed
+from ecu.law.joint.estimates import read_estimates
 from ecu.law.joint.filter import joint_step
 from ecu.law.types import UNKNOWN, ZERO, Four, Inputs, Source
 from ecu.parameters.ecu import EcuParameters
@@ -152,7 +152,7 @@ def estimate(state: Vector, z: Vector, parameters: EcuParameters, dt_s: float) -
     nominal = parameters.friction_brake.pad_friction
     if parameters.compensation.method == "joint":
         state = joint_step(state, z, joint_parameters(parameters), dt_s)
-        started, speed, torque, mu, confidence, mass, implausible, stuck = believed(
+        started, speed, torque, mu, confidence, mass, implausible, stuck = read_estimates(
             state, parameters.compensation.confidence_full
         )
         if not started:

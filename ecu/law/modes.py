@@ -32,13 +32,13 @@ _PEDALS = Fault.PEDAL_1 | Fault.PEDAL_2
 class ModeMemory(NamedTuple):
     """State of the supervision.
 
-    ``runs``: valid frames in sequence of each source (saturating); the rest are times since or during, s.
+    ``valid_counts``: valid frames in sequence of each source (saturating); the rest are times since or during, s.
     """
 
     mode: BrakeMode
-    runs: tuple[int, ...]
+    valid_counts: tuple[int, ...]
     since_upgrade_s: float
-    apart_s: float
+    disagreement_s: float
     own_map_s: float
 
 
@@ -152,8 +152,8 @@ def supervise(
         faults |= Fault.PEDAL_1
     if pedal.channel_2_lost:
         faults |= Fault.PEDAL_2
-    apart_s = memory.apart_s + dt_s if pedal.apart else 0.0
-    if apart_s > p.pedal_disagreement_s:
+    disagreement_s = memory.disagreement_s + dt_s if pedal.channels_disagree else 0.0
+    if disagreement_s > p.pedal_disagreement_s:
         faults |= Fault.PEDAL_DISAGREE
     own_map = memory.mode != BrakeMode.INIT and memory.mode != BrakeMode.SAFE_STOP and Brake.OWN_MAP in inputs.brake
     own_map_s = min(memory.own_map_s + dt_s, 2.0 * p.own_map_tolerated_s) if own_map else 0.0
@@ -161,23 +161,23 @@ def supervise(
         faults |= Fault.EHB_OWN_MAP
     if inputs.link_down:
         faults |= Fault.LINK
-    runs, most = memory.runs, p.frames_to_upgrade
+    valid_counts, most = memory.valid_counts, p.frames_to_upgrade
     bad = max([h.bad_in_row for h in inputs.health])
-    if bad or True in lost or min(runs) < most:
-        runs = tuple(
+    if bad or True in lost or min(valid_counts) < most:
+        valid_counts = tuple(
             0 if gone or h.bad_in_row else min(run + h.fresh, most)
-            for run, h, gone in zip(runs, inputs.health, lost, strict=True)
+            for run, h, gone in zip(valid_counts, inputs.health, lost, strict=True)
         )
     since_upgrade_s = memory.since_upgrade_s + dt_s
     mode = memory.mode
     allowed = _allowed(inputs, lost, bad, faults, p)
     if mode == BrakeMode.INIT:
-        if min(runs) >= p.frames_to_upgrade:
+        if min(valid_counts) >= p.frames_to_upgrade:
             mode = allowed
             since_upgrade_s = 0.0
     elif allowed > mode:
         mode = allowed
-    elif allowed < mode and min(runs) >= p.frames_to_upgrade and since_upgrade_s >= p.upgrade_interval_s:
+    elif allowed < mode and min(valid_counts) >= p.frames_to_upgrade and since_upgrade_s >= p.upgrade_interval_s:
         mode = BrakeMode(mode - 1)
         since_upgrade_s = 0.0
-    return ModeMemory(mode, runs, since_upgrade_s, apart_s, own_map_s), faults
+    return ModeMemory(mode, valid_counts, since_upgrade_s, disagreement_s, own_map_s), faults

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.law.compiled import entry, helper
+from ecu.law.gravity import GRAVITY_MPS2
 
 Vector = NDArray[np.float64]
 
@@ -51,7 +52,6 @@ P_THRESHOLD, P_MU, P_C1, P_C2, P_C3, P_CORNER = range(13, 19)
 Q_RATE, Q_FORCE, Q_TORQUE, R_OMEGA, R_FORCE = range(19, 24)
 P_K_WINDOW, P_K_LIMIT, P_FORCE_MIN, P_MU_WINDOW, P_DELAY, P_PRESSURE_MIN, P_SPEED_MIN, ROAD, P_DIVE = range(24, 33)
 
-G0 = 9.80665
 SPEED_GAIN, OFFSET_GAIN = 5.0, 5.0  # reference speed while the wheels roll free: 1/s, 1/s2
 
 
@@ -137,64 +137,66 @@ def kalman_run(x: Vector, covariance: Vector, z: Vector, force_rate: Vector, q: 
             out[n, i] = x[i]
 
 
-@entry
-def paper_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
-    """Advance observer and friction estimation by one sample.
-
-    Parameters
-    ----------
-    s : state of the last sample (layout of this file); not changed.  z : inputs as of `joint.layout`, NaN where not
-        available.  p : parameters, `estimator.paper_parameters`.  dt : s.
-    """
-    s = s.copy()
-    radius = p[P_RADIUS]
+@helper
+def fastest_wheel(z: Vector) -> float:
+    """Speed of the fastest wheel, rad/s; -1 where no wheel has one."""
     fastest = -1.0
-    missing = isnan(z[AX])
     for i in range(4):
         if z[WHEEL + i] > fastest:
             fastest = z[WHEEL + i]
+    return fastest
+
+
+@helper
+def starts(s: Vector, z: Vector, p: Vector) -> bool:
+    """Set the state at the first complete sample; whether this sample can be used."""
+    fastest = fastest_wheel(z)
+    missing = isnan(z[AX])
+    for i in range(4):
         if isnan(z[WHEEL + i]) or isnan(z[PRESSURE + i]):
             missing = True
     if s[STARTED] == 0.0:
         for i in range(4):
             s[FRICTION + i] = p[P_MU]
         if missing or fastest < 0.0:
-            return s
+            return False
         s[STARTED] = 1.0
-        s[SPEED] = fastest * radius
+        s[SPEED] = fastest * p[P_RADIUS]
         s[K] = 1.0
         for i in range(4):
             s[FILTER + 4 * i] = z[WHEEL + i]
             for j in range(4):
                 s[COVARIANCE + 16 * i + 5 * j] = 1e4
-    if missing:
-        return s
-    ax, ay, yaw_rate = z[AX], z[AY], z[YAW_RATE]
-    if isnan(ay):
-        ay = 0.0
-    if isnan(yaw_rate):
-        yaw_rate = 0.0
-    steer = 0.0 if isnan(z[STEER]) else z[STEER] / p[P_STEER_RATIO]
+    return not missing
 
-    # reference speed: the wheels while they roll free, the acceleration while they slip
-    braking = z[DEMAND] > 0.0
-    level = ax / (1.0 + G0 * p[P_DIVE])
+
+@helper
+def update_reference_speed(s: Vector, z: Vector, p: Vector, dt: float) -> None:
+    """Reference speed, m/s: of the wheels while they roll free, of the acceleration while they slip."""
+    radius = p[P_RADIUS]
+    level = z[AX] / (1.0 + GRAVITY_MPS2 * p[P_DIVE])
     s[SPEED] += dt * (level - s[OFFSET])
-    if braking:
-        s[SPEED] = max(s[SPEED], fastest * radius)
+    if z[DEMAND] > 0.0:
+        s[SPEED] = max(s[SPEED], fastest_wheel(z) * radius)
     else:
         mean = 0.25 * (z[WHEEL] + z[WHEEL + 1] + z[WHEEL + 2] + z[WHEEL + 3]) * radius
         s[OFFSET] -= min(dt * OFFSET_GAIN, 1.0) * (mean - s[SPEED])
         s[SPEED] += min(dt * SPEED_GAIN, 1.0) * (mean - s[SPEED])
-    speed = s[SPEED]
 
-    # wheel loads (Doumiati et al.) and tyre model
-    s[LOAD_ACCELERATION] += min(dt / 0.05, 1.0) * (ax - s[LOAD_ACCELERATION])
+
+@helper
+def tyre_forces(s: Vector, z: Vector, p: Vector, dt: float, ay: float, model: Vector) -> tuple[float, float]:
+    """Burckhardt's forces on the car, N, along and across it, with wheel loads as of Doumiati et al.
+
+    ``model`` (4,) takes the longitudinal force of each wheel, the one whose rate is the filter's input (eq. 7).
+    """
+    speed = s[SPEED]
+    yaw_rate = 0.0 if isnan(z[YAW_RATE]) else z[YAW_RATE]
+    steer = 0.0 if isnan(z[STEER]) else z[STEER] / p[P_STEER_RATIO]
+    s[LOAD_ACCELERATION] += min(dt / 0.05, 1.0) * (z[AX] - s[LOAD_ACCELERATION])
     base = p[P_BASE]
     rear_m = base - p[P_FRONT]
-    lateral = rear_m * yaw_rate - speed * ay / (G0 * p[P_CORNER])
-    model = np.empty(4)
-    along_x = np.empty(4)
+    lateral = rear_m * yaw_rate - speed * ay / (GRAVITY_MPS2 * p[P_CORNER])
     body_x = 0.0
     body_y = 0.0
     for i in range(4):
@@ -202,7 +204,7 @@ def paper_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
         left = 1.0 if i % 2 == 0 else -1.0
         arm = rear_m if axle == 0 else p[P_FRONT]
         end = 1.0 if axle == 0 else -1.0
-        load = 0.5 * p[P_MASS] * (G0 * arm / base - end * s[LOAD_ACCELERATION] * p[P_HEIGHT] / base)
+        load = 0.5 * p[P_MASS] * (GRAVITY_MPS2 * arm / base - end * s[LOAD_ACCELERATION] * p[P_HEIGHT] / base)
         load -= left * arm / base * p[P_MASS] * ay * p[P_HEIGHT] / p[P_TRACK + axle]
         angle = steer if axle == 0 else 0.0
         ground = speed - yaw_rate * left * 0.5 * p[P_TRACK + axle]
@@ -210,21 +212,23 @@ def paper_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
         along = ground * np.cos(angle) + across * np.sin(angle)
         side = across * np.cos(angle) - ground * np.sin(angle)
         reference = max(along, 1.0)
-        slip = (z[WHEEL + i] * radius - along) / reference
+        slip = (z[WHEEL + i] * p[P_RADIUS] - along) / reference
         fl, fs = burckhardt(slip, -side / reference, max(load, 200.0), p[P_C1], p[P_C2], p[P_C3])
         model[i] = fl
-        along_x[i] = np.cos(angle)
         body_x += fl * np.cos(angle) - fs * np.sin(angle)
         body_y += fl * np.sin(angle) + fs * np.cos(angle)
+    return body_x, body_y
 
-    # correction factor (12), over a window, held where it cannot be told
-    resistance = 0.5 * p[P_DRAG] * speed * speed + p[P_MASS] * G0 * p[P_ROLL]
-    sensed_x = p[P_MASS] * ax + resistance
+
+@helper
+def update_correction_factor(s: Vector, z: Vector, p: Vector, ay: float, body_x: float, body_y: float) -> None:
+    """Correction factor K (eq. 12), least squares over a window; held where it cannot be estimated."""
+    resistance = 0.5 * p[P_DRAG] * s[SPEED] * s[SPEED] + p[P_MASS] * GRAVITY_MPS2 * p[P_ROLL]
+    sensed_x = p[P_MASS] * z[AX] + resistance
     sensed_y = p[P_MASS] * ay
     sensed = sqrt(sensed_x * sensed_x + sensed_y * sensed_y)
     modelled = sqrt(body_x * body_x + body_y * body_y)
-    fast = speed > p[P_SPEED_MIN]
-    if braking and modelled > p[P_FORCE_MIN] and sensed > p[P_FORCE_MIN] and sensed_x * body_x > 0.0:
+    if z[DEMAND] > 0.0 and modelled > p[P_FORCE_MIN] and sensed > p[P_FORCE_MIN] and sensed_x * body_x > 0.0:
         window = int(p[P_K_WINDOW])
         at = int(s[K_NEXT])
         s[K_MODEL + at] = modelled
@@ -237,9 +241,12 @@ def paper_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
             top += s[K_MODEL + n] * s[K_SENSOR + n]
             bottom += s[K_MODEL + n] * s[K_MODEL + n]
         s[K] = min(max(top / bottom, 1.0 / p[P_K_LIMIT]), p[P_K_LIMIT])
-    factor = s[K] if p[ROAD] > 0.5 else 1.0
 
-    # Kalman filter
+
+@helper
+def update_wheel_filters(s: Vector, z: Vector, p: Vector, model: Vector, dt: float) -> None:
+    """Kalman filter of the wheels (eqs. 5 to 8): the virtual sensor's force is K times the tyre model's (13), (14)."""
+    factor = s[K] if p[ROAD] > 0.5 else 1.0
     measurement = np.empty(8)
     rate = np.empty(4)
     for i in range(4):
@@ -250,35 +257,61 @@ def paper_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     q = np.array([0.0, p[Q_RATE] ** 2 * dt, p[Q_FORCE] ** 2 * dt, p[Q_TORQUE] ** 2 * dt])
     r = np.array([p[R_OMEGA] ** 2, p[R_FORCE] ** 2])
     kalman_step(
-        s[FILTER : FILTER + 16], s[COVARIANCE : COVARIANCE + 64], measurement, rate, q, r, radius, p[P_INERTIA], dt
+        s[FILTER : FILTER + 16], s[COVARIANCE : COVARIANCE + 64], measurement, rate, q, r, p[P_RADIUS], p[P_INERTIA], dt
     )
+    for i in range(4):
+        s[WHEEL_TORQUE + i] = s[FILTER + 4 * i + TORQUE]
 
-    # pad friction (16)-(21)
+
+@helper
+def update_pad_friction(s: Vector, z: Vector, p: Vector, dt: float) -> None:
+    """Pad friction (eqs. 16 to 21): least squares of friction torque over pressure, over a window."""
     share = min(dt / (p[P_DELAY] + 0.5 * dt), 1.0)
     for i in range(4):
         clamp = max(z[PRESSURE + i] - p[P_THRESHOLD], 0.0)
         motor = 0.0 if isnan(z[MOTOR + i]) else z[MOTOR + i]
         s[PRESSURE_LAG + i] += share * (clamp - s[PRESSURE_LAG + i])
         s[MOTOR_LAG + i] += share * (motor - s[MOTOR_LAG + i])
-        s[WHEEL_TORQUE + i] = s[FILTER + 4 * i + TORQUE]
     least = min(min(s[PRESSURE_LAG], s[PRESSURE_LAG + 1]), min(s[PRESSURE_LAG + 2], s[PRESSURE_LAG + 3]))
-    if braking and least > p[P_PRESSURE_MIN] and fast:
-        window = int(p[P_MU_WINDOW])
-        at = int(s[MU_NEXT])
-        s[MU_NEXT] = (at + 1) % window
-        s[MU_NUMBER] = min(s[MU_NUMBER] + 1.0, window)
-        number = int(s[MU_NUMBER])
-        for i in range(4):
-            gain = p[P_GAIN] if i < 2 else p[P_GAIN + 1]
-            s[MU_TORQUE + i * MAX_WINDOW + at] = s[MOTOR_LAG + i] - s[WHEEL_TORQUE + i]
-            s[MU_PRESSURE + i * MAX_WINDOW + at] = gain * s[PRESSURE_LAG + i]
-            top = 0.0
-            bottom = 0.0
-            for n in range(number):
-                phi = s[MU_PRESSURE + i * MAX_WINDOW + n]
-                top += phi * s[MU_TORQUE + i * MAX_WINDOW + n]
-                bottom += phi * phi
-            if 2 * number >= window:
-                s[FRICTION + i] = min(max(top / bottom, 0.05), 1.2)
-                s[CONFIDENCE + i] = min(bottom / (number * (gain * 10e5) ** 2), 1.0)
+    if not (z[DEMAND] > 0.0 and least > p[P_PRESSURE_MIN] and s[SPEED] > p[P_SPEED_MIN]):
+        return
+    window = int(p[P_MU_WINDOW])
+    at = int(s[MU_NEXT])
+    s[MU_NEXT] = (at + 1) % window
+    s[MU_NUMBER] = min(s[MU_NUMBER] + 1.0, window)
+    number = int(s[MU_NUMBER])
+    for i in range(4):
+        gain = p[P_GAIN] if i < 2 else p[P_GAIN + 1]
+        s[MU_TORQUE + i * MAX_WINDOW + at] = s[MOTOR_LAG + i] - s[WHEEL_TORQUE + i]
+        s[MU_PRESSURE + i * MAX_WINDOW + at] = gain * s[PRESSURE_LAG + i]
+        top = 0.0
+        bottom = 0.0
+        for n in range(number):
+            phi = s[MU_PRESSURE + i * MAX_WINDOW + n]
+            top += phi * s[MU_TORQUE + i * MAX_WINDOW + n]
+            bottom += phi * phi
+        if 2 * number >= window:
+            s[FRICTION + i] = min(max(top / bottom, 0.05), 1.2)
+            s[CONFIDENCE + i] = min(bottom / (number * (gain * 10e5) ** 2), 1.0)
+
+
+@entry
+def paper_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
+    """Advance observer and friction estimation by one sample.
+
+    Parameters
+    ----------
+    s : state of the last sample (layout of this file); not changed.  z : inputs as of `joint.layout`, NaN where not
+        available.  p : parameters, `estimator.paper_parameters`.  dt : s.
+    """
+    s = s.copy()
+    if not starts(s, z, p):
+        return s
+    ay = 0.0 if isnan(z[AY]) else z[AY]
+    update_reference_speed(s, z, p, dt)
+    model = np.empty(4)
+    body_x, body_y = tyre_forces(s, z, p, dt, ay, model)
+    update_correction_factor(s, z, p, ay, body_x, body_y)
+    update_wheel_filters(s, z, p, model, dt)
+    update_pad_friction(s, z, p, dt)
     return s

@@ -111,7 +111,7 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     demand = base_brake.distribute(torque, p.friction_brake.front_share)
     wanted = blend.wanted_torque(demand, factor_now, _usable_torque(inputs, lost, mode), p.motor)
     power = sum(wanted) * max(wheel_speed, 0.0) * p.motor.charge_efficiency
-    charge = blend.hand_over(memory.charge, inputs.charge_power_w, power, p.blend, dt_s)
+    charge = blend.ramp_charge_limit(memory.charge, inputs.charge_power_w, power, p.blend, dt_s)
     shares = blend.blend(demand, wanted, power, charge, speed, deceleration, p.blend)
 
     pressure = friction.pressure_demands(shares.friction_nm, mu, brake_gains(p), p.friction_brake)

@@ -1,1 +1,1 @@
-"""Parameter values of the controller: frozen dataclasses beside their TOML sets."""
+"""Gives the controller's parameter values: frozen dataclasses beside their TOML sets."""

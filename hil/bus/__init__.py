@@ -1,4 +1,7 @@
-"""Buses behind one protocol."""
+"""Takes a bus by name and gives one protocol to send and receive frames, whatever carries them.
+
+What happens to a bus, bus-off and overflows among it, comes with the frames as link events (`error_frame`).
+"""
 
 from hil.bus.bus import Bus, BusError, wait
 from hil.bus.channel import ChannelClaim, bench_channel, claim_channel

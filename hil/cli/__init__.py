@@ -1,1 +1,1 @@
-"""The command line."""
+"""Takes a command line and gives an exit code: one command a file."""

@@ -25,7 +25,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Run twice and compare."""
-    from hil.compare import compare_scenario
+    from hil.bench.compare import compare_scenario
     from hil.report.text import print_text
 
     comparison = compare_scenario(

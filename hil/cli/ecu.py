@@ -18,9 +18,9 @@ def run(args: argparse.Namespace) -> int:
     """Run the controller until it is told to stop."""
     from dbc.frame import Node
     from ecu.node import EcuNode
+    from hil.bench.node_process import ECU, NODE_PERIOD_NS, serve
     from hil.faults.frames import on_faulty_line
-    from hil.node_process import ECU, NODE_PERIOD_NS, serve
-    from hil.scenario import load_scenario
+    from hil.scenario.scenario import load_scenario
 
     scenario = load_scenario(args.scenario)
 

@@ -17,8 +17,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Print a list, one effect, or JSON."""
-    from hil.effects import EffectError, layout
-    from hil.effects_page import described, text
+    from hil.scenario.effects import EffectError, layout
+    from hil.validation.doc_pages.effects_page import described, text
 
     effects = [described(effect) for effect in layout().effects]
     if args.name is not None:

@@ -1,4 +1,4 @@
-"""``brakebench explain``: what measured data have and the simulation has not, why, and what the extension gains."""
+"""``brakebench explain``: what the simulation gets wrong in measured data, its cause, and what an extension gains."""
 
 import argparse
 import json
@@ -24,13 +24,15 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         metavar="LOG",
         help="CAN log, CSV, Parquet, MF4 or .mat table, or a folder of them",
     )
-    parser.add_argument("--vehicle", type=Path, metavar="SET.toml", help="the car's numbers (default: the shipped car)")
+    parser.add_argument(
+        "--vehicle", type=Path, metavar="SET.toml", help="the vehicle's parameters (default: the shipped car)"
+    )
     parser.add_argument("--dbc", type=Path, metavar="FILE", help="another car's DBC, with --map")
     parser.add_argument("--map", type=Path, metavar="CHANNELS.toml", help="which signal is which channel")
     parser.add_argument(
         "--logs", dest="about", type=Path, metavar="LOGS.toml", help="direction, disc temperature per file"
     )
-    parser.add_argument("--extend", type=Path, metavar="FILE", help="extension to begin with")
+    parser.add_argument("--extend", type=Path, metavar="FILE", help="extension to start from")
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="write report.html, report.png, result.json, extension.toml"
     )
@@ -45,13 +47,13 @@ def run(args: argparse.Namespace) -> int:
     from hil.diagnosis.sensor_consistency.check import Consistency
     from hil.diagnosis.sensor_consistency.page import build_report as sensor_report
 
-    def say(text: str) -> None:
+    def progress(text: str) -> None:
         print(f"  {text} ...", file=sys.stderr)
 
     try:
-        found = explain(
+        answer = explain(
             list(args.logs), args.vehicle, channel_map=args.map, database=args.dbc, about=args.about,
-            extend=args.extend, out=args.out, say=say,
+            extend=args.extend, out=args.out, progress=progress,
         )  # fmt: skip
     except UnusableError as error:
         if not args.json:
@@ -59,16 +61,16 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(_unusable(str(error)), indent=2))
         return error.exit_code
     sources = [str(path) for path in args.logs]
-    report = sensor_report(found, sources) if isinstance(found, Consistency) else build_report(found, sources)
+    report = sensor_report(answer, sources) if isinstance(answer, Consistency) else build_report(answer, sources)
     if args.out is not None:
         from hil.report.figure import write_figure
         from hil.report.html import write_html
 
         write_html(report, args.out / "report.html")
         write_figure(report, args.out / "report.png")
-        (args.out / "result.json").write_text(json.dumps(found.json, indent=2), encoding="utf-8")
+        (args.out / "result.json").write_text(json.dumps(answer.json, indent=2), encoding="utf-8")
     if args.json:
-        print(json.dumps(found.json, indent=2, allow_nan=False))
+        print(json.dumps(answer.json, indent=2, allow_nan=False))
     else:
         from hil.report.text import print_text
 
@@ -78,6 +80,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _unusable(why: str) -> dict[str, object]:
     return {
-        "verdict": "unusable", "why": why, "causes": [], "rivals": [], "undetectable_effects": [], "discriminating_manoeuvres": [],
-        "residual_patterns": [], "held_out_error": {}, "extension": None,
+        "verdict": "unusable", "why": why, "causes": [], "rivals": [], "undetectable_effects": [],
+        "discriminating_manoeuvres": [], "residual_patterns": [], "held_out_error": {}, "extension": None,
     }  # fmt: skip

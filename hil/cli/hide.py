@@ -10,7 +10,7 @@ from hil.cli.options import add_json
 from hil.errors import BrakebenchError
 
 if TYPE_CHECKING:
-    from hil.hide.case import Hidden
+    from hil.validation.reference_car.case import Hidden
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -52,8 +52,8 @@ def run(args: argparse.Namespace) -> int:
         return _list(args.json)
     if args.out is None:
         raise BrakebenchError("--out is missing: give a folder for the logs, e.g. --out hidden/one")
-    from hil.hide.case import make_case, measured_case, scaled_case
-    from hil.hide.files import write
+    from hil.validation.reference_car.case import make_case, measured_case, scaled_case
+    from hil.validation.reference_car.files import write
 
     hidden = _hidden(args)
     case = make_case(hidden, args.seed, args.noise, args.manoeuvres)
@@ -69,8 +69,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _hidden(args: argparse.Namespace) -> list["Hidden"]:
-    from hil.hide.case import Hidden
-    from hil.hide.catalogue import find
+    from hil.validation.reference_car.case import Hidden
+    from hil.validation.reference_car.catalogue import find
 
     if args.effect == ["none"]:
         if args.magnitude or args.wheel or args.snr or args.onset is not None:
@@ -88,7 +88,7 @@ def _hidden(args: argparse.Namespace) -> list["Hidden"]:
 
 
 def _list(as_json: bool) -> int:
-    from hil.hide.catalogue import HIDEABLE
+    from hil.validation.reference_car.catalogue import HIDEABLE
 
     if as_json:
         rows = {

@@ -58,7 +58,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Identify, or check the intervals, and print."""
-    from hil.parameters import load_set
+    from hil.scenario.parameters import load_set
     from plant.parameters.plant import PlantParameters
 
     source = args.parameters or resources.files("plant.parameters") / "paper_car.toml"
@@ -118,9 +118,9 @@ def _coverage(args: argparse.Namespace, brake: "Brake") -> int:
 def _write(args: argparse.Namespace, study: "Study", parameters: "FrictionBrakeParameters", report: "Report") -> None:
     from hil.identify.files import as_json, pad_toml
     from hil.identify.summary import figures
-    from hil.parameters import ParameterError, load_set
     from hil.report.figure import write_figure
     from hil.report.html import write_html
+    from hil.scenario.parameters import ParameterError, load_set
     from plant.parameters.brakes import OstermeyerParameters
 
     try:

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from hil.cli.options import add_json
 
 MEASUREMENTS = ("rt", "plant", "ecu", "codec", "loop", "explain")
-"""Each is a module of hil.perf with ``measure() -> list[Row]``."""
+"""Each is a module of hil.validation.perf with ``measure() -> list[Row]``."""
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -21,7 +21,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print the rows."""
-    rows = importlib.import_module(f"hil.perf.{args.name}").measure()
+    rows = importlib.import_module(f"hil.validation.perf.{args.name}").measure()
     if args.json:
         print(json.dumps({"rows": [asdict(row) for row in rows]}, indent=2))
         return 0

@@ -17,9 +17,9 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 def run(args: argparse.Namespace) -> int:
     """Run the vehicle until it is told to stop; it drives the scenario once, when a controller is there."""
     from dbc.frame import Node
+    from hil.bench.node_process import NODE_PERIOD_NS, PLANT, serve
     from hil.faults.frames import on_faulty_line
-    from hil.node_process import NODE_PERIOD_NS, PLANT, serve
-    from hil.scenario import load_scenario
+    from hil.scenario.scenario import load_scenario
     from plant.model import compile_model
     from plant.node import PlantNode
 

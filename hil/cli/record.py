@@ -5,13 +5,13 @@ import sys
 from pathlib import Path
 
 from dbc.frame import BusName
+from hil.bench.recorder import FLUSH_PERIOD_NS, Recorder
 from hil.bus.channel import bench_channel
 from hil.bus.open import open_bus
 from hil.cli.options import add_bus, add_ready_fd
-from hil.process import StopSignal, end_with_parent, say_ready
-from hil.recorder import FLUSH_PERIOD_NS, Recorder
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop
+from hil.rt.process import StopSignal, end_with_parent, say_ready
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from hil.bench.playback import LATE_NS, ROLES, Replay, Selection, select
 from hil.cli.options import add_bus, add_json
-from hil.replay import LATE_NS, ROLES, Replay, Selection, select
 
 INCOMPLETE_EXIT_CODE = 3
 INTERRUPTED_EXIT_CODE = 130  # 128 + SIGINT, as a shell reports it
@@ -58,8 +58,8 @@ def run(args: argparse.Namespace) -> int:
     from hil.bus.channel import bench_channel, resolve
     from hil.bus.open import open_bus
     from hil.log.read import read_log
-    from hil.process import StopSignal
     from hil.rt.clock import WallClock
+    from hil.rt.process import StopSignal
     from hil.rt.realtime import request_timer_slack
 
     stop = StopSignal()

@@ -12,7 +12,7 @@ from hil.cli.options import add_json
 from hil.errors import BrakebenchError
 
 if TYPE_CHECKING:
-    from hil.reproduce.study import Row
+    from hil.validation.reproduce.study import Row
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -44,9 +44,9 @@ def run(args: argparse.Namespace) -> int:
     """Drive, print, draw."""
     if args.seeds < 1:
         raise BrakebenchError(f"--seeds: expected at least 1, got {args.seeds}")
-    from hil.reproduce.identification import identification_rows, shipped_study
-    from hil.reproduce.store import Store
-    from hil.reproduce.study import conditions_of, measure
+    from hil.validation.reproduce.identification import identification_rows, shipped_study
+    from hil.validation.reproduce.store import Store
+    from hil.validation.reproduce.study import conditions_of, measure
 
     def say(line: str) -> None:
         print(line, file=sys.stderr, flush=True)
@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({"rows": [asdict(row) for row in rows]}, indent=2, allow_nan=False))
     else:
-        from hil.reproduce.summary import build_report, table_lines
+        from hil.validation.reproduce.summary import build_report, table_lines
 
         print("\n".join([*table_lines(rows), build_report(rows, {}).reason]))
     return 0
@@ -71,8 +71,8 @@ def run(args: argparse.Namespace) -> int:
 def _write(out: Path, rows: "list[Row]") -> None:
     from hil.report.figure import write_figure
     from hil.report.html import write_html
-    from hil.reproduce.figures import figures
-    from hil.reproduce.summary import build_report
+    from hil.validation.reproduce.figures import figures
+    from hil.validation.reproduce.summary import build_report
 
     try:
         out.mkdir(parents=True, exist_ok=True)

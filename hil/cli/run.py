@@ -34,15 +34,15 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Run, measure, report."""
+    from hil.bench.run import run_scenario
     from hil.errors import BrakebenchError
-    from hil.run import run_scenario
 
     if args.virtual and (args.without or args.realtime or args.bus != "auto"):
         raise BrakebenchError("--virtual has no bus and no processes: leave out --bus, --without and --realtime")
     scenario, out = args.scenario, args.out
     if args.extend is not None:
+        from hil.bench.run import new_folder
         from hil.diagnosis.result.extended_scenario import extended_scenario
-        from hil.run import new_folder
 
         folder = Path(out) if out else new_folder(Path(scenario).stem)
         folder.mkdir(parents=True, exist_ok=True)

@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
 
 def listed() -> list[dict[str, Any]]:
     """Name, title, longest duration, what it expects, and file of each scenario."""
-    from hil.scenario import load_scenario, scenario_names
+    from hil.scenario.scenario import load_scenario, scenario_names
 
     rows = []
     for scenario in map(load_scenario, scenario_names()):

@@ -20,11 +20,11 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Compute, print, draw."""
-    from hil.scenario import load_scenario
-    from hil.sensitivities import SHOWN, alike, as_json, recorded, signatures
-    from hil.verify.car import paper_car
-    from plant.effects.manoeuvres import MANOEUVRES, drive
-    from plant.effects.signals import NAMES
+    from hil.scenario.scenario import load_scenario
+    from hil.validation.sensitivities import SHOWN, alike, as_json, recorded, signatures
+    from hil.validation.verify.car import paper_car
+    from plant.open_loop_manoeuvres import MANOEUVRES, drive
+    from plant.signals import NAMES
 
     if args.scenario in MANOEUVRES:
         show = MANOEUVRES[args.scenario]
@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
         name, title, plan = scenario.name, scenario.title, recorded(scenario)
     found = signatures(plan)
     if args.out is not None:
-        from hil.sensitivities_figure import draw
+        from hil.validation.doc_pages.sensitivities_figure import draw
 
         args.out.mkdir(parents=True, exist_ok=True)
         draw(title, found, args.out / f"sensitivities_{name}.png")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.cli.options import add_json, add_seed
-from hil.trials import FAMILIES
+from hil.validation.blind_trials import FAMILIES
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -47,7 +47,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--apart",
         type=Path,
         metavar="FILE",
-        help="instead: measure how far apart (d') the hidden car holds all effects into FILE",
+        help="instead: measure how far apart (d') the reference car holds all effects into FILE",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("trials"), metavar="DIR", help="cases, table and figure (default: trials)"
@@ -64,20 +64,20 @@ def _positive(text: str) -> int:
 
 def run(args: argparse.Namespace) -> int:
     """Run the trials and print the table."""
-    from hil.trials.confusion import draw
-    from hil.trials.run import run_family
-    from hil.trials.score import table_of
+    from hil.validation.blind_trials.confusion import draw
+    from hil.validation.blind_trials.run import run_family
+    from hil.validation.blind_trials.score import table_of
 
     if args.own_error is not None:
-        from hil.trials.own_error import as_toml, measure, tables
+        from hil.validation.blind_trials.discrepancy_table import as_toml, measure, tables
 
         return _measured(
             args.own_error, lambda: as_toml(tables(*measure(args.count, args.seed, _say)), args.count, args.seed)
         )
     if args.apart is not None:
-        from hil.trials import apart
+        from hil.validation.blind_trials import separability
 
-        return _measured(args.apart, lambda: apart.as_toml(apart.measure(args.seed, _say), args.seed))
+        return _measured(args.apart, lambda: separability.as_toml(separability.measure(args.seed, _say), args.seed))
     families = FAMILIES if args.family is None else (args.family,)
     scored: dict[str, Any] = {}
     singles: dict[tuple[int, float], Any] = {}
@@ -97,9 +97,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _measured(path: Path, text: Callable[[], str]) -> int:
     """Write what takes long to measure; a path that cannot be written is refused before."""
-    from hil.log.whole import written_whole
+    from hil.log.atomic_write import atomic_write
 
-    with written_whole(path, overwrite=True) as part:
+    with atomic_write(path, overwrite=True) as part:
         part.touch()
         part.write_text(text(), encoding="utf-8")
     return 0

@@ -17,6 +17,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Verify; 1 when a number is beyond its limit."""
-    from hil.verify.plant import main
+    from hil.validation.verify.plant import main
 
     return main(args)

@@ -1,4 +1,4 @@
-"""`explain`: measured logs in, an answer out. The library call behind ``brakebench explain``."""
+"""`explain`: takes measured logs and a vehicle set, gives the answer. The call behind ``brakebench explain``."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -16,13 +16,13 @@ from hil.diagnosis.data.log import Log
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.data.read import from_frame, read_logs
 from hil.diagnosis.data.straight_line import is_straight_line
-from hil.diagnosis.detection.result import Progress, Settings
+from hil.diagnosis.detection.result import Diagnosis, Progress, Settings
 from hil.diagnosis.detection.stepwise import diagnose
 from hil.diagnosis.result.answer import Answer, answer
 from hil.diagnosis.result.cross_validation import held_out_error
 from hil.diagnosis.result.residual_patterns import residual_patterns
 from hil.diagnosis.sensor_consistency.check import Consistency, check, why_not_simulatable
-from hil.diagnosis.simulation.parameter_set import nominal
+from hil.diagnosis.simulation.parameter_set import ParameterSet, nominal
 from hil.diagnosis.vehicle.extension_file import load_extension, write_extension
 from hil.diagnosis.vehicle.load import load_vehicle
 from hil.diagnosis.vehicle.spec import Vehicle
@@ -31,57 +31,64 @@ from hil.diagnosis.vehicle.spec import Vehicle
 def explain(
     logs: Any, vehicle: Path | str | Mapping[str, Any] | None = None, *, channel_map: Path | None = None,
     database: Path | None = None, about: Path | None = None, extend: Path | None = None, out: Path | None = None,
-    settings: Settings | None = None, say: Progress | None = None,
+    settings: Settings | None = None, progress: Progress | None = None,
 ) -> Answer | Consistency:  # fmt: skip
-    """Explain what measured data have and the simulation has not.
+    """Find what the simulation gets wrong in measured data, name its cause, extend the model and measure the gain.
 
-    Where no force was measured, or none that pulls the car, the sensors are compared with the car's own motion
-    (`hil.diagnosis.sensor_consistency`) instead of replaying it; the remarks say so.
+    Where no force was measured, or none that propels the car, no simulation is possible: the sensors are compared with
+    the car's own motion (`hil.diagnosis.sensor_consistency`); the remarks say so.
 
     Parameters
     ----------
     logs : a data frame (or mapping of columns) in the canonical table, a path, or a list of either.
-    vehicle : flat vehicle set as file or mapping; None is the shipped car.
-    channel_map, database, about : another car's channels, its DBC, and ``logs.toml``.
-    extend : extension file to begin with.
-    out : folder for the extension file; none is written without.
-    settings, say : what to switch off (for tests), and where to tell the progress.
+    vehicle : flat vehicle set as a file or mapping; None is the shipped car.
+    channel_map, database, about : another car's channel map, its DBC, and ``logs.toml``.
+    extend : extension file whose model is the starting point.
+    out : folder for the extension file; without it none is written.
+    settings : parts to switch off, for tests.  progress : called with one line of text a step.
 
     Raises
     ------
     hil.diagnosis.data.log.UnusableError
-        Data or files that nothing can be concluded from: the message says why.
+        Data or files that permit no conclusion: the message says why.
     """
+    report = progress or (lambda _: None)
+    folder = None if out is None else Path(out)
     car = load_vehicle(shipped(Path(vehicle), "vehicle") if isinstance(vehicle, str | Path) else vehicle)
     read = with_both_axles(_logs(logs, car, channel_map, database, about))
-    why = why_not_simulatable(read, float(car.parameters.wheel.rolling_radius_m))
-    if why:
-        return check(read, car, why, extend, out, say or (lambda _: None))
-    car = car.without_lateral_dynamics() if is_straight_line(read) else car
-    car = car.with_motor_limits_from(read)
-    case = prepare(read, float(car.parameters.wheel.rolling_radius_m), car.unstated)
-    handed_in = nominal(car)
-    base = handed_in if extend is None else load_extension(Path(extend)).applied(handed_in)
-    with threadpool_limits(1, "blas"):  # replays fill the processors; linear algebra beside them only waits
-        found = diagnose(case, car, base, settings, say)
-        (say or (lambda _: None))("measuring the gain on held-out manoeuvres")
-        gained, missed = held_out_error(found), residual_patterns(found)
-    written = None
-    if out is not None:
-        Path(out).mkdir(parents=True, exist_ok=True)
-        written = str(Path(out) / "extension.toml")
-        names = ", ".join(term.candidate.name for term in found.final.terms) or "no effect"
-        fitter, final = found.fitter, found.final
-        causes = fitter.parameter_set(np.zeros_like(final.z), final.terms).theta  # zeros of sensors are of these logs
-        extended = replace(fitter.parameter_set(final.z, final.terms), theta=causes)
-        write_extension(Path(written), handed_in, extended, f"Taught by {len(read)} logs: {names}")
-    read_so = (f"{drive.log.name}: {text}" for drive in case.recordings for text in drive.log.remarks)
-    remarks = [*car.remarks, *read_so, *found.remarks]
-    return answer(found, gained, missed, written, remarks, None if out is None else Path(out))
+    radius_m = float(car.parameters.wheel.rolling_radius_m)
+    if why := why_not_simulatable(read, radius_m):
+        return check(read, car, why, extend, folder, report)
+    car = (car.without_lateral_dynamics() if is_straight_line(read) else car).with_motor_limits_from(read)
+    dataset = prepare(read, radius_m, car.unstated)
+    base = nominal(car) if extend is None else load_extension(Path(extend)).applied(nominal(car))
+    with threadpool_limits(1, "blas"):  # simulations fill the processors; linear algebra beside them only waits
+        diagnosis = diagnose(dataset, car, base, settings, report)
+        report("held-out error by cross-validation")
+        errors, patterns = held_out_error(diagnosis), residual_patterns(diagnosis)
+    extension = None if folder is None else _write_extension(diagnosis, nominal(car), folder)
+    of_logs = (f"{one.log.name}: {text}" for one in dataset.recordings for text in one.log.remarks)
+    remarks = [*car.remarks, *of_logs, *diagnosis.remarks]
+    return answer(diagnosis, errors, patterns, extension, remarks, folder)
+
+
+def _write_extension(diagnosis: Diagnosis, without: ParameterSet, folder: Path) -> str:
+    """Write the causes and the estimated nuisances as ``extension.toml``; its path.
+
+    Sensor zeros belong to these logs alone and are left out.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "extension.toml"
+    fitter, final = diagnosis.fitter, diagnosis.final
+    causes = fitter.parameter_set(np.zeros_like(final.z), final.terms).theta
+    extended = replace(fitter.parameter_set(final.z, final.terms), theta=causes)
+    names = ", ".join(term.candidate.name for term in final.terms) or "no effect"
+    write_extension(path, without, extended, f"Estimated from {len(diagnosis.dataset.recordings)} logs: {names}")
+    return str(path)
 
 
 def shipped(path: Path, kind: str) -> Path:
-    """A file, or by the name of a car the one that comes with brakebench; ``kind`` is ``map`` or ``vehicle``."""
+    """A file, or, by the name of a car, the file that comes with brakebench; ``kind`` is ``map`` or ``vehicle``."""
     ours = Path(str(resources.files("hil.diagnosis") / "cars" / f"{path.name}.{kind}.toml"))
     return ours if not path.suffix and not path.exists() and ours.exists() else path
 

@@ -11,8 +11,8 @@ from hil.bus.channel import claim_channel
 from hil.bus.open import open_bus
 from hil.bus.rendezvous import base_directory
 from hil.doctor.line import Line, Status
-from hil.process import output_of
 from hil.rt.clock import monotonic_ns
+from hil.rt.process import output_of
 
 _ROUNDS = 200
 

@@ -11,7 +11,7 @@ from typing import Any
 from dbc.contract import contract
 from dbc.frame import BusName
 from hil.doctor.line import Line, Status, as_root, read
-from hil.process import output_of
+from hil.rt.process import output_of
 
 _ARPHRD_CAN = 280  # linux/if_arp.h
 _IFF_UP = 1  # linux/if.h

@@ -1,4 +1,4 @@
-"""Identification from measured records: the paper's pad friction model from a brake dynamometer (Figures 3 to 5).
+"""Takes records of a brake dynamometer and gives the paper's pad friction model (Figures 3 to 5), with intervals.
 
 `record` reads a dynamometer's CSV, `model` integrates equations (3) and (4), `fit` finds their five parameters,
 `uncertainty` says how well, `validation` predicts another record, `coverage` checks the intervals on records whose

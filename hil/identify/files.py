@@ -57,7 +57,7 @@ def coverage_json(rows: list[Covered]) -> dict[str, Any]:
 
 
 def pad_toml(study: Study, axle: int, parameters: FrictionBrakeParameters) -> str:
-    """Return the fit as the plant's pad table, which `hil.parameters.load_set` reads as `OstermeyerParameters`.
+    """Return the fit as the plant's pad table: `hil.scenario.parameters.load_set` reads it as `OstermeyerParameters`.
 
     The dynamometer had one axle's brake; gamma of the other goes with the inverse of its disc's heat capacity.
     """

@@ -148,7 +148,7 @@ def _last_stroke(pressure: Floats) -> slice:
 
 
 def _parameters(study: Study) -> Section:
-    numbers, tied = estimates(study.best), correlations(study.best)
+    numbers, correlation = estimates(study.best), correlations(study.best)
     repeats = estimates(study.repeat) if study.repeat else numbers
     again = (f"on {study.validation.record.name}",) if study.validation else ()
     heads = ("", "value", "95 % from", "to", "± %", "told", *again)
@@ -164,7 +164,7 @@ def _parameters(study: Study) -> Section:
             Table(
                 "Correlation of the logarithms",
                 ("", *symbols),
-                tuple((symbol, *(f"{c:+.3f}" for c in row)) for symbol, row in zip(symbols, tied, strict=True)),
+                tuple((symbol, *(f"{c:+.3f}" for c in row)) for symbol, row in zip(symbols, correlation, strict=True)),
             ),
             _forms(study),
         ),

@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 WELL, POOR = 0.1, 0.25
 """Half of the 95 % interval over the value: up to which a number is well, above which it is poorly determined."""
-TIED = 0.9
+STRONG_CORRELATION = 0.9
 """Two parameters with a larger correlation cannot be told apart by the record."""
 
 _NORMAL_95 = 1.959964
@@ -95,17 +95,17 @@ def correlations(fit: Fit) -> Floats:
 
 def findings(fit: Fit) -> tuple[str, ...]:
     """Say in words what the record does not tell."""
-    numbers, tied = estimates(fit), correlations(fit)
+    numbers, correlation = estimates(fit), correlations(fit)
     said = [
         f"{n.symbol} is poorly determined: 95 % interval {n.low:.3g} to {n.high:.3g} {n.unit}"
         for n in numbers
         if n.told == "poorly"
     ]
     said += [
-        f"{numbers[i].symbol} and {numbers[j].symbol} are hardly told apart: correlation {tied[i, j]:+.3f}"
+        f"{numbers[i].symbol} and {numbers[j].symbol} are hardly told apart: correlation {correlation[i, j]:+.3f}"
         for i in range(len(numbers))
         for j in range(i)
-        if abs(tied[i, j]) > TIED
+        if abs(correlation[i, j]) > STRONG_CORRELATION
     ]
     said += [f"{name} ended at the edge of its box: its interval means nothing" for name in fit.at_edge]
     return tuple(said)

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from hil.log.atomic_write import atomic_write
 from hil.log.frames import FrameFlag, FrameTable, LogError, Recording
 from hil.log.read import read_log
-from hil.log.whole import written_whole
 from hil.log.write import FORMATS, NAMELESS, channel_numbers, write_log
 
 TOLERANCE_NS = 1000  # text formats keep microseconds
@@ -37,7 +37,7 @@ def convert(source: Path, target: Path, overwrite: bool = False) -> Conversion:
         raise LogError(target, f"unknown suffix {target.suffix!r}; known are {', '.join(FORMATS)}")
     recording = read_log(source)
     frames = recording.frames
-    with written_whole(target, overwrite) as temporary:
+    with atomic_write(target, overwrite) as temporary:
         write_log(frames, temporary)
         back = read_log(temporary)
         difference = _difference(frames, back, target.suffix.lower())

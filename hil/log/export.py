@@ -9,9 +9,9 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
+from hil.log.atomic_write import atomic_write
 from hil.log.decode import DecodedLog
 from hil.log.frames import LogError
-from hil.log.whole import written_whole
 
 SUFFIXES = (".parquet", ".csv")
 CELLS_PER_BATCH = 4_000_000
@@ -31,7 +31,7 @@ def export(log: DecodedLog, path: Path, overwrite: bool = True) -> None:
     if path.suffix not in SUFFIXES:
         raise LogError(path, f"signals are written as {' or '.join(SUFFIXES)}, got {path.suffix or 'no suffix'!r}")
     schema = _schema(log)
-    with written_whole(path, overwrite) as temporary:
+    with atomic_write(path, overwrite) as temporary:
         if path.suffix == ".parquet":
             with pa.parquet.ParquetWriter(temporary, schema, compression="zstd") as writer:
                 for batch in _batches(log, schema):

@@ -1,1 +1,1 @@
-"""One Report value and its printers."""
+"""Takes one `Report` value and gives it as a page, a figure or text."""

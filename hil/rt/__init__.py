@@ -1,1 +1,1 @@
-"""Time: clocks and the fixed-rate loop."""
+"""Takes nodes and a period and gives them time: clocks, the fixed-rate loop, virtual time, processes."""

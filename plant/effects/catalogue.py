@@ -1,65 +1,60 @@
 """The built-in effects, in the order of the catalogue."""
 
-from plant.effects import (
+from plant.effects.chassis import cog_height, mass_offset, pitch_dive, rotating_inertia, steer_lateral, sus_compliance
+from plant.effects.effect import Effect
+from plant.effects.hydraulics import (
     accumulator,
-    aero_lift,
     air_in_line,
-    aquaplaning,
-    battery_soc,
-    bedding,
     blend_sync,
-    caliper_asymmetry,
-    cog_height,
-    cogging,
-    current_torque,
-    dtv_judder,
     ehb_bandwidth,
     ehb_dead_time,
     ehb_deadband,
     ehb_rate_limit,
     fluid_temp,
-    glazing,
-    headwind,
-    hot_spot,
+    pressure_location,
+    valve_leak,
+)
+from plant.effects.motors import (
+    battery_soc,
+    cogging,
+    current_torque,
     iwm_derating,
     iwm_field,
     iwm_gain,
-    load_sensitivity,
-    low_speed,
-    mass_offset,
     motor_tau,
+    regen_fadeout,
+)
+from plant.effects.pads import (
+    bedding,
+    caliper_asymmetry,
+    dtv_judder,
+    glazing,
+    hot_spot,
     mu_nv_dynamics,
     mu_pressure,
-    mu_road,
     mu_speed,
     mu_warmup,
     pad_mu_gain,
     pad_temp_fade,
-    pitch_dive,
     pressure_hysteresis,
-    pressure_location,
-    regen_fadeout,
     residual_drag,
-    road_grade,
-    road_roughness,
-    rolling_resistance,
-    rotating_inertia,
-    slip_stiffness,
-    split_mu,
-    steer_lateral,
     stuck_corner,
-    sus_compliance,
     thermal_growth,
     threshold,
+    water,
+)
+from plant.effects.road_air import aero_lift, aquaplaning, headwind, mu_road, road_grade, road_roughness, split_mu
+from plant.effects.sensing.catalogue import SENSING
+from plant.effects.tyres import (
+    load_sensitivity,
+    low_speed,
+    rolling_resistance,
+    slip_stiffness,
     tyre_pressure_loss,
     tyre_radius,
     tyre_relaxation,
     tyre_temperature,
-    valve_leak,
-    water,
 )
-from plant.effects.effect import Effect
-from plant.effects.sensing.catalogue import SENSING
 
 BUILT_IN: tuple[Effect, ...] = (
     road_grade.EFFECT,

@@ -5,11 +5,16 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from plant.excitation import Excitation
 from plant.layout import constants
 
 NODES = ("wheel", "imu", "pressure", "motor", "driver")
 GROUND = "ground"
 """What measures the speed over ground: a logger's own receiver or optical sensor, on no vehicle bus."""
+NODE_LATENCY = "node_latency_s"
+"""By how much a node's frames come later than the wheel speeds': a number of every node, of no parameter set."""
+USUAL_STEP = 0.05
+"""Step of a finite difference, as a share of the typical size: many effects show long before that is reached."""
 
 
 class Scope(StrEnum):
@@ -43,6 +48,12 @@ class Parameter:
     typical : size met on real cars; the sign is the more frequent one.
     neutral : where the effect is absent. All strengths are 0 there.
     shape : True for a number that says how, not how much: it has one value, and no meaning while the strengths are 0.
+    difference_step : step of a finite difference by it, as a share of ``typical``; larger where a small one changes
+        nothing or is lost in noise, or where a large one would have to be followed in smaller steps of time.
+    sign_along_road : whether it changes sign when the same stretch of road is driven back.
+    part_to_part : standard deviation from one part of a kind to the next, where it is known; 0 where it is not.
+    aliases : numbers of the vehicle that are the same quantity, names of ``PARAMETER`` or `NODE_LATENCY`: it changes
+        them and nothing else, so that no data tell the two apart.
     """
 
     name: str
@@ -52,6 +63,16 @@ class Parameter:
     typical: float
     neutral: float = 0.0
     shape: bool = False
+    difference_step: float = USUAL_STEP
+    sign_along_road: bool = False
+    part_to_part: float = 0.0
+    aliases: tuple[str, ...] = ()
+
+    @property
+    def step(self) -> float:
+        """Step of a finite difference from the neutral value, in ``unit``, on the side where it is more often."""
+        share = self.difference_step
+        return self.typical * share if self.typical else 0.3 * share * self.high
 
     def size(self, scope: Scope) -> int:
         """How many values it has."""
@@ -71,16 +92,22 @@ class Effect:
     ----------
     name : field name, also in scenarios and reports.  row : of the effect catalogue.
     title : one line for people.  equation : in words of mathematics.
-    joints : where it acts.  parameters, scope : its numbers and what has values of its own.
+    injection_points : where it acts (`plant.injection_points`).
+    parameters, scope : its numbers and what has values of its own.
+    acts_when : what must be going on for it to change the motion, or an input measured on the way: one for all members,
+        or one for each.
+    baseline_section : section of the parameter set that states what it departs from: where a car's section is not
+        known, nothing can be said of the effect. Empty where it shows without.
+    free_phase : whether its pattern may begin at any angle of the wheel, and turn with a log of its own.
     source : where equation and sizes are from.  signature : what it leaves in the residuals.
     confounded_with : what looks alike in some manoeuvres.  twins : what looks alike in every manoeuvre of this model.
-    manoeuvre : which of `plant.effects.manoeuvres` shows it.
+    manoeuvre : which of `plant.open_loop_manoeuvres` shows it.
     dissipates : whether it may only take energy out of the motion.
     states : extra states it uses.
     static : ``(q, k, y)``, from its numbers alone.  dynamic : ``(x, u, q, k, y)``, from the state.
     rates : ``(x, u, q, k, y)``, of its extra states.  Its numbers begin at ``k`` in ``q``; parameters are changed in
-        ``q``, joints in ``y``.
-    sense : of a sensing effect, which acts on measured arrays and not in the model (`plant.effects.sensing.chain`).
+        ``q``, injection points in ``y``.
+    sense : of a sensing effect, which acts on measured arrays and not in the model (`plant.injection.sensing_chain`).
     undo : its inverse on arrays, where it has one.
     nodes : of `NODES`, or `GROUND`, whose signals a sensing effect changes.
     """
@@ -89,12 +116,15 @@ class Effect:
     row: int
     title: str
     equation: str
-    joints: tuple[str, ...]
+    injection_points: tuple[str, ...]
     scope: Scope
     parameters: tuple[Parameter, ...]
     source: str
     signature: str
     manoeuvre: str
+    acts_when: Excitation | tuple[Excitation, ...] = Excitation.ALWAYS
+    baseline_section: str = ""
+    free_phase: bool = False
     confounded_with: tuple[str, ...] = ()
     twins: tuple[str, ...] = ()
     dissipates: bool = False
@@ -107,9 +137,20 @@ class Effect:
     nodes: tuple[str, ...] = ()
 
     @property
+    def subsystem(self) -> str:
+        """Part of the car, the package of `plant.effects` it is declared in; empty for an effect from outside."""
+        first = next(f for f in (self.sense, self.static, self.dynamic, self.rates) if f is not None)
+        package = str(first.__module__).split(".")
+        return package[2] if package[:2] == ["plant", "effects"] else ""
+
+    @property
     def sensing(self) -> bool:
         """Whether it acts on what is measured and not in the model."""
         return self.sense is not None
+
+    def excitation(self, member: int) -> Excitation:
+        """What must be going on for its value at one member of its scope to matter."""
+        return self.acts_when[member] if isinstance(self.acts_when, tuple) else self.acts_when
 
     def parameter(self, name: str) -> Parameter:
         """One parameter by name; KeyError where there is none."""

@@ -1,14 +1,17 @@
-# mypy: disable-error-code=no-any-return
-# (elements of a vector are Any to the type checker)
 """Quantities that several effects look at."""
 
+# mypy: disable-error-code=no-any-return
+# (elements of a vector are Any to the type checker)
+
 from plant.compiled import equation
+from plant.hydraulics import brake_gain
 from plant.layout import Vector
 from plant.vectors import P, X, Y
 
 APPLIED_PA = 1e5
 FORGET_S = 0.01
 REFERENCE_K = 293.15
+NOMINAL_PAD_FRICTION = 0.38
 
 
 @equation
@@ -43,6 +46,7 @@ def heat_rates(x: Vector, y: Vector) -> None:
 
 @equation
 def brake_gain_nm_pa(i: int, q: Vector) -> float:
-    """Nominal friction torque per pressure at a pad friction of 0.38, N m/Pa: 2 mu eta A r."""
+    """Friction torque per pressure of a wheel at the nominal pad friction, N m/Pa (`plant.hydraulics.brake_gain`)."""
     area = per_axle(i, q, P.friction_brake_piston_area_m2)
-    return 0.76 * q[P.friction_brake_efficiency] * area * per_axle(i, q, P.friction_brake_effective_radius_m)
+    radius = per_axle(i, q, P.friction_brake_effective_radius_m)
+    return brake_gain(NOMINAL_PAD_FRICTION, area, radius, q[P.friction_brake_efficiency])

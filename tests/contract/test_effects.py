@@ -12,16 +12,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from hil.parameters import load_set
+from hil.scenario.parameters import load_set
 from plant.effects.catalogue import BUILT_IN
-from plant.effects.manoeuvres import MANOEUVRES, drive
-from plant.effects.places import JOINTS
-from plant.effects.signals import noise, simulate
-from plant.effects.states import EXTRA_STATES
-from plant.effects.theta import THETA
+from plant.extra_states import EXTRA_STATES
+from plant.injection.theta import THETA
+from plant.injection_points import INJECTION_POINTS
 from plant.integrate import RUNGE_KUTTA_4, SEMI_IMPLICIT
-from plant.model import NEUTRAL, replay
+from plant.model import NEUTRAL, Scene, replay
+from plant.open_loop_manoeuvres import MANOEUVRES, drive
 from plant.parameters import PlantParameters
+from plant.signals import noise, simulate
 from plant.vectors import BASE_RATES, OUTPUTS, PARAMETER
 
 NAMES = [effect.name for effect in BUILT_IN]
@@ -116,10 +116,10 @@ def found(name, plan, data, sigma, *, noisy=False):
 def test_catalogue_is_complete_and_consistent():
     rows = [effect.row for effect in BUILT_IN]
     assert sorted(rows) == sorted({*range(1, 72), 76} - {67, 68})  # jitter and lost frames are the port's
-    joints = {*JOINTS, *PARAMETER.sizes}
+    points = {*INJECTION_POINTS, *PARAMETER.sizes}
     for effect in BUILT_IN:
         assert effect.manoeuvre in MANOEUVRES, effect.name
-        assert effect.sensing or set(effect.joints) <= joints, effect.name
+        assert effect.sensing or set(effect.injection_points) <= points, effect.name
         assert set(effect.states) <= set(EXTRA_STATES), effect.name
         assert {*effect.twins} <= {*NAMES}, effect.name
         assert all(effect.name in THETA.effect(twin).twins for twin in effect.twins), effect.name
@@ -220,7 +220,7 @@ def test_dissipative_effects_never_push(name):
         theta = THETA.typical(name)
         for parameter, value in zip(THETA.effect(name).strengths, corner, strict=True):
             theta[THETA.slice(name, parameter.name)] = value
-        table = replay(plan.start, plan.rows, plan.parameters, columns, theta=theta)[0]
+        table = replay(plan.start, plan.rows, plan.parameters, columns, Scene(theta=theta))[0]
         friction, rolling, omega = table[:, :4], table[:, 4:8], table[:, 8:]
         turning = np.abs(omega) > 1.0
         assert (friction * omega)[turning].max() <= 0.0

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from hil.result import Signals
-from hil.scenario import load_scenario
-from hil.virtual import simulate
+from hil.bench.result import Signals
+from hil.bench.virtual import simulate
+from hil.scenario.scenario import load_scenario
 
 HERE = Path(__file__).parent
 STORED = HERE / "golden.npz"

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from hil.diagnosis.detection.result import Settings
-from hil.hide.case import Hidden, make_case
-from hil.hide.cases import SEPARABLE, draw
-from hil.trials.reading import in_set
-from hil.trials.run import run_case
+from hil.validation.blind_trials.reading import in_set
+from hil.validation.blind_trials.run import run_case
+from hil.validation.reference_car.case import Hidden, make_case
+from hil.validation.reference_car.cases import SEPARABLE, draw
 
 SEED = 7
 pytestmark = [pytest.mark.slow, pytest.mark.long, pytest.mark.timeout(1200)]
@@ -141,7 +141,7 @@ def test_a_cause_that_begins_in_the_middle_is_named(index: int, effect: str) -> 
 def test_rolling_resistance_of_an_axle_is_told_or_tied_with_what_acts_alike() -> None:
     """A drag of the axle was told alone, by a beginning that cost nothing.
 
-    Which is told first is not asked: they cannot be told apart (`hil.trials.separable`).
+    Which is told first is not asked: they cannot be told apart (`hil.validation.blind_trials.separable`).
     """
     assert in_set(run_case(draw("single", SINGLES.index("rolling_resistance"), 68, 15.0), 68, 15.0))
 
@@ -182,7 +182,7 @@ def test_without_the_noise_model_nothing_hidden_raises_an_alarm() -> None:
 def test_the_sealed_answer_is_never_opened(tmp_path: Path) -> None:
     """With the answer gone the verdict is the same."""
     from hil.diagnosis.explain import explain
-    from hil.hide.files import sealed_folder, write
+    from hil.validation.reference_car.files import sealed_folder, write
 
     write(draw("null", 0, SEED), tmp_path / "logs")
     for file in sealed_folder(tmp_path / "logs").iterdir():

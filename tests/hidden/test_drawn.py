@@ -7,11 +7,11 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from hil.hide.case import Case
-from hil.hide.cases import SEPARABLE, draw
-from hil.trials.run import run_case
-from hil.trials.separable import told_apart
-from hil.trials.sources import SOURCES, STUDIED
+from hil.validation.blind_trials.run import run_case
+from hil.validation.blind_trials.separable import effect_separable
+from hil.validation.blind_trials.sources import SOURCES, STUDIED
+from hil.validation.reference_car.case import Case
+from hil.validation.reference_car.cases import SEPARABLE, draw
 from plant.compiled import digest
 
 COUNT, MOST_MISSES, MOST_ALARMS = 12, 2, 1
@@ -38,7 +38,7 @@ def _singles(seed: int) -> Iterator[Case]:
     for index in np.random.default_rng(seed).permutation(len(SEPARABLE)):
         case = draw("single", int(index), seed, SNR)
         (hidden,) = case.hidden
-        if case.reached and told_apart(hidden.effect, hidden.wheel, case.noise_level, SNR):
+        if case.reached and effect_separable(hidden.effect, hidden.wheel, case.noise_level, SNR):
             yield case
 
 

@@ -12,7 +12,7 @@ from hil.diagnosis.data.log import make_log
 from hil.diagnosis.detection.result import Settings
 from hil.diagnosis.explain import explain
 from hil.diagnosis.vehicle.extension_file import load_extension
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 
 def _plain(speed_mps: float, pressure_pa: np.ndarray) -> np.ndarray:

@@ -28,7 +28,7 @@ from dbc.bench_messages import ManoeuvreState, TruthMotion
 from dbc.exchange import Receiver
 from ecu.node import EcuNode
 from hil.rt.lockstep import Member, lockstep
-from hil.scenario import load_scenario
+from hil.scenario.scenario import load_scenario
 from plant.node import PlantNode
 scenario = load_scenario("stop72")
 plant, ecu = PlantNode(scenario.plant, scenario.manoeuvre, 1), EcuNode(scenario.ecu)

@@ -11,7 +11,7 @@ import pytest
 from documented import MOTOR_LOSS
 from processes import RUN_LIMIT_S, alive, children_of, heed_interrupts, wait_until
 
-from hil.result import Signals
+from hil.bench.result import Signals
 
 NO_TAKEOVER = """
 import ecu.law.step  # every motor is taken for able, whatever it reports

@@ -12,10 +12,10 @@ from dbc.contract import spec_of
 from dbc.frame import BusName, Frame
 from dbc.messages import BrakeMode, BrakePedal, BrakeStatus, EhbDemandFront
 from ecu.node import EcuNode
+from hil.bench.node_process import ECU, NODE_PERIOD_NS, PLANT
 from hil.bus.open import open_bus
-from hil.node_process import ECU, NODE_PERIOD_NS, PLANT
 from hil.rt.lockstep import Member, lockstep
-from hil.scenario import load_scenario
+from hil.scenario.scenario import load_scenario
 from plant.node import PlantNode
 
 LOG_NS = 2_500_000_000

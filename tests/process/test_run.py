@@ -12,8 +12,8 @@ import pytest
 from processes import alive, children_of, result_of, wait_until
 
 from dbc.messages import BrakeMode, EhbState
+from hil.bench.result import Signals
 from hil.bus.rendezvous import base_directory
-from hil.result import Signals
 
 FACTS = {
     "stop_distance_m", "stop_time_s", "mean_decel_mps2", "demanded_decel_mps2", "energy_recuperated_j",

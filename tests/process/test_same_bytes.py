@@ -10,8 +10,8 @@ from dbc.bench_messages import EcuReception, EcuTiming
 from dbc.contract import spec_of
 from dbc.frame import BusName, Frame
 from ecu.node import SOURCES, EcuNode
-from hil.node_process import NODE_PERIOD_NS
-from hil.scenario import load_scenario
+from hil.bench.node_process import NODE_PERIOD_NS
+from hil.scenario.scenario import load_scenario
 
 LINE = re.compile(r"\(\d+\.\d+\) (\w+) ([0-9A-F]+)#([0-9A-F]*)")
 NEVER = 15

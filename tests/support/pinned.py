@@ -13,7 +13,7 @@ import outsider
 import plant_logs
 
 from hil.diagnosis.explain import explain
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 HERE = Path(__file__).parent.parent / "pinned"
 RECORDS = HERE / "records"

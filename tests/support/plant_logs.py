@@ -3,7 +3,7 @@
 import numpy as np
 
 from hil.diagnosis.vehicle.load import paper_car
-from plant.model import initial_state, pack, replay
+from plant.model import Scene, initial_state, pack, replay
 from plant.vectors import INPUT
 
 WHEELS = ("fl", "fr", "rl", "rr")
@@ -27,7 +27,7 @@ def log(theta: np.ndarray, seed: int, k: int, seconds: float = 14.0) -> dict[str
     groups = ("state.wheel_speed_rad_s", "state.pressure_pa", "state.motor_torque_nm")
     names = [f"{g}_{w}" for g in groups for w in WHEELS] + ["state.imu_longitudinal_mps2", "state.speed_mps"]
     x = initial_state(parameters, SPEED_MPS, 350.0, 0.7)
-    (table,) = replay(x, u, pack(parameters), names, theta=theta)
+    (table,) = replay(x, u, pack(parameters), names, Scene(theta=theta))
     force = np.zeros(n)
     for i in range(1, n):
         force[i] = 0.99 * force[i - 1] + 0.03 * np.sqrt(1.0 - 0.99**2) * rng.standard_normal()

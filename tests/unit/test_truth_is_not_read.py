@@ -6,7 +6,7 @@ from dbc.contract import contract
 from dbc.frame import BusName
 from ecu.node import EcuNode
 from hil.rt.lockstep import Member, lockstep
-from hil.scenario import load_scenario
+from hil.scenario.scenario import load_scenario
 from plant.node import PlantNode
 
 TRUTH = {spec.can_id for spec in contract(BusName.BENCH).by_id.values() if spec.sender == "PLANT"}

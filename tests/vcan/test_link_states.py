@@ -18,11 +18,11 @@ from dbc.contract import spec_of
 from dbc.frame import BusName, Frame, LinkEvent, LinkState
 from dbc.messages import BrakeMode, BrakeStatus, Fault, MotorDemandFront
 from ecu.node import EcuNode
+from hil.bench.result import Signals
+from hil.bench.result import link_events as recorded_link_events
 from hil.bus import Bus, claim_channel, open_bus
 from hil.bus.error_frame import CAN_ERR_BUSOFF, link_events
-from hil.result import Signals
-from hil.result import link_events as recorded_link_events
-from hil.scenario import load_scenario
+from hil.scenario.scenario import load_scenario
 from plant.node import PlantNode
 
 if TYPE_CHECKING:

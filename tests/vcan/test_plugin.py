@@ -15,7 +15,7 @@ from processes import RUN_LIMIT_S
 
 from dbc.contract import spec_of
 from dbc.messages import MotorDemandFront, MotorState, MotorStatusFront
-from hil.result import Signals
+from hil.bench.result import Signals
 
 if TYPE_CHECKING:
     from candump import Candump

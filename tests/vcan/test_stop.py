@@ -36,8 +36,8 @@ from dbc.messages import (
     MotorStatusFront,
     MotorStatusRear,
 )
+from hil.bench.result import Signals
 from hil.bus import open_bus
-from hil.result import Signals
 
 if TYPE_CHECKING:
     from candump import Candump, Line

@@ -1,4 +1,4 @@
-"""Joint filter: one extended Kalman filter over the car's motion, its tyres and its four pad frictions.
+"""Takes sensor values and gives speed, wheel torques and pad frictions: one extended Kalman filter over all of them.
 
 What the paper does in two stages (wheel torque, then pad friction) is one estimation problem: the wheel torque is
 T = T_motor - mu G (p - p0), and the accelerations of car and wheels tell what sum and which shares of T were true.

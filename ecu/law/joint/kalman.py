@@ -4,13 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.law.compiled import helper
+from ecu.law.gravity import GRAVITY_MPS2
 from ecu.law.joint.layout import (
     APPLIED_PA,
     AXLE,
     BIAS,
     COVARIANCE,
     FRICTION,
-    G0,
     GRADE,
     MASS,
     PRESSURE_LAG,
@@ -65,9 +65,9 @@ def predict(s: Vector, p: Vector, acceleration: float, uncertainty: float, dt: f
     c = COVARIANCE
     s[SPEED] = max(s[SPEED] + dt * acceleration, 0.0)
     for j in range(N):
-        s[c + SPEED * N + j] -= dt * (s[c + BIAS * N + j] + G0 * s[c + GRADE * N + j])
+        s[c + SPEED * N + j] -= dt * (s[c + BIAS * N + j] + GRAVITY_MPS2 * s[c + GRADE * N + j])
     for j in range(N):
-        s[c + j * N + SPEED] -= dt * (s[c + j * N + BIAS] + G0 * s[c + j * N + GRADE])
+        s[c + j * N + SPEED] -= dt * (s[c + j * N + BIAS] + GRAVITY_MPS2 * s[c + j * N + GRADE])
     s[c] += uncertainty**2 * dt * dt + 1e-8
     s[c + BIAS * N + BIAS] += p[Q_BIAS] * dt
     s[c + GRADE * N + GRADE] += p[Q_GRADE] * dt

@@ -35,5 +35,4 @@ P_LAG, P_WHEEL_LAG, P_PITCH_W, P_PITCH_D, P_ZERO_TIME, P_ZERO_LIMIT, P_SPEED_MIN
 START = 42  # variances: bias, grade, mass, stiffness, axle, radius, friction common, axle, single; nominal friction
 PARAMETERS = 52
 
-G0 = 9.80665
 APPLIED_PA = 1e5

@@ -4,12 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.law.compiled import helper
+from ecu.law.gravity import GRAVITY_MPS2
 from ecu.law.joint.kalman import correct
 from ecu.law.joint.layout import (
     AXLE,
     BIAS,
     FRICTION,
-    G0,
     GATE,
     GRADE,
     MASS,
@@ -62,9 +62,9 @@ def balance_forces(
     drive = not applied and abs(force) > MASS_FORCE_SHARE * mass and change < p[R_ACC]
     h = np.zeros(N)
     h[BIAS] = 1.0
-    h[GRADE] = turn * G0 / (mass + turn)
+    h[GRADE] = turn * GRAVITY_MPS2 / (mass + turn)
     if drive:
-        h[MASS] = -(predicted - s[BIAS] + G0 * p[P_ROLL]) * p[P_MASS] / (mass + turn)
+        h[MASS] = -(predicted - s[BIAS] + GRAVITY_MPS2 * p[P_ROLL]) * p[P_MASS] / (mass + turn)
     for i in range(4):
         gain = p[P_GAIN] if i < 2 else p[P_GAIN + 1]
         h[FRICTION + i] = -gain * s[PRESSURE_LAG + i] / p[P_ARM] / (mass + turn)
@@ -87,7 +87,7 @@ def compare_wheel_speed(
     """
     end = 1.0 if i < 2 else -1.0
     gain = p[P_GAIN] if i < 2 else p[P_GAIN + 1]
-    stiffness = load * (p[P_STIFF] + p[P_STIFF_SLOPE] * (load - 0.25 * p[P_MASS] * G0))
+    stiffness = load * (p[P_STIFF] + p[P_STIFF_SLOPE] * (load - 0.25 * p[P_MASS] * GRAVITY_MPS2))
     factor = s[STIFFNESS] + end * s[AXLE]
     force = wheel_force(s, p, i, load, acceleration)
     grip = force / (p[P_PEAK] * load)

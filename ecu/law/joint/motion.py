@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.law.compiled import helper
+from ecu.law.gravity import GRAVITY_MPS2
 from ecu.law.joint.layout import (
     AX,
     BIAS,
-    G0,
     GRADE,
     LAST_AX,
     LOAD_ACCELERATION,
@@ -81,7 +81,7 @@ def watch_accelerometer(s: Vector, z: Vector, p: Vector, dt: float) -> bool:
     s[REPEATED_S] += dt
     since = s[REPEATED_S] - s[LOOKED_S]
     if since > REPEAT_S:
-        told = (z[AX] - s[BIAS]) / (1.0 + G0 * p[P_DIVE]) - G0 * s[GRADE]
+        told = (z[AX] - s[BIAS]) / (1.0 + GRAVITY_MPS2 * p[P_DIVE]) - GRAVITY_MPS2 * s[GRADE]
         if abs((speed - s[SPEED_THEN]) / since - told) > CONTRADICTION_MPS2:
             s[STUCK] = 1.0
         s[LOOKED_S], s[SPEED_THEN] = s[REPEATED_S], speed
@@ -92,10 +92,10 @@ def watch_accelerometer(s: Vector, z: Vector, p: Vector, dt: float) -> bool:
 def level_acceleration(s: Vector, z: Vector, p: Vector, dt: float) -> float:
     """Measured longitudinal acceleration with the body's pitch taken out (the sensor pitches with it), m/s2."""
     w, d = p[P_PITCH_W], p[P_PITCH_D]
-    level = (z[AX] - s[BIAS]) / (1.0 + G0 * p[P_DIVE])
+    level = (z[AX] - s[BIAS]) / (1.0 + GRAVITY_MPS2 * p[P_DIVE])
     s[PITCH_RATE] += dt * (w * w * (-p[P_DIVE] * level - s[PITCH]) - 2.0 * d * w * s[PITCH_RATE])
     s[PITCH] += dt * s[PITCH_RATE]
-    ax = z[AX] + G0 * s[PITCH]
+    ax = z[AX] + GRAVITY_MPS2 * s[PITCH]
     s[LOAD_ACCELERATION] += min(dt / 0.05, 1.0) * (ax - s[BIAS] - s[LOAD_ACCELERATION])
     return float(ax)
 
@@ -108,8 +108,8 @@ def expected_acceleration(s: Vector, p: Vector, force: float, side_n: float) -> 
     """
     mass = p[P_MASS] * s[MASS]
     turn = 4.0 * p[P_INERTIA] / (p[P_RADIUS] * p[P_ARM])
-    resistance = 0.5 * p[P_DRAG] * s[SPEED] * s[SPEED] + mass * G0 * p[P_ROLL]
-    return float((force - resistance - side_n + turn * G0 * s[GRADE]) / (mass + turn))
+    resistance = 0.5 * p[P_DRAG] * s[SPEED] * s[SPEED] + mass * GRAVITY_MPS2 * p[P_ROLL]
+    return float((force - resistance - side_n + turn * GRAVITY_MPS2 * s[GRADE]) / (mass + turn))
 
 
 @helper
@@ -126,7 +126,7 @@ def wheel_states(
         arm_m = rear_m if axle == 0 else p[P_FRONT]
         left = 1.0 if i % 2 == 0 else -1.0
         share_y = arm_m / base * mass * ay * p[P_HEIGHT] / p[P_TRACK + axle]
-        load = 0.5 * mass * G0 * arm_m / base - (shift_x if axle == 0 else -shift_x) - left * share_y
+        load = 0.5 * mass * GRAVITY_MPS2 * arm_m / base - (shift_x if axle == 0 else -shift_x) - left * share_y
         loads[i] = max(load, 200.0)
         ground = s[SPEED] - yaw_rate * left * 0.5 * p[P_TRACK + axle]
         if axle == 0:
@@ -135,10 +135,10 @@ def wheel_states(
 
 
 @helper
-def stand(s: Vector, p: Vector) -> None:
+def apply_standstill(s: Vector, p: Vector) -> None:
     """The car stands: nothing to learn; a standing brake gives what holds the car, and no more than it can."""
     s[SPEED] = 0.0
-    holding = 0.25 * p[P_MASS] * s[MASS] * G0 * s[GRADE] * p[P_ARM]
+    holding = 0.25 * p[P_MASS] * s[MASS] * GRAVITY_MPS2 * s[GRADE] * p[P_ARM]
     for i in range(4):
         most = abs(s[TORQUE + i])
         s[TORQUE + i] = min(max(holding, -most), most)

@@ -67,7 +67,7 @@ def watch_wheel(s: Vector, p: Vector, i: int, omega: float, ground: float, expec
 
 
 @helper
-def find_speed_again(s: Vector, z: Vector, p: Vector) -> None:
+def reinitialise_speed(s: Vector, z: Vector, p: Vector) -> None:
     """Take the speed from the wheels where all of them seem to slide and yet agree, as after driving off."""
     mean = 0.25 * (z[WHEEL] + z[WHEEL + 1] + z[WHEEL + 2] + z[WHEEL + 3])
     if mean * p[P_RADIUS] < 0.7 * s[SPEED]:  # all locked, as on ice

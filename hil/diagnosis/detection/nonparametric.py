@@ -1,7 +1,7 @@
 """Nonparametric terms: unknown functions of one variable at an injection point, rivals of the listed effects.
 
 A term is ``c_1 f_1(v) + ... + c_5 f_5(v)`` with hat functions over the range of ``v`` that the logs cover, multiplied
-or added at an injection point of the plant (`plant.effects.bank`). With listed effects alone, an unlisted cause would
+or added at an injection point of the plant (`plant.injection.bank`). With listed effects alone, an unlisted cause would
 get a wrong name. Takes a simulator and a parameter set, gives the basis expansions and, of fitted ones, the curves.
 """
 
@@ -15,9 +15,9 @@ from hil.diagnosis.estimation.model_discrepancy import UNLISTED
 from hil.diagnosis.estimation.terms import LOCATIONS, Candidate
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator
-from plant.effects.bank import Shape, Variable, term
 from plant.effects.effect import Effect, Parameter, Scope
-from plant.effects.places import JOINTS
+from plant.injection.bank import Shape, Variable, term
+from plant.injection_points import INJECTION_POINTS
 
 BASIS_SIZE = 5
 _WHEELS = Scope.WHEEL.members
@@ -59,7 +59,7 @@ class NonparametricTerm:
     @property
     def scope(self) -> Scope:
         """Wheel where the injection point has four members, else car."""
-        return Scope.WHEEL if JOINTS[self.injection_point][0] == 4 else Scope.CAR
+        return Scope.WHEEL if INJECTION_POINTS[self.injection_point][0] == 4 else Scope.CAR
 
 
 NONPARAMETRIC_TERMS = (
@@ -104,7 +104,7 @@ class BasisFunction(Candidate):
         return LOCATIONS[self.term.scope][self.location]
 
     def row(self, value: float) -> Floats:
-        """Its row of the bank (`plant.effects.bank`) at this coefficient."""
+        """Its row of the bank (`plant.injection.bank`) at this coefficient."""
         coefficients = [value if k in self.members() else 0.0 for k in range(self.term.scope.size)]
         shaped = (self.term.variable, Shape.HAT, self.centre, self.width)
         return term(self.term.injection_point, coefficients, shaped, add=self.term.adds)
@@ -153,12 +153,12 @@ def basis_expansion(unknown: NonparametricTerm, low: float, high: float) -> Basi
     """A term at all members, its hat functions evenly over a range of its variable."""
     centres = np.linspace(low, high, BASIS_SIZE)
     point, variable = unknown.injection_point, _VARIABLE_NAMES[unknown.variable]
-    unit = JOINTS[point][1] if unknown.adds else ""
+    unit = INJECTION_POINTS[point][1] if unknown.adds else ""
     bound = 20.0 * unknown.typical if unknown.adds else 0.9
     coefficients = tuple(Parameter(f"c{k + 1}", unit, -bound, bound, unknown.typical) for k in range(BASIS_SIZE))
     effect = Effect(
         name=UNLISTED, row=0, title=f"{point} depends on {variable} in a way that no list has",
-        equation="sum c_k hat((v - v_k) / w)", joints=(point,), scope=unknown.scope, parameters=coefficients,
+        equation="sum c_k hat((v - v_k) / w)", injection_points=(point,), scope=unknown.scope, parameters=coefficients,
         source="measured data", signature="", manoeuvre="",
     )  # fmt: skip
     width = float(centres[1] - centres[0])

@@ -15,15 +15,16 @@ from scipy.optimize import minimize_scalar
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.nonparametric import BasisFunction
 from hil.diagnosis.detection.profile_fit import CandidateFits, FittedHypothesis, refitted
-from hil.diagnosis.detection.threshold import DEVIATION_BY_FORM, SHAPE_MIN_SHARE
+from hil.diagnosis.detection.threshold import SHAPE_MIN_SHARE
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
 from hil.diagnosis.estimation.information import finite_difference_jacobian, information_blocks, solve
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation
 from hil.diagnosis.estimation.terms import Candidate
+from hil.diagnosis.estimation.uncertainty import FORM_SD_SHARE
 from hil.diagnosis.noise.model import Noise
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from plant.effects.effect import Parameter
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 _GRID = 9
 """Values of a shape parameter tested by one step, evenly between its bounds, by a constant factor where these are far
@@ -81,7 +82,9 @@ def fit_shape_parameters(
         )
         for one in listed
         for shape in one.effect.parameters
-        if shape.shape and function.term.injection_point in one.effect.joints and one.location == function.location
+        if shape.shape
+        and function.term.injection_point in one.effect.injection_points
+        and one.location == function.location
         for at in _grid(shape)
     ]
     if not offered:
@@ -150,7 +153,7 @@ def _fitted(
     minimize_scalar(cost, bounds=neighbours, method="bounded", options={"maxiter": _ROUNDS})
     at, model = min(tried, key=lambda one: one[1].cost)
     by_noise = _deviation(at, model.cost, [(other, of.cost) for other, of in tried], start.shape)
-    by_form = DEVIATION_BY_FORM * (neighbours[1] - neighbours[0])
+    by_form = FORM_SD_SHARE * (neighbours[1] - neighbours[0])
     deviation = hypot(
         by_noise * sqrt(variance_inflation(start)), by_form, _deviation_by_nuisances(fitter, model, noise, by_noise)
     )

@@ -25,14 +25,11 @@ from hil.diagnosis.detection.threshold import (
 )
 from hil.diagnosis.estimation.aliases import resolve_aliases
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Tracks
-from hil.diagnosis.estimation.information import InformationBlocks, information_blocks, solve
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation, with_uncertainty
 from hil.diagnosis.estimation.terms import Candidate
+from hil.diagnosis.estimation.uncertainty import standard_deviations
 from hil.diagnosis.noise.model import Noise, SampleMasks, whiten
 from plant.effects.effect import Effect
-
-_DRAWS, _FEW_SEGMENTS, _MOST_SPREAD = 60, 6, 1.6
-"""Bootstrap draws; segments below which there are none; largest ratio to the standard deviation by curvature."""
 
 # --- what divides a gain in these logs
 
@@ -90,7 +87,7 @@ class FormErrorAllowance:
 
     def __init__(self, explained: float, fitter: Fitter, model: Model, noise: Noise, jacobian: Tracks) -> None:
         self._explained, self._jacobian, self._masks, self._noise = explained, jacobian, fitter.masks, noise
-        self._injection_points = {point for term in model.terms for point in term.candidate.effect.joints}
+        self._injection_points = {point for term in model.terms for point in term.candidate.effect.injection_points}
         self._known: dict[str, float] = {}
         if model.terms:
             values = np.array(model.values())
@@ -109,7 +106,7 @@ class FormErrorAllowance:
         """In chi-squared, for an effect with this signature, (samples, 1)."""
         if not self._injection_points:
             return 0.0
-        if self._injection_points.intersection(effect.joints):
+        if self._injection_points.intersection(effect.injection_points):
             return FORM_ERROR_SAME_POINT**2 * self._explained
         overlap = signature_overlap(self._energies, signature_energies(signature, self._masks, self._noise))
         return FORM_ERROR**2 * self._explained * overlap
@@ -211,25 +208,3 @@ def eliminate_backward(
     if model.terms:
         model = resolve_aliases(model, fitter.nuisances, fitter.base)
     return Elimination(model, tuple(left), tuple(remarks))
-
-
-def standard_deviations(fitter: Fitter, model: Model, noise: Noise) -> Floats:
-    """Standard deviation of each term's value by noise: curvature of the likelihood, more where segments disagree."""
-    own, count = fitter.term_jacobian(model), len(fitter.nuisances)
-    columns = {name: np.hstack([values, own[name]]) for name, values in fitter.nuisance_jacobian_at(model).items()}
-    blocks = information_blocks(model.residual, columns, fitter.masks, noise, count)
-    _, covariance = solve(blocks.total(), count, range(len(model.terms)), model.z)
-    curvature = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    if len(blocks.matrix) < _FEW_SEGMENTS:
-        return np.asarray(curvature)
-    return np.clip(_bootstrapped(blocks, count, model.z), curvature, _MOST_SPREAD * curvature)
-
-
-def _bootstrapped(blocks: InformationBlocks, count: int, z: Floats) -> Floats:
-    """Spread of the values over segments drawn with replacement."""
-    rng, segments, width = np.random.default_rng(1), len(blocks.matrix), blocks.matrix.shape[1] - 1 - count
-    shares = np.full(segments, 1.0 / segments)
-    weights = [rng.multinomial(segments, shares).astype(np.float64) for _ in range(_DRAWS)]
-    changes = [solve(blocks.total(drawn), count, range(width), z)[0][count:] for drawn in weights]
-    low, high = np.quantile(np.array(changes), (0.16, 0.84), axis=0)
-    return np.asarray(0.5 * (high - low))

@@ -8,9 +8,11 @@ Constants of lower rooms that decide, too: `BIASED_BIRGE_RATIO` (1.5, `hil.diagn
 Birge ratio on the nuisance parameters may be biased, hypotheses are refitted from the nominal vehicle and ten are
 shortlisted), ``UNMEASURED_RATIO``, ``UNSURE`` and ``FEW`` beside ``model_discrepancy.toml``
 (`hil.diagnosis.estimation.model_discrepancy`: what divides a gain), ``PRIOR_SD_IN_TYPICAL_SIZES``
-(`hil.diagnosis.estimation.terms`: prior sd of a candidate), ``HUBER`` (`hil.diagnosis.noise.innovations`) and the prior
-sds and bounds of the nuisance parameters (`hil.diagnosis.vehicle.priors`). ``BASIS_SIZE``
-(`hil.diagnosis.detection.nonparametric`) is the degrees of freedom of a nonparametric term's threshold.
+(`hil.diagnosis.estimation.terms`: prior sd of a candidate), ``FORM_SD_SHARE`` (`hil.diagnosis.estimation.uncertainty`:
+sd of a value by the form of its equation, in the Occam factor of a shape), ``HUBER``
+(`hil.diagnosis.noise.innovations`) and the prior sds and bounds of the nuisance parameters
+(`hil.diagnosis.vehicle.priors`). ``BASIS_SIZE`` (`hil.diagnosis.detection.nonparametric`) is the degrees of freedom of a
+nonparametric term's threshold.
 """
 
 from dataclasses import dataclass, replace
@@ -105,10 +107,6 @@ FORM_ERROR, FORM_ERROR_SAME_POINT = 0.2, 0.35
 """Share of an accepted cause's amplitude that its equation may get wrong, elsewhere and at its own injection points: a
 further cause must exceed it [detection-threshold, Other conditions]. Larger: second causes are missed; smaller: the
 form of the first is named as a second."""
-DEVIATION_BY_FORM = 0.05
-"""Standard deviation of a value by the form of its equation, as a share of the value [isolability-and-intervals,
-Interval of a value]. Of 44 values 93 % lie inside with it, 89 % without (10 %: 95). Larger: wider intervals, and a
-smaller Occam factor of a shape."""
 
 # --- onset
 
@@ -149,7 +147,7 @@ SHAPE_MIN_SHARE = 0.5
 ISOLABILITY_SIGMA = 2.0
 """Standard deviations of a signature that must remain after its best imitation for a cause to be isolable [isolability-
 and-intervals, Isolability group]. Larger: more answers are ``cannot_tell_apart``."""
-CERTAIN = 4.6
+DISTINCT = 4.6
 """Difference of the criterion (10 to 1) below which a rival of another name makes the answer ``cannot_tell_apart`` [as
 above]. Larger: fewer single names."""
 UNDETECTABLE_SHARE = 0.5

@@ -15,8 +15,8 @@ from hil.diagnosis.data.log import Floats
 from hil.diagnosis.estimation.gauss_newton import Model, Term
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.vehicle.priors import Nuisance
-from plant.effects.apply import Q
-from plant.effects.theta import THETA
+from plant.injection.apply import Q
+from plant.injection.theta import THETA
 from plant.vectors import OUTPUT, PARAMETER
 
 _STAMPS = "timestamp_offset"

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from plant.effects.effect import NODES, Effect, Parameter, Scope
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 _SHARE = 0.05
 _SHARES = {
@@ -136,7 +136,7 @@ def candidates(
     found = []
     for effect in dict.fromkeys(column.effect for column in of):
         groups = LOCATIONS[effect.scope]
-        if effect.scope is Scope.WHEEL and all(joint.startswith(_MOTOR) for joint in effect.joints):
+        if effect.scope is Scope.WHEEL and all(joint.startswith(_MOTOR) for joint in effect.injection_points):
             groups = {place: members for place, members in groups.items() if not {*members} & {*undriven}}
         if effect.scope is Scope.NODE:
             groups = {node: members for node, members in groups.items() if node not in quiet}

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Isolation: takes the information matrix and a named cause, gives its rivals and the manoeuvres that decide."""

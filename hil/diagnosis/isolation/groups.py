@@ -1,7 +1,7 @@
-"""What cannot be told apart: causes whose signatures, alone or together, imitate another one's within the noise.
+"""Isolability groups: candidates whose signatures, alone or together, imitate another one's within the noise.
 
-From the joint information matrix and its null vectors, not from pairs: mass, pad friction front and rear and drag are
-tied by straight stops although no two of them look alike.
+They follow from the joint information matrix and its null vectors, not from pairs: after straight stops mass, pad
+friction front and rear and drag are not isolable although no two of them look alike.
 """
 
 from collections.abc import Sequence
@@ -13,22 +13,24 @@ from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.threshold import ISOLABILITY_SIGMA
 from hil.diagnosis.estimation.terms import Candidate
 
-MOST_RIVALS = 4
-_LEAST_SHARE = 0.02
+MAX_RIVALS = 4
+"""Rivals that imitate together, at most."""
+_MIN_REDUCTION = 0.02
+"""Share of the separation that one rival more must take off."""
 
 
 @dataclass(frozen=True, eq=False)
 class IsolabilityGroup:
-    """What imitates a candidate of a certain value.
+    """The candidates that these data cannot isolate from one of a certain value.
 
     Attributes
     ----------
-    members : the rivals that together leave least of it, the most important first; empty where they leave too much to
-        be tied with it. A single one where that is enough.
-    values : their values in the imitation: with the named one's, a null vector of the information.
-    apart : standard deviations left after the best imitation, the rivals' usual sizes held against them.
-    alone : standard deviations it stands out with nothing to imitate it; below `ISOLABILITY_SIGMA` nothing is to be told.
-    pairs : each rival that imitates it alone, with the standard deviations left, the closest first.
+    members : the rivals whose joint imitation leaves least of it, the most important first; empty where it is isolable
+        from all of them together.
+    values : their values in the imitation: with that of the named one, a null vector of the information matrix.
+    separation : standard deviations that remain after the best imitation, the rivals' priors included.
+    alone : standard deviations without any rival; below `ISOLABILITY_SIGMA` the candidate is not detectable.
+    pairs : each rival that imitates it alone, with the standard deviations that remain, the closest first.
     """
 
     members: tuple[int, ...]
@@ -39,12 +41,12 @@ class IsolabilityGroup:
 
     @property
     def indices(self) -> tuple[int, ...]:
-        """All that are tied with it: together or one by one."""
+        """Every rival: of the joint imitation and of the pairs."""
         return tuple(dict.fromkeys((*self.members, *(index for index, _ in self.pairs))))
 
 
 def summed(q: Floats, candidates: Sequence[Candidate], offset: int = 0) -> Floats:
-    """Products of the candidates' signatures: columns that move together summed, (candidates, candidates)."""
+    """Information matrix of the candidates, (candidates, candidates): columns of one candidate are summed."""
     moves = np.zeros((len(candidates), q.shape[0]))
     for row, candidate in enumerate(candidates):
         moves[row, [offset + k for k in candidate.columns]] = 1.0
@@ -54,16 +56,16 @@ def summed(q: Floats, candidates: Sequence[Candidate], offset: int = 0) -> Float
 def isolability_group(
     q: Floats, candidates: Sequence[Candidate], named: int, value: float, offset: int = 0
 ) -> IsolabilityGroup:
-    """What cannot be told from ``candidates[named]`` of size ``value`` by these data.
+    """The isolability group of ``candidates[named]`` at ``value``.
 
-    Places of the same effect are no rivals; values of rivals stay within their bounds.
+    Locations of the same effect are no rivals; values of rivals stay within their bounds.
 
     Parameters
     ----------
-    q : (columns, columns) whitened products after the nuisances are projected out
-        (`hil.diagnosis.estimation.information.Marginal`); the named candidate must not be projected out.
+    q : (columns, columns) information with the nuisances marginalised
+        (`hil.diagnosis.estimation.information.Marginal`); the named candidate must not be marginalised.
     candidates : their ``columns`` count from ``offset`` in ``q``.
-    value : of the named one, in its unit.
+    value : of the named candidate, in its unit.
     """
     bounds = np.array([(c.parameter.low, c.parameter.high) for c in candidates])
     precision = np.array([c.prior_sd for c in candidates]) ** -2.0
@@ -75,12 +77,12 @@ def isolability_group(
 def imitation(
     products: Floats, precision: Floats, bounds: Floats, named: int, value: float, allowed: Floats | None = None
 ) -> IsolabilityGroup:
-    """`isolability_group` on plain numbers.
+    """`isolability_group` on plain arrays.
 
     Parameters
     ----------
-    products : (n, n) of the signatures per unit.  precision : (n,) of the normal priors around 0.
-    bounds : (n, 2) lowest and highest values.  allowed : (n,) whether it may be a rival, all but the named by default.
+    products : (n, n) information matrix, per unit.  precision : (n,) of the normal priors around 0.
+    bounds : (n, 2) lowest and highest values.  allowed : (n,) which may be a rival; all but the named by default.
     """
     rivals = np.ones(len(products), bool) if allowed is None else np.asarray(allowed, bool).copy()
     rivals[named] = False
@@ -94,19 +96,19 @@ def imitation(
     pairs = tuple((int(k), float(left[k])) for k in np.argsort(left) if left[k] < ISOLABILITY_SIGMA)
     chosen = _forward(products, precision, bounds, named, value, rivals)
     chosen = _backward(products, precision, bounds, named, value, chosen)
-    values, apart = _jointly(products, precision, named, value, chosen)
-    if apart >= ISOLABILITY_SIGMA:
-        return IsolabilityGroup((), (), apart, alone, pairs)
-    return IsolabilityGroup(tuple(chosen), tuple(values.tolist()), apart, alone, pairs)
+    values, separation = _jointly(products, precision, named, value, chosen)
+    if separation >= ISOLABILITY_SIGMA:
+        return IsolabilityGroup((), (), separation, alone, pairs)
+    return IsolabilityGroup(tuple(chosen), tuple(values.tolist()), separation, alone, pairs)
 
 
 def remaining(products: Floats, precision: Floats, named: int, value: float, rivals: Sequence[int]) -> float:
-    """Standard deviations left of a signature after the best imitation by all these rivals together."""
+    """Standard deviations that remain of a signature after the best joint imitation by these rivals."""
     return _jointly(products, precision, named, value, rivals)[1]
 
 
 def _pairwise(products: Floats, precision: Floats, bounds: Floats, named: int, value: float) -> Floats:
-    """What each rival alone leaves, (n,): d'^2 = v^2 (q_ss - q_sr^2 / (q_rr + prior)), at the bound where it is met."""
+    """Separation from each rival alone, (n,): d'^2 = v^2 (q_ss - q_sr^2 / (q_rr + prior)), within the bounds."""
     penalised = np.maximum(np.diag(products), 0.0) + precision
     cross = value * products[named]
     best = np.clip(cross / penalised, bounds[:, 0], bounds[:, 1])
@@ -117,7 +119,7 @@ def _pairwise(products: Floats, precision: Floats, bounds: Floats, named: int, v
 def _jointly(
     products: Floats, precision: Floats, named: int, value: float, rivals: Sequence[int]
 ) -> tuple[Floats, float]:
-    """Values of the rivals that imitate best, and what they leave."""
+    """Values of the rivals in their best joint imitation, and the separation that remains."""
     total = value * value * float(products[named, named])
     if not rivals:
         return np.zeros(0), float(np.sqrt(max(total, 0.0)))
@@ -132,24 +134,24 @@ def _jointly(
 def _forward(
     products: Floats, precision: Floats, bounds: Floats, named: int, value: float, rivals: Floats
 ) -> list[int]:
-    """The rival that helps most, again and again, until what is left is within the noise."""
+    """Forward selection of rivals until the separation falls below `ISOLABILITY_SIGMA`."""
     chosen: list[int] = []
     left = remaining(products, precision, named, value, chosen)
-    while left >= ISOLABILITY_SIGMA and len(chosen) < MOST_RIVALS:
-        found = _next(products, precision, bounds, named, value, rivals, chosen)
-        if found is None:
+    while left >= ISOLABILITY_SIGMA and len(chosen) < MAX_RIVALS:
+        rival = _next(products, precision, bounds, named, value, rivals, chosen)
+        if rival is None:
             break
-        better = remaining(products, precision, named, value, [*chosen, found])
-        if better > (1.0 - _LEAST_SHARE) * left:
+        less = remaining(products, precision, named, value, [*chosen, rival])
+        if less > (1.0 - _MIN_REDUCTION) * left:
             break
-        chosen, left = [*chosen, found], better
+        chosen, left = [*chosen, rival], less
     return chosen
 
 
 def _next(
     products: Floats, precision: Floats, bounds: Floats, named: int, value: float, rivals: Floats, chosen: list[int]
 ) -> int | None:
-    """The rival that leaves least beside those chosen with all values within their bounds."""
+    """The rival that, given those chosen, reduces the separation most with all values within their bounds."""
     cross, own = products[named].copy(), np.diag(products) + precision
     if chosen:
         a = products[np.ix_(chosen, chosen)] + np.diag(precision[chosen])
@@ -171,7 +173,7 @@ def _next(
 def _backward(
     products: Floats, precision: Floats, bounds: Floats, named: int, value: float, chosen: list[int]
 ) -> list[int]:
-    """Without those that were not needed after all."""
+    """Backward elimination of rivals that the imitation does not need."""
     for k in list(chosen):
         rest = [other for other in chosen if other != k]
         values, left = _jointly(products, precision, named, value, rest)

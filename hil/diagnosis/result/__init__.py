@@ -1,1 +1,1 @@
-"""What is said in the end: verdict, rivals, what to drive, the extension, its gain, and the report."""
+"""Result: takes a diagnosis, gives the answer as JSON, its report, its held-out error and the extended scenario."""

@@ -1,4 +1,4 @@
-"""What the extension gains on manoeuvres that its fit never saw, beside doing nothing and the best wrong cause."""
+"""Cross-validation: the error on manoeuvres that no fit saw, nominal, extended, and with the best wrong effect."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,11 +14,19 @@ from hil.diagnosis.noise.model import Noise, SampleMasks
 
 FOLDS = 4
 _DRAWS = 400
+_TEMPERING = 1.5
+"""Divisor of the criterion differences: two hypotheses differ less than an exact noise model would say."""
 
 
 @dataclass(frozen=True)
 class HeldOutError:
-    """Error of one track: root mean square as handed in, extended, and with the best wrong effect."""
+    """Root mean square residual of one channel, in its unit.
+
+    Attributes
+    ----------
+    before : of the nominal vehicle.  after : of the extended model, held out; ``low`` to ``high`` is its 95 % interval.
+    tuned : with nuisance parameters alone, held out.  best_wrong : with the best wrong effect, held out.
+    """
 
     channel: str
     before: float
@@ -29,82 +37,82 @@ class HeldOutError:
     best_wrong: float | None
 
 
-def best_wrong(found: Diagnosis) -> FittedHypothesis | None:
-    """The best contender of another effect for the first cause."""
-    if not found.hypotheses:
+def best_wrong(diagnosis: Diagnosis) -> FittedHypothesis | None:
+    """The best hypothesis of another effect in place of the first cause; None where there is none."""
+    if not diagnosis.hypotheses:
         return None
-    right = found.final.terms[0].candidate.effect.name
-    return next((c for c in found.hypotheses[0] if c.term.candidate.effect.name != right), None)
+    right = diagnosis.final.terms[0].candidate.effect.name
+    return next((c for c in diagnosis.hypotheses[0] if c.term.candidate.effect.name != right), None)
 
 
-def folds(frame: SampleMasks) -> list[Floats]:
-    """Weights of the manoeuvres each fold trains on; neighbours in time go to different folds."""
-    count = int(np.max(frame.segment_id)) + 1
+def folds(masks: SampleMasks) -> list[Floats]:
+    """Training weights of each fold, (segments,) each; neighbours in time go to different folds."""
+    count = int(np.max(masks.segment_id)) + 1
     parts = min(FOLDS, count)
     return [np.array([0.0 if k % parts == fold else 1.0 for k in range(count)]) for fold in range(parts)]
 
 
 def held_out_residual(fitter: Fitter, noise: Noise, model: Model) -> Tracks:
-    """Residual of every manoeuvre from a fit on the others, in which no number goes farther than it may.
+    """Residual of every segment from a fit to the other folds, within the bounds of all parameters.
 
-    That fit is the one at hand and what leaving the manoeuvre out changes in one linear step: where tyres near their
-    limit bend the cost, a step goes on from the best fit with all manoeuvres, too.
+    That fit is the present one plus the change of one linear step by leaving the fold out: near the tyres' limit, where
+    the cost is not quadratic, a full step would move on from the best fit with all segments, too.
     """
-    frame = fitter.masks
-    trained = folds(frame)
+    masks = fitter.masks
+    trained = folds(masks)
     if len(trained) < 2:
         return model.residual
     columns = dict(fitter.nuisance_jacobian)
     if model.terms:
         own = fitter.term_jacobian(model)
         columns = {name: np.hstack([values, own[name]]) for name, values in columns.items()}
-    of = information_blocks(model.residual, columns, frame, noise, len(fitter.nuisances))
+    blocks = information_blocks(model.residual, columns, masks, noise, len(fitter.nuisances))
     out = {name: np.zeros_like(values) for name, values in model.residual.items()}
-    blocks = np.asarray(frame.segment_id, np.int64)
-    z_of_all, of_all, *_ = fitter.moved(model, of.total())
+    segments = np.asarray(masks.segment_id, np.int64)
+    z_of_all, of_all, *_ = fitter.moved(model, blocks.total())
     for weights in trained:
-        z, terms, *_ = fitter.moved(model, of.total(weights))
+        z, terms, *_ = fitter.moved(model, blocks.total(weights))
         z = np.clip(model.z + z - z_of_all, fitter.lower, fitter.upper)
         terms = tuple(map(_changed, model.terms, terms, of_all))
         residual = fitter.residual(z, terms)
-        test = weights[blocks] < 0.5
+        test = weights[segments] < 0.5
         for name, values in residual.items():
             out[name][test] = values[test]
     return out
 
 
 def _changed(now: Term, without: Term, of_all: Term) -> Term:
-    """An effect as fitted, with what a step without some manoeuvres changes beside one with all."""
+    """A term as fitted, changed by the difference of the steps without the fold and with all segments."""
     parameter = now.candidate.parameter
     return replace(now, value=float(np.clip(now.value + without.value - of_all.value, parameter.low, parameter.high)))
 
 
-def held_out_error(found: Diagnosis) -> list[HeldOutError]:
-    """Gain of every track."""
-    fitter, noise, frame = found.fitter, found.noise, found.fitter.masks
-    wrong = best_wrong(found)
-    after = held_out_residual(fitter, noise, found.final) if found.final.terms else None
-    tuned = held_out_residual(fitter, noise, found.base)
+def held_out_error(diagnosis: Diagnosis) -> list[HeldOutError]:
+    """Held-out error of every channel."""
+    fitter, noise, masks = diagnosis.fitter, diagnosis.noise, diagnosis.fitter.masks
+    wrong = best_wrong(diagnosis)
+    after = held_out_residual(fitter, noise, diagnosis.final) if diagnosis.final.terms else None
+    tuned = held_out_residual(fitter, noise, diagnosis.base)
     other = held_out_residual(fitter, noise, wrong.model) if wrong is not None else None
-    listed = []
-    for name in frame.names:
-        before = _by_manoeuvre(found.nominal.residual[name], frame, name)
-        own = _by_manoeuvre((after or tuned)[name], frame, name)
+    errors = []
+    for name in masks.names:
+        before = _by_segment(diagnosis.nominal.residual[name], masks, name)
+        own = _by_segment((after or tuned)[name], masks, name)
         low, high = _interval(own)
-        listed.append(
+        errors.append(
             HeldOutError(
-                name, _rms(before), _rms(own), low, high, _rms(_by_manoeuvre(tuned[name], frame, name)),
-                None if other is None else _rms(_by_manoeuvre(other[name], frame, name)),
+                name, _rms(before), _rms(own), low, high, _rms(_by_segment(tuned[name], masks, name)),
+                None if other is None else _rms(_by_segment(other[name], masks, name)),
             )
         )  # fmt: skip
-    return listed
+    return errors
 
 
-def _by_manoeuvre(values: Floats, frame: SampleMasks, name: str) -> Floats:
-    """Sums of squares and counts, (manoeuvres, 2); the start speed's error within a manoeuvre is part of it."""
-    known = frame.present[name] > 0.5
-    blocks = np.asarray(frame.segment_id, np.int64)[known]
-    count = int(np.max(frame.segment_id)) + 1
+def _by_segment(values: Floats, masks: SampleMasks, name: str) -> Floats:
+    """Sums of squares and counts, (segments, 2)."""
+    known = masks.present[name] > 0.5
+    blocks = np.asarray(masks.segment_id, np.int64)[known]
+    count = int(np.max(masks.segment_id)) + 1
     squares = np.bincount(blocks, values[known, 0].astype(np.float64) ** 2, count)
     return np.column_stack((squares, np.bincount(blocks, minlength=count)))
 
@@ -114,7 +122,7 @@ def _rms(sums_by: Floats) -> float:
 
 
 def _interval(sums_by: Floats) -> tuple[float, float]:
-    """95 % by bootstrap over manoeuvres."""
+    """95 % interval by bootstrap over segments."""
     rng = np.random.default_rng(0)
     drawn = rng.integers(0, len(sums_by), (_DRAWS, len(sums_by)))
     total = sums_by[drawn].sum(axis=1)
@@ -123,9 +131,9 @@ def _interval(sums_by: Floats) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def probabilities(contenders: Sequence[FittedHypothesis], tempering: float = 1.5) -> list[float]:
-    """Softmax of the log-odds, tempered: two contenders are less far apart than an exact noise model would say."""
-    logs = np.array([-0.5 * delta_criterion(c, contenders[0]) / tempering for c in contenders])
+def probabilities(hypotheses: Sequence[FittedHypothesis]) -> list[float]:
+    """Posterior probability of each hypothesis among these: softmax of half the tempered criterion differences."""
+    logs = np.array([-0.5 * delta_criterion(one, hypotheses[0]) / _TEMPERING for one in hypotheses])
     logs -= logs.max()
     weights = np.exp(logs)
     return [float(v) for v in weights / weights.sum()]

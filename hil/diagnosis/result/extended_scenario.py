@@ -1,4 +1,4 @@
-"""`run --extend`: a scenario with what a diagnosis taught, as a scenario file that every process can read."""
+"""`run --extend`: a scenario with the effects and parameters of an extension file, as a file every process can read."""
 
 import json
 import tomllib
@@ -9,7 +9,7 @@ from typing import Any
 
 from hil.diagnosis.data.log import UnusableError
 from hil.diagnosis.vehicle.extension_file import load_extension
-from hil.scenario import find_scenario
+from hil.scenario.scenario import find_scenario
 
 _SECTIONS = (
     "friction_brake", "vehicle", "suspension", "wheel", "tyre", "ehb", "pad", "motor", "battery", "sensor",
@@ -17,7 +17,7 @@ _SECTIONS = (
 
 
 def extended_scenario(name: str, extension: Path, folder: Path) -> Path:
-    """Write a scenario's file again into ``folder``, with the effects and the vehicle's numbers of an extension file.
+    """Write a scenario's file again into ``folder``, with the effects and the vehicle's parameters of an extension file.
 
     Parameters
     ----------
@@ -25,26 +25,26 @@ def extended_scenario(name: str, extension: Path, folder: Path) -> Path:
 
     Raises
     ------
-    UnusableError, hil.scenario_table.ScenarioError
+    UnusableError, hil.scenario.table.ScenarioError
         An extension file or a scenario that cannot be used, or nothing in the extension that a simulation can have.
     """
-    load_extension(extension)  # refuses what no car can have
-    taught = tomllib.loads(extension.read_text(encoding="utf-8"))
-    effects, numbers = taught.get("effects", {}), taught.get("parameters", {})
-    if not (effects or numbers or taught.get("laws")):
+    load_extension(extension)  # refuses values that no car has
+    extended = tomllib.loads(extension.read_text(encoding="utf-8"))
+    effects, parameters = extended.get("effects", {}), extended.get("parameters", {})
+    if not (effects or parameters or extended.get("laws")):
         raise UnusableError(
-            f"{extension}: nothing to simulate: no [effects] and no [parameters]; what it holds is of sensors that the "
-            "simulated car has not (see its comments)"
+            f"{extension}: nothing to simulate: no [effects] and no [parameters]; it describes sensors that the simulated "
+            "car does not have (see its comments)"
         )
     source = find_scenario(name)
     scenario = tomllib.loads(source.read_bytes().decode("utf-8"))
     own = scenario.setdefault("effects", {})
     for effect, values in effects.items():
         own[effect] = own.get(effect, {}) | values
-    if taught.get("laws"):
-        own["laws"] = [*own.get("laws", []), *taught["laws"]]
+    if extended.get("laws"):
+        own["laws"] = [*own.get("laws", []), *extended["laws"]]
     plant = scenario.setdefault("plant", {})
-    for flat, value in numbers.items():
+    for flat, value in parameters.items():
         section = next(s for s in _SECTIONS if flat.startswith(s + "_"))
         values = value if isinstance(value, list) else [value]
         plant.setdefault(section, {})[flat.removeprefix(section + "_")] = values if len(values) > 1 else values[0]
@@ -60,8 +60,8 @@ def _copy_tables(value: Any, source: Path | Traversable, folder: Path) -> None:
     if isinstance(value, dict):
         name = value.get("csv")
         if isinstance(name, str):
-            beside = source.parent if isinstance(source, Path) else Path(str(source)).parent
-            (folder / Path(name).name).write_bytes((beside / name).read_bytes())
+            folder_of_source = source.parent if isinstance(source, Path) else Path(str(source)).parent
+            (folder / Path(name).name).write_bytes((folder_of_source / name).read_bytes())
             value["csv"] = Path(name).name
         for item in value.values():
             _copy_tables(item, source, folder)

@@ -1,4 +1,4 @@
-"""The report of a diagnosis: measured against simulated, what is left over, who was in the race, what it gains."""
+"""The report of a diagnosis: measured against simulated, residual patterns, candidates, held-out error, limits."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,13 +14,13 @@ from hil.diagnosis.result.cross_validation import HeldOutError, probabilities
 from hil.diagnosis.result.residual_patterns import UNITS, WORDS
 from hil.report.report import Chart, Curve, Number, Panel, Report, Section, Table, Trace, Verdict
 from hil.report.units import BAR, Display, Unit
-from plant.effects.places import JOINTS
+from plant.injection_points import INJECTION_POINTS
 
 _SENTENCE = {
     "none": "Nothing beyond noise and the stated tolerances.",
     "named": "A listed cause explains what the simulation missed.",
     "cannot_tell_apart": "Several causes explain these data equally well.",
-    "unlisted": "No listed cause explains the data; where it acts is shown.",
+    "unlisted": "No listed cause explains the data; a nonparametric term shows where it acts.",
     "not_testable": "These manoeuvres excite too little to conclude anything.",
 }
 _SHOWN: dict[str, Unit] = {"wheel": Display("km/h", 3.6), "pressure": BAR, "motor": "N m"}
@@ -38,7 +38,7 @@ _PANELS = (
 
 def build_report(answer: Answer, sources: Sequence[str]) -> Report:
     """Build the report."""
-    content, found = answer.json, answer.diagnosis
+    content, diagnosis = answer.json, answer.diagnosis
     verdict = content["verdict"]
     return Report(
         title="Measured data against the simulation",
@@ -46,10 +46,10 @@ def build_report(answer: Answer, sources: Sequence[str]) -> Report:
         reason=_headline(content),
         numbers=tuple(_numbers(answer)),
         sections=(
-            _comparison(answer), _missed(answer), *_laws(answer), _race(answer), _gained(answer), _limits(answer),
+            _comparison(answer), _missed(answer), *_curves(answer), _candidates(answer), _held_out(answer), _limits(answer),
         ),
         provenance={
-            "logs": list(sources), "segments": len(found.dataset.segments), "replays": found.fitter.simulator.runs,
+            "logs": list(sources), "segments": len(diagnosis.dataset.segments), "replays": diagnosis.fitter.simulator.runs,
             "extension": content["extension"] or "not written", "remarks": content["remarks"],
         },
     )  # fmt: skip
@@ -59,7 +59,7 @@ def _headline(content: dict[str, object]) -> str:
     causes = content["causes"]
     text = _SENTENCE[str(content["verdict"])]
     if isinstance(causes, list) and causes:
-        named = "; ".join(f"{c['title'] if c['curve'] else c['effect']} ({c['wheel']})" for c in causes)
+        named = "; ".join(f"{c['title'] if c['curve'] else c['effect']} ({c['location']})" for c in causes)
         text = f"{named}: {text[0].lower()}{text[1:]}"
     return text
 
@@ -70,27 +70,27 @@ def _numbers(answer: Answer) -> list[Number]:
         for name, entry in cause["parameters"].items():
             low, high = entry["ci95"]
             which = f" {name}" if len(cause["parameters"]) > 1 else ""
-            label = f"{cause['effect']}{which}, {cause['wheel']}"
+            label = f"{cause['effect']}{which}, {cause['location']}"
             numbers.append(Number(label, entry["value"], entry["unit"], note=f"95 %: {low:.4g} to {high:.4g}"))
         numbers.append(Number("its probability", 100.0 * cause["probability"], "%"))
-    best = _most_gained(answer.held_out)
+    best = _best_reduced(answer.held_out)
     if best is not None and best.before > 0.0:
         note = f"{WORDS[best.channel]}, on manoeuvres no fit saw"
         numbers.append(Number("Held-out error removed", 100.0 * (1.0 - best.after / best.before), "%", note=note))
     return numbers
 
 
-def _most_gained(gains: Sequence[HeldOutError]) -> HeldOutError | None:
-    shown = [g for g in gains if g.channel in ("wheel.mean", "ax", "gps", "pressure.mean", "motor.mean")]
+def _best_reduced(errors: Sequence[HeldOutError]) -> HeldOutError | None:
+    shown = [g for g in errors if g.channel in ("wheel.mean", "ax", "gps", "pressure.mean", "motor.mean")]
     return max(shown, key=lambda g: 1.0 - g.after / max(g.before, 1e-12), default=None)
 
 
 def _joined_time(answer: Answer) -> tuple[Floats, Floats]:
-    """Time over all logs in a row, and a gap before each log."""
+    """Time over all logs, one after the other, (samples,), and where each log begins."""
     times, gaps, begin = [], [], 0.0
-    for drive in answer.diagnosis.dataset.recordings:
-        times.append(begin + np.arange(drive.samples) * answer.diagnosis.dataset.sample_s)
-        gap = np.zeros(drive.samples, bool)
+    for recording in answer.diagnosis.dataset.recordings:
+        times.append(begin + np.arange(recording.samples) * answer.diagnosis.dataset.sample_s)
+        gap = np.zeros(recording.samples, bool)
         gap[0] = True
         gaps.append(gap)
         begin = float(times[-1][-1]) + 1.0
@@ -98,47 +98,45 @@ def _joined_time(answer: Answer) -> tuple[Floats, Floats]:
 
 
 def _mean(values: Floats) -> Floats:
-    """Mean of the channels of each row that are known; NaN where none is."""
+    """Mean of the known channels of each row; NaN where none is known."""
     known = np.isfinite(values).sum(axis=1)
     return np.asarray(np.where(known > 0, np.nansum(values, axis=1) / np.maximum(known, 1), np.nan))
 
 
 def _comparison(answer: Answer) -> Section:
-    """Measured, as handed in, and extended, over all logs in a row; residuals below."""
-    found = answer.diagnosis
+    """Measured, nominal and extended over all logs, the residuals below."""
+    diagnosis = answer.diagnosis
     t, gaps = _joined_time(answer)
-    measured = found.fitter.simulator.measured()
+    measured = diagnosis.fitter.simulator.measured()
     panels = []
     for group, title in _PANELS:
-        if group not in found.dataset.groups:
+        if group not in diagnosis.dataset.groups:
             continue
-        factor = found.fitter.radius if group == "wheel" else 1.0
+        factor = diagnosis.fitter.radius if group == "wheel" else 1.0
         unit: Unit = _SHOWN.get(group, "m/s²")
         known = _mean(measured[group]) * factor
-        shown = ~gaps & (found.fitter.masks.present.get("ax", ~gaps) > 0.5) if group == "ax" else ~gaps
+        shown = ~gaps & (diagnosis.fitter.masks.present.get("ax", ~gaps) > 0.5) if group == "ax" else ~gaps
         traces = []
         for name, model in _models(answer):
             simulated = _mean(model.channels[group]) * factor
-            traces.append(
-                Trace(name, t, np.where(shown, simulated, np.nan), group="rl" if name == "handed in" else "fl")
-            )
+            traces.append(Trace(name, t, np.where(shown, simulated, np.nan), group="rl" if name == "nominal" else "fl"))
         traces.append(Trace("measured", t, np.where(shown, known, np.nan), "demand"))
         panels.append(Panel(title, unit, tuple(traces)))
         residuals = []
         for name, model in _models(answer):
             left = known - _mean(model.channels[group]) * factor
-            residuals.append(Trace(name, t, np.where(shown, left, np.nan), group="rl" if name == "handed in" else "fl"))
+            residuals.append(Trace(name, t, np.where(shown, left, np.nan), group="rl" if name == "nominal" else "fl"))
         panels.append(Panel(f"{title.split(',')[0]}: measured less simulated", unit, tuple(residuals)))
     return Section(
         "Measured against simulated", panels=tuple(panels),
-        text="The logs in a row, each replayed freely from measured inputs; the speed starts anew at every segment.",
+        text="All logs, one after the other, simulated open loop from measured inputs; every segment restarts the speed.",
     )  # fmt: skip
 
 
 def _models(answer: Answer) -> list[tuple[str, Model]]:
-    found = answer.diagnosis
-    extended = found.final if found.final.terms else found.base
-    return [("handed in", found.nominal), ("extended" if found.final.terms else "tuned", extended)]
+    diagnosis = answer.diagnosis
+    extended = diagnosis.final if diagnosis.final.terms else diagnosis.base
+    return [("nominal", diagnosis.nominal), ("extended" if diagnosis.final.terms else "nuisances fitted", extended)]
 
 
 def _missed(answer: Answer) -> Section:
@@ -153,7 +151,7 @@ def _missed(answer: Answer) -> Section:
         for w in sorted(answer.patterns, key=lambda w: -w.rms / max(w.noise, 1e-12))
     )
     table = Table(
-        "What the simulation as handed in misses", ("channel", "rms", "unit", "noise", "rms/noise", "goes with"), rows
+        "What the nominal simulation misses", ("channel", "rms", "unit", "noise", "rms/noise", "correlates with"), rows
     )
     return Section("What is wrong", tables=(table,), charts=tuple(_residual_charts(answer)))
 
@@ -166,13 +164,13 @@ def _scaled(value: float, track: str) -> tuple[float, str]:
 
 
 def _residual_charts(answer: Answer) -> list[Chart]:
-    """Residual of the acceleration over what it may go with, in bins, before and after."""
-    found = answer.diagnosis
-    if "ax" not in found.dataset.groups:
+    """Binned residual of the acceleration over pressure and speed, nominal and extended."""
+    diagnosis = answer.diagnosis
+    if "ax" not in diagnosis.dataset.groups:
         return []
-    pressure = np.concatenate([d.pressure_pa for d in found.dataset.recordings])
-    speed = np.concatenate([d.speed_mps for d in found.dataset.recordings])
-    known = found.fitter.masks.present["ax"] > 0.5
+    pressure = np.concatenate([d.pressure_pa for d in diagnosis.dataset.recordings])
+    speed = np.concatenate([d.speed_mps for d in diagnosis.dataset.recordings])
+    known = diagnosis.fitter.masks.present["ax"] > 0.5
     charts = []
     for title, x, mask, label, unit in (
         ("Acceleration residual over pressure", pressure, known, "pressure", BAR),
@@ -200,11 +198,11 @@ def _binned(x: Floats, y: Floats, name: str) -> Curve | None:
     if len(rows) < 3:
         return None
     centre, mean, spread = (np.array(v) for v in zip(*rows, strict=True))
-    return Curve(name, centre, mean, mean - spread, mean + spread, group="rl" if name == "handed in" else "fl")
+    return Curve(name, centre, mean, mean - spread, mean + spread, group="rl" if name == "nominal" else "fl")
 
 
-def _laws(answer: Answer) -> list[Section]:
-    """The curve of a cause in no list, with its 95 % band."""
+def _curves(answer: Answer) -> list[Section]:
+    """The curve of a nonparametric term with its 95 % band."""
     sections = []
     for cause in answer.json["causes"]:
         if not cause["curve"]:
@@ -212,20 +210,24 @@ def _laws(answer: Answer) -> list[Section]:
         x, y, low, high = (np.array([point[key] for point in cause["curve"]]) for key in ("x", "y", "low", "high"))
         (variable,) = cause["variables"]
         unit = _VARIABLES.get(variable, "")
-        curve = Curve("found", x, y, low, high, group="fl")
-        added = JOINTS[cause["injection_point"]][1] if cause["adds"] else ""
-        label = f"added to {cause['joint']}" if cause["adds"] else f"change of {cause['joint']}, share"
-        chart = Chart(f"{cause['title']}, {cause['wheel']}", variable.replace("_", " "), unit, label, added, (curve,))
-        sections.append(Section("A cause in no list", charts=(chart,), text="The band is its 95 % interval."))
+        curve = Curve("estimate", x, y, low, high, group="fl")
+        added = INJECTION_POINTS[cause["injection_point"]][1] if cause["adds"] else ""
+        label = (
+            f"added to {cause['injection_point']}" if cause["adds"] else f"change of {cause['injection_point']}, share"
+        )
+        chart = Chart(
+            f"{cause['title']}, {cause['location']}", variable.replace("_", " "), unit, label, added, (curve,)
+        )
+        sections.append(Section("Nonparametric term", charts=(chart,), text="The band is its 95 % interval."))
     return sections
 
 
-def _race(answer: Answer) -> Section:
-    """Who was in the race, and how far apart they are."""
-    found = answer.diagnosis
+def _candidates(answer: Answer) -> Section:
+    """The fitted hypotheses for each cause, and the score test of all candidates."""
+    diagnosis = answer.diagnosis
     tables, charts = [], []
-    for k, listed in enumerate(found.selections):
-        charts += _behind(f"Cause {k + 1}: how much worse than the best each candidate fits", listed)
+    for k, listed in enumerate(diagnosis.selections):
+        charts += _differences(f"Cause {k + 1}: Δχ² of each fitted candidate to the best", listed)
         chances = probabilities(listed)
         rows = tuple(
             (
@@ -236,45 +238,48 @@ def _race(answer: Answer) -> Section:
         )  # fmt: skip
         tables.append(
             Table(
-                f"Cause {k + 1}: candidates, fitted non-linearly",
+                f"Cause {k + 1}: profile fits",
                 ("candidate", "name", "value", "unit", "Δχ² to the best", "probability %"),
                 rows,
-                note=f"Below Δχ² {INDISTINGUISHABLE} two candidates are rivals. It is divided by the numbers' strain.",
+                note=f"Below Δχ² {INDISTINGUISHABLE} a candidate is a rival. Δχ² is divided by the Birge ratio.",
             )
         )
-    top = sorted(found.scores, key=lambda s: -s.gain)[:15]
+    top = sorted(diagnosis.scores, key=lambda s: -s.gain)[:15]
     screened = tuple(
         (s.candidate.name, round(s.gain, 1), float(f"{s.value:.4g}"), s.candidate.parameter.unit) for s in top
     )
     tables.append(
         Table(
-            "Screen: one linear step each, against noise and tolerances",
+            "Score test: one linear step each, nuisance parameters marginalised",
             ("candidate", "Δχ²", "value", "unit"),
             screened,
-            note=f"Asked of a cause: Δχ² {found.detection_threshold:.0f}.",
+            note=f"Detection threshold: Δχ² {diagnosis.detection_threshold:.0f}.",
         )
     )
     bars = Curve("gain", np.arange(1.0, len(top) + 1.0), np.array([s.gain for s in top]), style="points")
-    asked = Curve(
-        "asked of a cause", np.array([0.5, len(top) + 0.5]), np.full(2, found.detection_threshold), style="demand"
+    limit = Curve(
+        "detection threshold",
+        np.array([0.5, len(top) + 0.5]),
+        np.full(2, diagnosis.detection_threshold),
+        style="demand",
     )
     names = tuple(s.candidate.name for s in top)
-    alone = Chart("Screen: explained by each candidate alone", "candidate", "", "Δχ²", "", (bars, asked), names)
+    alone = Chart("Score test: gain of each candidate alone", "candidate", "", "Δχ²", "", (bars, limit), names)
     return Section("Candidates", tables=tuple(tables), charts=(*charts, alone) if top else ())
 
 
-def _behind(title: str, listed: Sequence[FittedHypothesis]) -> list[Chart]:
-    """Candidates for one cause, as fitted, and the line below which they are rivals."""
+def _differences(title: str, listed: Sequence[FittedHypothesis]) -> list[Chart]:
+    """Fitted candidates for one cause, and the line below which they are rivals."""
     if len(listed) < 2:
         return []
     rows = np.arange(1.0, len(listed) + 1.0)
-    behind = Curve("fitted", rows, np.array([delta_chi2(c, listed[0]) for c in listed]), style="points", group="fl")
+    fitted = Curve("fitted", rows, np.array([delta_chi2(c, listed[0]) for c in listed]), style="points", group="fl")
     rivals = Curve("rivals below", np.array([0.5, len(listed) + 0.5]), np.full(2, INDISTINGUISHABLE), style="demand")
     names = tuple(c.term.candidate.name for c in listed)
-    return [Chart(title, "candidate", "", "Δχ² to the best", "", (behind, rivals), names)]
+    return [Chart(title, "candidate", "", "Δχ² to the best", "", (fitted, rivals), names)]
 
 
-def _gained(answer: Answer) -> Section:
+def _held_out(answer: Answer) -> Section:
     rows = tuple(
         (
             WORDS[g.channel], *_scaled(g.before, g.channel)[:1], *_scaled(g.tuned, g.channel)[:1],
@@ -285,40 +290,40 @@ def _gained(answer: Answer) -> Section:
         for g in answer.held_out
     )  # fmt: skip
     table = Table(
-        "Free-running error on manoeuvres that no fit saw (root mean square)",
-        ("channel", "handed in", "tuned, no effect", "best wrong effect", "extended", "95 %", "unit"), rows,
+        "Open-loop error on manoeuvres that no fit saw (root mean square)",
+        ("channel", "nominal", "nuisances alone", "best wrong effect", "extended", "95 %", "unit"), rows,
     )  # fmt: skip
-    return Section("Gain", tables=(table,), charts=_gain_charts(answer))
+    return Section("Held-out error", tables=(table,), charts=_held_out_charts(answer))
 
 
-def _gain_charts(answer: Answer) -> tuple[Chart, ...]:
-    """Held-out error of each channel as a share of the error as handed in."""
-    gains = [g for g in answer.held_out if g.before > 0.0]
-    if not gains:
+def _held_out_charts(answer: Answer) -> tuple[Chart, ...]:
+    """Held-out error of each channel as a share of the nominal error."""
+    errors = [g for g in answer.held_out if g.before > 0.0]
+    if not errors:
         return ()
-    x = np.arange(1.0, len(gains) + 1.0)
-    before = np.array([g.before for g in gains])
-    own = np.array([g.after for g in gains]) / before
-    low, high = np.array([g.low for g in gains]) / before, np.array([g.high for g in gains]) / before
+    x = np.arange(1.0, len(errors) + 1.0)
+    before = np.array([g.before for g in errors])
+    own = np.array([g.after for g in errors]) / before
+    low, high = np.array([g.low for g in errors]) / before, np.array([g.high for g in errors]) / before
     curves = [Curve("extended", x, own, low, high, "points", "fl")]
-    curves.append(Curve("tuned, no effect", x, np.array([g.tuned for g in gains]) / before, style="points", group="rr"))
-    if all(g.best_wrong is not None for g in gains):
-        wrong = np.array([g.best_wrong for g in gains], np.float64) / before
+    curves.append(Curve("nuisances alone", x, np.array([g.tuned for g in errors]) / before, style="points", group="rr"))
+    if all(g.best_wrong is not None for g in errors):
+        wrong = np.array([g.best_wrong for g in errors], np.float64) / before
         curves.append(Curve("best wrong effect", x, wrong, style="points", group="rl"))
-    curves.append(Curve("handed in", np.array([0.5, len(gains) + 0.5]), np.ones(2), style="demand"))
-    title, names = "Held-out error against the simulation as handed in", tuple(WORDS[g.channel] for g in gains)
-    return (Chart(title, "channel", "", "error / error as handed in", "", tuple(curves), names),)
+    curves.append(Curve("nominal", np.array([0.5, len(errors) + 0.5]), np.ones(2), style="demand"))
+    title, names = "Held-out error against the nominal simulation", tuple(WORDS[g.channel] for g in errors)
+    return (Chart(title, "channel", "", "error / nominal error", "", tuple(curves), names),)
 
 
 def _limits(answer: Answer) -> Section:
     content = answer.json
-    rows = [("not testable with these manoeuvres", ", ".join(content["undetectable_effects"]) or "-")]
+    rows = [("undetectable in these manoeuvres", ", ".join(content["undetectable_effects"]) or "-")]
     rows += [("missing channel", text) for text in content["missing"]]
     rows += [("remark", text) for text in content["remarks"]]
     if content["discriminating_manoeuvres"]:
         rows.append(
             (
-                "drive this instead",
+                "drive this to decide",
                 ", ".join(Path(one["scenario"]).stem for one in content["discriminating_manoeuvres"]),
             )
         )

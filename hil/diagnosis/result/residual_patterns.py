@@ -1,4 +1,4 @@
-"""What the simulation misses, by channel: size against the noise, and what it goes with. Names no cause."""
+"""Residual patterns: what the nominal simulation misses, by channel, and what it correlates with. Names no cause."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from scipy.stats import spearmanr
 from hil.diagnosis.data.dataset import Dataset
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.result import Diagnosis
-from hil.diagnosis.noise.model import Noise, SampleMasks
+from hil.diagnosis.noise.model import SampleMasks
 from plant.vectors import INPUT
 
 WORDS = {
@@ -23,14 +23,16 @@ WORDS = {
     "motor.left-right rear": "motor_torque_left_minus_right_rear",
 }  # fmt: skip
 UNITS = {"wheel": "m/s", "ax": "m/s2", "ay": "m/s2", "yaw": "rad/s", "gps": "m/s", "pressure": "Pa", "motor": "N m"}
-"""Units of the tracks, by group; wheel speeds are compared as speeds at the rolling radius."""
-_SEEN = 1.15
-_STRONG = 0.25
+"""Units by group of channels; wheel speeds are compared as speeds at the rolling radius."""
+_NOISE_RATIO = 1.15
+"""Root mean square over that of noise, below which a residual counts as noise."""
+_MIN_CORRELATION = 0.25
+"""Rank correlation (Spearman) from which on a variable is reported."""
 
 
 @dataclass(frozen=True)
 class ResidualPattern:
-    """One channel: root mean square of the residual, what noise alone would leave, and what the rest goes with."""
+    """One channel: root mean squares of the residual and of noise alone, in its unit, and the correlated variables."""
 
     track: str
     channel: str
@@ -40,66 +42,70 @@ class ResidualPattern:
     pattern: str
 
 
-def residual_patterns(found: Diagnosis) -> list[ResidualPattern]:
-    """Of every track, of the simulation as handed in."""
-    frame = found.fitter.masks
-    with_what = _variables(found.dataset)
-    quiet = _expected(found, frame, found.noise)
-    listed = []
-    for name in frame.names:
-        values = found.nominal.residual[name][:, 0]
-        known = frame.present[name] > 0.5
-        rms, noise = float(np.sqrt(np.mean(values[known] ** 2))), quiet[name]
-        pattern = "noise" if rms < _SEEN * noise else _pattern(name, values, known, with_what, frame)
-        listed.append(ResidualPattern(name, WORDS[name], UNITS[name.split(".")[0]], rms, noise, pattern))
-    return listed
+def residual_patterns(diagnosis: Diagnosis) -> list[ResidualPattern]:
+    """The pattern of every channel in the simulation of the nominal vehicle."""
+    masks = diagnosis.fitter.masks
+    variables = _variables(diagnosis.dataset)
+    expected = _expected(diagnosis, masks)
+    patterns = []
+    for name in masks.names:
+        values = diagnosis.nominal.residual[name][:, 0]
+        known = masks.present[name] > 0.5
+        rms, noise = float(np.sqrt(np.mean(values[known] ** 2))), expected[name]
+        pattern = "noise" if rms < _NOISE_RATIO * noise else _pattern(name, values, known, variables, masks)
+        patterns.append(ResidualPattern(name, WORDS[name], UNITS[name.split(".")[0]], rms, noise, pattern))
+    return patterns
 
 
-def _expected(found: Diagnosis, frame: SampleMasks, noise: Noise) -> dict[str, float]:
-    """What noise and disturbance leave: of the final model where it is white, never above the residual's own."""
-    final = found.final.residual
-    return {name: float(np.sqrt(np.mean(final[name][frame.present[name] > 0.5, 0] ** 2))) for name in frame.names}
+def _expected(diagnosis: Diagnosis, masks: SampleMasks) -> dict[str, float]:
+    """Root mean square that noise and disturbances leave: that of the final model's residual."""
+    final = diagnosis.final.residual
+    return {name: float(np.sqrt(np.mean(final[name][masks.present[name] > 0.5, 0] ** 2))) for name in masks.names}
 
 
-def _variables(case: Dataset) -> dict[str, Floats]:
+def _variables(dataset: Dataset) -> dict[str, Floats]:
     parts: dict[str, list[Floats]] = {}
-    for drive in case.recordings:
-        at = np.arange(drive.samples) * drive.stride
+    for recording in dataset.recordings:
+        at = np.arange(recording.samples) * recording.stride
 
-        def mean(name: str, at: Floats = at, inputs: Floats = drive.inputs) -> Floats:
+        def mean(name: str, at: Floats = at, inputs: Floats = recording.inputs) -> Floats:
             return np.asarray(inputs[np.asarray(at, np.int64)][:, INPUT.slice(name)].mean(axis=1))
 
         pressure = np.maximum(mean("pressure_pa"), mean("pressure_demand_pa"))
         applied = pressure > 2e5
         parts.setdefault("pressure", []).append(pressure)
         parts.setdefault("motor torque", []).append(mean("motor_torque_nm"))
-        parts.setdefault("speed", []).append(drive.speed_mps)
+        parts.setdefault("speed", []).append(recording.speed_mps)
         parts.setdefault("steering", []).append(mean("steering_wheel_rad"))
         parts.setdefault("time in the log", []).append(at * 0.01)
-        heat = np.cumsum(pressure * drive.speed_mps)
+        heat = np.cumsum(pressure * recording.speed_mps)
         parts.setdefault("brake work so far", []).append(heat)
         parts.setdefault("rate of pressure", []).append(np.gradient(pressure))
-        parts.setdefault("speed while braking", []).append(np.where(applied, drive.speed_mps, np.nan))
+        parts.setdefault("speed while braking", []).append(np.where(applied, recording.speed_mps, np.nan))
     return {name: np.concatenate(p) for name, p in parts.items()}
 
 
-def _pattern(name: str, values: Floats, known: Floats, variables: dict[str, Floats], frame: SampleMasks) -> str:
+def _pattern(name: str, values: Floats, known: Floats, variables: dict[str, Floats], masks: SampleMasks) -> str:
     shown = values.copy()
-    if name in ("wheel.mean", "gps"):  # the speed's error grows: its slope is what goes with things
+    if name in ("wheel.mean", "gps"):  # the error of the speed accumulates: its slope correlates
         n = 25
-        slope = np.convolve(values, np.concatenate((np.ones(n), -np.ones(n))) / (n * n * frame.sample_s), mode="same")
-        restarts = np.convolve((frame.segment_start + frame.log_start) > 0.5, np.ones(2 * n + 1), mode="same") > 0.5
+        slope = np.convolve(values, np.concatenate((np.ones(n), -np.ones(n))) / (n * n * masks.sample_s), mode="same")
+        restarts = np.convolve((masks.segment_start + masks.log_start) > 0.5, np.ones(2 * n + 1), mode="same") > 0.5
         shown = np.where(restarts, np.nan, slope)
-    step = max(int(0.1 / frame.sample_s), 1)
-    found = []
+    step = max(int(0.1 / masks.sample_s), 1)
+    correlations = []
     for what, variable in variables.items():
         good = (known > 0.5) & np.isfinite(shown) & np.isfinite(variable)
         x, y = variable[good][::step], shown[good][::step]
         if len(x) > 40 and np.ptp(x) > 0.0 and np.ptp(y) > 0.0:
-            found.append((float(spearmanr(x, y)[0]), what))
-    found.sort(key=lambda item: -abs(item[0]))
+            correlations.append((float(spearmanr(x, y)[0]), what))
+    correlations.sort(key=lambda item: -abs(item[0]))
     offset = float(np.nanmean(shown[known > 0.5])) / max(float(np.nanstd(shown[known > 0.5])), 1e-12)
-    if found and abs(found[0][0]) > _STRONG:
-        words = [f"{'grows' if r > 0 else 'falls'} with {what} ({r:+.2f})" for r, what in found[:2] if abs(r) > _STRONG]
+    if correlations and abs(correlations[0][0]) > _MIN_CORRELATION:
+        words = [
+            f"{'grows' if r > 0 else 'falls'} with {what} ({r:+.2f})"
+            for r, what in correlations[:2]
+            if abs(r) > _MIN_CORRELATION
+        ]
         return "; ".join(words)
     return "constant offset" if abs(offset) > 0.7 else "no simple pattern"

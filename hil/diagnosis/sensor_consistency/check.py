@@ -29,7 +29,7 @@ from hil.diagnosis.sensor_consistency.selection import Progress, SelectionResult
 from hil.diagnosis.sensor_consistency.stops import estimates, nominal_braking, relative_sigma, stop_search
 from hil.diagnosis.sensor_consistency.wheel_radius import SPREAD, WheelRadiusModel
 from hil.diagnosis.vehicle.spec import Vehicle
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 _ROLL = 0.15  # the body rolls, and its accelerometer with it (effects, 56)
 _DIVE = 0.02  # its nose goes down by 1 to 1.5 deg/g, and the accelerometer with it (effects, 8)

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from hil.diagnosis.data.log import MOTOR_TORQUE, PRESSURE, PRESSURE_DEMAND
 from hil.diagnosis.sensor_consistency.motion import Motion
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 _SENSORS = {"imu_gain", "imu_bias", "imu_filter", "imu_position", "timestamp_offset", "wrong_scale", "tyre_radius"}
 _WHERE = {

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.diagnosis.sensor_consistency.selection import RARE, SelectionResult
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 GRAVITY_MPS2 = 9.80665
 INDISTINGUISHABLE = 4.6
@@ -95,7 +95,7 @@ class Cause:
         """As a cause (its first name), or a rival; ``share`` as `_share` if None."""
         name = self.labels[at]
         effect = THETA.effect(name.effect)
-        joint = next((j for j in effect.joints if j == f"sensor.{name.location}"), effect.joints[0])
+        joint = next((j for j in effect.injection_points if j == f"sensor.{name.location}"), effect.injection_points[0])
         low, high = sorted((name.factor * self.low, name.factor * self.high))
         parameter = {"value": name.factor * self.value, "unit": effect.parameter(name.parameter).unit}
         probability = (self._share if share is None else share) * self.log_density[at] / sum(self.log_density)

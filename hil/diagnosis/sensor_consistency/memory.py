@@ -8,7 +8,7 @@ from hil.diagnosis.data.log import UnusableError
 from hil.diagnosis.sensor_consistency.labels import Cause
 from hil.diagnosis.sensor_consistency.selection import SelectionResult
 from plant.effects.effect import Scope
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 MODELS = ("along", "turning", "wheels", "braking")
 

@@ -13,9 +13,9 @@ from hil.diagnosis.data.log import Floats
 from hil.diagnosis.data.prepare import STRAIGHT_RAD
 from hil.diagnosis.simulation.sensors import OUTPUT_SENSORS
 from plant.effects.effect import NODES
-from plant.effects.joints import J
-from plant.effects.places import JOINTS, field
-from plant.effects.theta import THETA
+from plant.inject import J
+from plant.injection.theta import THETA
+from plant.injection_points import INJECTION_POINTS, field
 from plant.vectors import INPUT, PARAMETER
 
 
@@ -76,7 +76,7 @@ def _of_number(name: str) -> Excitation:
 
 
 def _of_joint(joint: str) -> Excitation:
-    return _AT_JOINT.get(joint, Excitation.DRIVING) if joint in JOINTS else _of_number(joint)
+    return _AT_JOINT.get(joint, Excitation.DRIVING) if joint in INJECTION_POINTS else _of_number(joint)
 
 
 def _of_parameters() -> NDArray[np.int64]:
@@ -89,7 +89,7 @@ def _of_parameters() -> NDArray[np.int64]:
 def _of_theta() -> NDArray[np.int64]:
     found = np.full(THETA.size, int(Excitation.DRIVING), np.int64)
     for effect in THETA.effects:
-        joints = [_of_joint(joint) for joint in effect.joints]
+        joints = [_of_joint(joint) for joint in effect.injection_points]
         for parameter in effect.strengths:
             where = THETA.slice(effect.name, parameter.name)
             if effect.name not in _ALWAYS and Excitation.DRIVING not in joints:

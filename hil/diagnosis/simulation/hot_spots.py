@@ -8,8 +8,8 @@ import numpy as np
 from hil.diagnosis.data.dataset import ROW_S, Recording
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.simulation.parameter_set import ParameterSet
-from plant.effects.hot_spot import ORDER
-from plant.effects.theta import THETA
+from plant.effects.pads.hot_spot import ORDER
+from plant.injection.theta import THETA
 from plant.vectors import INPUT
 
 _SPEEDS = INPUT.slice("wheel_speed_rad_s")

@@ -7,8 +7,8 @@ from hil.diagnosis.data.log import Floats
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.sensors import ground_speed_before, wheel_speed_before
 from hil.diagnosis.vehicle.spec import Vehicle
-from plant.effects.theta import THETA
 from plant.friction import mu_equilibrium
+from plant.injection.theta import THETA
 from plant.model import initial_state
 from plant.vectors import DELAY_SLOTS, INPUT, STATE, P, X
 

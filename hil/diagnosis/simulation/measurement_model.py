@@ -13,7 +13,7 @@ from hil.diagnosis.data.prepare import averaged
 from hil.diagnosis.simulation.latency import delayed
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.sensors import after_sensors
-from plant.effects.sensing.chain import Chain
+from plant.injection.sensing_chain import Chain
 from plant.parameters.plant import PlantParameters
 from plant.vectors import INPUT
 

@@ -13,9 +13,9 @@ from hil.diagnosis.simulation.sensors import SENSORS
 from hil.diagnosis.vehicle.keys import LATENCY_S
 from hil.diagnosis.vehicle.priors import HALF_WIDTH_TO_SIGMA, Nuisance, factor_of
 from hil.diagnosis.vehicle.spec import Vehicle
-from plant.effects.bank import NO_TERMS
 from plant.effects.effect import NODES
-from plant.effects.theta import THETA
+from plant.injection.bank import NO_TERMS
+from plant.injection.theta import THETA
 
 _SIGN_ALONG_ROAD = (("road_grade", "grade"), ("headwind", "wind_mps"))
 LATENCY_NODES = ("imu", "pressure", "motor", "demand", "steering", "yaw_rate")
@@ -44,7 +44,7 @@ class Onset:
 
 @dataclass(frozen=True, eq=False)
 class ParameterSet:
-    """One car: flat parameters, theta, basis terms (rows as in `plant.effects.bank`), discs at the start, latencies.
+    """One car: flat parameters, theta, basis terms (rows as in `plant.injection.bank`), discs at the start, latencies.
 
     ``onsets`` are effects that begin in the middle.
     ``tooth_share`` multiplies the lag of a toothed wheel, half the time between two teeth: the speed is told when a

@@ -7,8 +7,8 @@ import numpy as np
 from hil.diagnosis.data.log import Floats
 from plant.effects.effect import GROUND, NODES
 from plant.effects.sensing.catalogue import SENSING
-from plant.effects.sensing.chain import Chain
-from plant.effects.theta import THETA
+from plant.injection.sensing_chain import Chain
+from plant.injection.theta import THETA
 from plant.vectors import INPUT
 
 Stack = Mapping[str, Floats]

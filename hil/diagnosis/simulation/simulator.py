@@ -32,9 +32,9 @@ from hil.diagnosis.simulation.parameter_set import ParameterSet, excitation_that
 from hil.diagnosis.simulation.sensors import before_sensors
 from hil.diagnosis.simulation.substeps import STEPS, rows_per_step
 from hil.diagnosis.vehicle.spec import Vehicle
-from plant.effects.plugin import NO_PLUGINS
-from plant.effects.states import EXTRA_STATES
-from plant.effects.theta import THETA
+from plant.extra_states import EXTRA_STATES
+from plant.injection.plugin import NO_PLUGINS
+from plant.injection.theta import THETA
 from plant.integrate import EXPONENTIAL
 from plant.model import column_indices, healthy, simulate
 from plant.road import DRY, road_table

@@ -10,9 +10,9 @@ import numpy as np
 
 from hil.diagnosis.data.log import Floats, UnusableError
 from hil.diagnosis.simulation.parameter_set import ParameterSet
-from hil.effects import EffectError, read_laws, written_laws
-from plant.effects.bank import NO_TERMS
-from plant.effects.theta import THETA
+from hil.scenario.effects import EffectError, read_laws, written_laws
+from plant.injection.bank import NO_TERMS
+from plant.injection.theta import THETA
 from plant.vectors import PARAMETER
 
 

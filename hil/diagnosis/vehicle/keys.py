@@ -75,8 +75,8 @@ LATENCY_S: Final = 4e-3
 LINE: Final = "line_lag_s"
 """Of it, too: by how much pads lag behind what the sensors of the pressures tell, as one pole."""
 LINE_S: Final = 8e-3
-"""Half-width of that where a set does not say: 5 to 20 ms of a line (`plant.effects.pressure_location`), which many a
-set counts into its dead time."""
+"""Half-width of that where a set does not say: 5 to 20 ms of a line (`plant.effects.hydraulics.pressure_location`),
+which many a set counts into its dead time."""
 
 WIDE: Final = {
     "vehicle_mass_kg": 0.1,

@@ -25,7 +25,7 @@ from hil.diagnosis.vehicle.keys import (
 from hil.diagnosis.vehicle.priors import Nuisance, nuisance_parameters, with_wide_prior
 from hil.diagnosis.vehicle.side_to_side import line_lag, side_to_side_variation
 from hil.diagnosis.vehicle.spec import Vehicle, with_constant_friction, with_gains
-from hil.parameters import ParameterError, is_number, load_set, override
+from hil.scenario.parameters import ParameterError, is_number, load_set, override
 from plant.model import pack
 from plant.parameters.plant import PlantParameters
 from plant.vectors import PARAMETER

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.vehicle.priors import HALF_WIDTH_TO_SIGMA, Nuisance
 from plant.effects.effect import NODES
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 from plant.vectors import P
 
 _PARTS = (

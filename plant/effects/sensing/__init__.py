@@ -1,1 +1,1 @@
-"""Sensor and clock effects as pure functions of arrays."""
+"""Effects of sensors and clocks: takes measured arrays, gives one `Effect` a file, each a pure function of arrays."""

@@ -5,6 +5,7 @@ import numpy as np
 from plant.effects.effect import NODES, Effect, Parameter, Scope
 from plant.effects.sensing.delay import advanced, delayed
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -23,9 +24,10 @@ EFFECT = Effect(
     row=66,
     title="One node's clock runs slow, or fast",
     equation="s'(t) = s(t - e t)",
-    joints=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
+    injection_points=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
+    acts_when=(Excitation.NONE, Excitation.NONE, Excitation.BRAKES, Excitation.MOTORS, Excitation.NONE),
     scope=Scope.NODE,
-    parameters=(Parameter("share", "", -0.002, 0.002, 0.0005),),
+    parameters=(Parameter("share", "", -0.002, 0.002, 0.0005, part_to_part=5e-5),),
     source="M: 20 to 100 ppm, 6 ms a minute; C: larger here, to be seen within a minute",
     signature="lag linear in the time of the log",
     manoeuvre="pressure_triangle",

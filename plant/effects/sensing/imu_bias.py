@@ -4,6 +4,7 @@ import numpy as np
 
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -24,12 +25,13 @@ EFFECT = Effect(
     row=55,
     title="IMU zero off and drifting",
     equation="a' = a + b + d t, r' = r + b_r",
-    joints=("sensor.imu",),
+    injection_points=("sensor.imu",),
+    acts_when=Excitation.NONE,
     scope=Scope.CAR,
     parameters=(
         Parameter("ax_mps2", "m/s2", -1.0, 1.0, 0.05),
-        Parameter("ay_mps2", "m/s2", -1.0, 1.0, 0.05),
-        Parameter("yaw_rate_rad_s", "rad/s", -0.1, 0.1, 0.005),
+        Parameter("ay_mps2", "m/s2", -1.0, 1.0, 0.05, part_to_part=0.01),
+        Parameter("yaw_rate_rad_s", "rad/s", -0.1, 0.1, 0.005, part_to_part=5e-4),
         Parameter("drift_mps3", "m/s3", -0.02, 0.02, 0.002),
     ),
     source="S: +-0.09 g over life (Hyundai); M: 0.02 to 0.05 m/s2 in a run",

@@ -4,6 +4,7 @@ import numpy as np
 
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -35,7 +36,8 @@ EFFECT = Effect(
     row=58,
     title="A further low-pass in the IMU",
     equation="tau a'' = a - a''",
-    joints=("sensor.imu",),
+    injection_points=("sensor.imu",),
+    acts_when=Excitation.NONE,
     scope=Scope.CAR,
     parameters=(Parameter("time_s", "s", 0.0, 0.1, 0.01),),
     source="S: cut-off of 20 to 40 Hz, lag of 6 to 10 ms (Hyundai)",

@@ -4,6 +4,7 @@ import numpy as np
 
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vehicle import GRAVITY_MPS2
 
@@ -29,7 +30,8 @@ EFFECT = Effect(
     row=56,
     title="IMU scale and misalignment",
     equation="ax' = ax (1+e) + g sin m + c ay",
-    joints=("sensor.imu",),
+    injection_points=("sensor.imu",),
+    acts_when=Excitation.NONE,
     scope=Scope.CAR,
     parameters=(
         Parameter("gain", "", -0.2, 0.2, 0.02),

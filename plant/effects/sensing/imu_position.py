@@ -4,6 +4,7 @@ import numpy as np
 
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -32,7 +33,8 @@ EFFECT = Effect(
     row=57,
     title="IMU away from the centre of gravity",
     equation="ax' = ax - x r^2 - y dr/dt, ay' = ay - y r^2 + x dr/dt",
-    joints=("sensor.imu",),
+    injection_points=("sensor.imu",),
+    acts_when=Excitation.NONE,
     scope=Scope.CAR,
     parameters=(
         Parameter("x_m", "m", -1.5, 1.5, 0.3),

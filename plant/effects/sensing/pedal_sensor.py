@@ -2,6 +2,7 @@
 
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -20,7 +21,8 @@ EFFECT = Effect(
     row=70,
     title="Pedal sensor zero and scale off",
     equation="s' = s (1+e) + o",
-    joints=("sensor.driver",),
+    injection_points=("sensor.driver",),
+    acts_when=Excitation.NONE,
     scope=Scope.CAR,
     parameters=(
         Parameter("offset", "", -0.1, 0.1, 0.01),

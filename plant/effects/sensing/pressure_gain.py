@@ -2,6 +2,7 @@
 
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -20,10 +21,11 @@ EFFECT = Effect(
     row=62,
     title="Pressure sensor scale off, drifting",
     equation="p' = p (1 + e + d t)",
-    joints=("sensor.pressure",),
+    injection_points=("sensor.pressure",),
+    acts_when=Excitation.BRAKES,
     scope=Scope.WHEEL,
     parameters=(
-        Parameter("gain", "", -0.2, 0.2, 0.02),
+        Parameter("gain", "", -0.2, 0.2, 0.02, part_to_part=0.005),
         Parameter("drift_1_s", "1/s", -0.001, 0.001, 0.0002),
     ),
     source="M: +-1 to 2 %",

@@ -2,6 +2,7 @@
 
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -20,9 +21,10 @@ EFFECT = Effect(
     row=61,
     title="Pressure sensor zero off",
     equation="p' = p + o",
-    joints=("sensor.pressure",),
+    injection_points=("sensor.pressure",),
+    acts_when=Excitation.ALWAYS,
     scope=Scope.WHEEL,
-    parameters=(Parameter("offset_pa", "Pa", -500000.0, 500000.0, 100000.0),),
+    parameters=(Parameter("offset_pa", "Pa", -500000.0, 500000.0, 100000.0, part_to_part=7e3),),
     source="M: +-1 bar",
     signature="intercept of torque over pressure; at zero pressure it reads the offset",
     manoeuvre="coast_down",

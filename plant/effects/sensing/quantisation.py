@@ -4,6 +4,7 @@ import numpy as np
 
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 STEPS_OF = {
@@ -27,7 +28,8 @@ EFFECT = Effect(
     row=64,
     title="Coarse steps of the signals",
     equation="s' = q round(s/q)",
-    joints=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor"),
+    injection_points=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor"),
+    acts_when=Excitation.ALWAYS,
     scope=Scope.CAR,
     parameters=(
         Parameter("wheel_rad_s", "rad/s", 0.0, 1.0, 0.1),

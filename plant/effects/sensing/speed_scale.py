@@ -2,6 +2,7 @@
 
 from plant.effects.effect import GROUND, Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -20,7 +21,8 @@ EFFECT = Effect(
     row=76,
     title="Speed over ground told too fast or too slow",
     equation="v' = v (1+e)",
-    joints=("sensor.ground",),
+    injection_points=("sensor.ground",),
+    acts_when=Excitation.ALWAYS,
     scope=Scope.CAR,
     parameters=(Parameter("gain", "", -0.1, 0.1, 0.01),),
     source="C: an optical sensor mounted askew by 8 degrees tells 1 % too little; a satellite receiver is far better",

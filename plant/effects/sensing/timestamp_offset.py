@@ -1,8 +1,9 @@
 """One node's stamps are off: its samples are older than they say, or newer."""
 
-from plant.effects.effect import NODES, Effect, Parameter, Scope
+from plant.effects.effect import NODE_LATENCY, NODES, Effect, Parameter, Scope
 from plant.effects.sensing.delay import advanced, delayed
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -21,9 +22,10 @@ EFFECT = Effect(
     row=65,
     title="One node's samples are older than their stamps, or newer",
     equation="s'(t) = s(t - d)",
-    joints=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
+    injection_points=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
+    acts_when=(Excitation.NONE, Excitation.NONE, Excitation.BRAKES, Excitation.MOTORS, Excitation.NONE),
     scope=Scope.NODE,
-    parameters=(Parameter("delay_s", "s", -0.05, 0.1, 0.02),),
+    parameters=(Parameter("delay_s", "s", -0.05, 0.1, 0.02, aliases=(NODE_LATENCY,)),),
     source="M: 2 to 50 ms",
     signature="lag equal on all transients of one node",
     manoeuvre="pressure_steps",

@@ -4,6 +4,7 @@ import numpy as np
 
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -17,7 +18,8 @@ EFFECT = Effect(
     row=60,
     title="Wheel speeds drop out at low speed",
     equation="w' = 0 below a threshold",
-    joints=("sensor.wheel",),
+    injection_points=("sensor.wheel",),
+    acts_when=Excitation.NONE,
     scope=Scope.CAR,
     parameters=(Parameter("threshold_rad_s", "rad/s", 0.0, 20.0, 2.5),),
     source="S: zero below 2 to 3 km/h on many cars",

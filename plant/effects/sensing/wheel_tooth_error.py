@@ -4,6 +4,7 @@ import numpy as np
 
 from plant.effects.effect import Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -22,7 +23,8 @@ EFFECT = Effect(
     row=59,
     title="Toothed wheel runs out of centre",
     equation="w' = w (1 + a cos th + b sin th), th the integral of w",
-    joints=("sensor.wheel",),
+    injection_points=("sensor.wheel",),
+    acts_when=Excitation.NONE,
     scope=Scope.WHEEL,
     parameters=(
         Parameter("first_cosine", "", -0.02, 0.02, 0.001),

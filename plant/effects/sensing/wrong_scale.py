@@ -2,6 +2,7 @@
 
 from plant.effects.effect import NODES, Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
+from plant.excitation import Excitation
 from plant.layout import Vector
 
 
@@ -20,7 +21,8 @@ EFFECT = Effect(
     row=69,
     title="Wrong scale, sign or byte order in a database",
     equation="k' = k (1+e): e = -2 a sign, 2.6 km/h for m/s, 255 a byte",
-    joints=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
+    injection_points=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
+    acts_when=(Excitation.ALWAYS, Excitation.NONE, Excitation.BRAKES, Excitation.MOTORS, Excitation.NONE),
     scope=Scope.NODE,
     parameters=(Parameter("factor", "", -3.0, 300.0, 2.6),),
     source="M: 1, -1, 3.6, 256",

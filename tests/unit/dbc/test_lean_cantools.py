@@ -9,7 +9,10 @@ def said_by(code: str) -> str:
 
 
 def test_neither_controller_nor_plant_nor_recorder_loads_python_can():
-    code = "import sys, ecu.node, plant.node, hil.node_process, hil.recorder; print({'can', 'pandas'} & {*sys.modules})"
+    code = (
+        "import sys, ecu.node, plant.node, hil.bench.node_process, hil.bench.recorder; "
+        "print({'can', 'pandas'} & {*sys.modules})"
+    )
     assert said_by(code) == "set()"
 
 

@@ -23,7 +23,7 @@ from dbc.messages import (
 from ecu.law.types import Brake, Health, Inputs, Source
 from ecu.node import EcuNode
 from ecu.parameters.ecu import EcuParameters
-from hil.parameters import load_set
+from hil.scenario.parameters import load_set
 
 TICK_NS = 10_000_000
 

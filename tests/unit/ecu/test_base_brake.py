@@ -31,7 +31,7 @@ def test_pedal_map_is_progressive_and_zero_in_the_free_travel(parameters):
 def test_pedal_channels(good_inputs, one, two, lost, travel):
     reading = base_brake.read_pedal(good_inputs._replace(pedal_1=one, pedal_2=two), lost, 0.06)
     assert reading.travel == pytest.approx(travel)
-    assert reading.apart == (abs(one - two) > 0.06)
+    assert reading.channels_disagree == (abs(one - two) > 0.06)
 
 
 def test_no_pedal_channel_gives_no_travel(good_inputs):

@@ -3,7 +3,7 @@ import math
 
 import pytest
 
-from ecu.law.blend import ChargePower, blend, fade, hand_over, wanted_torque
+from ecu.law.blend import ChargePower, blend, fade, ramp_charge_limit, wanted_torque
 from ecu.law.friction import friction_torque, gains, pressure_demand
 
 DEMAND = (500.0, 500.0, 200.0, 200.0)
@@ -21,7 +21,7 @@ def handed_over(parameters, start_w, announced_w, power_w, seconds, dt_s=0.01):
     """What friction and motors count on after each tick."""
     held, history = ChargePower(start_w, start_w, start_w), []
     for _ in range(round(seconds / dt_s)):
-        held = hand_over(held, announced_w, power_w, parameters.blend, dt_s)
+        held = ramp_charge_limit(held, announced_w, power_w, parameters.blend, dt_s)
         history.append(held)
     return history
 
@@ -82,7 +82,7 @@ def test_a_limit_that_does_not_bind_is_followed_at_once(parameters):
 def test_a_limit_that_binds_from_the_start_is_never_exceeded(parameters):
     held = ChargePower(1e3, 1e3, 1e3)
     for power_w in range(0, 60_000, 2_000):
-        held = hand_over(held, 1e3, float(power_w), parameters.blend, 0.01)
+        held = ramp_charge_limit(held, 1e3, float(power_w), parameters.blend, 0.01)
         assert max(held) <= 1e3
 
 

@@ -10,8 +10,8 @@ from dbc.bench_messages import PhysicalFault
 from dbc.messages import BrakeMode
 from ecu.law import estimator
 from ecu.law.joint import layout
-from hil.parameters import override
-from hil.reproduce import runs
+from hil.scenario.parameters import override
+from hil.validation.reproduce import runs
 from plant.manoeuvre import Manoeuvre, SpeedPhase
 from plant.road import RoadSegment
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from hil.parameters import load_set
+from hil.scenario.parameters import load_set
 from plant.parameters import PlantParameters
 
 

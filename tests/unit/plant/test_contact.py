@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plant.model import initial_state, pack, replay
+from plant.model import Scene, initial_state, pack, replay
 from plant.road import RoadSegment, road_table
 from plant.tyre import load_offset, relaxation_longitudinal, slip_stiffness
 from plant.vectors import INPUT
@@ -19,7 +19,7 @@ def test_a_car_springs_back_with_the_energy_of_its_springs(paper_car, pressure_p
     demands[20:, INPUT.slice("pressure_demand_pa")] = pressure_pa
     columns = ["speed_mps", *(f"{part}_{w}" for part in ("longitudinal_force_n", "wheel_load_n") for w in WHEELS)]
     road = road_table((RoadSegment(-1e9, friction, friction),))
-    table = replay(initial_state(paper_car, 15.0, 423.15, 0.7), demands, p, columns, road=road)[0]
+    table = replay(initial_state(paper_car, 15.0, 423.15, 0.7), demands, p, columns, Scene(road=road))[0]
     speed = table[:, 0]
     stop = int(np.flatnonzero(speed <= 0.0)[0])
     held_j = 0.0

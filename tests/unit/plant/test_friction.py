@@ -5,7 +5,7 @@ from importlib import resources
 
 import pytest
 
-from hil.parameters import load_set
+from hil.scenario.parameters import load_set
 from plant.brake_thermal import disc_temperature_rate
 from plant.friction import mu_equilibrium, mu_rate, temperature_rate
 from plant.parameters import OstermeyerParameters

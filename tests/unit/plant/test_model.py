@@ -6,11 +6,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant.effects.bank import NO_TERMS
-from plant.effects.plugin import NO_PLUGINS
-from plant.effects.theta import THETA
+from plant.injection.bank import NO_TERMS
+from plant.injection.plugin import NO_PLUGINS
+from plant.injection.theta import THETA
 from plant.integrate import EXPONENTIAL, RUNGE_KUTTA_4, SEMI_IMPLICIT
-from plant.model import NEUTRAL, advance, column_indices, compile_model, healthy, initial_state, pack, replay, simulate
+from plant.model import (
+    NEUTRAL,
+    Scene,
+    advance,
+    column_indices,
+    compile_model,
+    healthy,
+    initial_state,
+    pack,
+    replay,
+    simulate,
+)
 from plant.road import DRY, RoadSegment, road_table
 from plant.vectors import BASE_RATES, CUT, INPUT, OUTPUT, PARAMETER, STATE, SWITCH, P, U, X, Y
 
@@ -33,7 +44,7 @@ def test_is_compiled_once_for_all_its_uses(stop):
     start, inputs, p = stop
     compile_model()
     replay(start, inputs[:3], p, ["speed_mps"])
-    replay(start, inputs[:3], np.tile(p, (2, 1)), ["speed_mps"], theta=np.tile(NEUTRAL, (2, 1)))
+    replay(start, inputs[:3], np.tile(p, (2, 1)), ["speed_mps"], Scene(theta=np.tile(NEUTRAL, (2, 1))))
     assert len(simulate.signatures) == 1
 
 
@@ -47,7 +58,7 @@ def test_own_pressure_at_the_pressure_cut_gives_the_same_stop(stop):
     measured[:, INPUT.slice("pressure_pa")] = first[:, 1:]
     cut = CUT.zeros()
     cut[CUT.slice("pressure")] = 1.0
-    again = replay(start, measured, p, ["speed_mps"], cut=cut)[0]
+    again = replay(start, measured, p, ["speed_mps"], Scene(cut=cut))[0]
     assert np.abs(again[:, 0] - first[:, 0]).max() < 2e-3
 
 
@@ -65,7 +76,7 @@ def test_own_values_at_the_other_cuts(stop, cut_name, part, source):
     measured[:, INPUT.slice(part)] = first[:, 1:]
     cut = CUT.zeros()
     cut[CUT.slice(cut_name)] = 1.0
-    again = replay(start, measured, p, ["speed_mps"], cut=cut)[0]
+    again = replay(start, measured, p, ["speed_mps"], Scene(cut=cut))[0]
     assert np.abs(again[:, 0] - first[:, 0]).max() < 0.02
 
 
@@ -74,7 +85,7 @@ def test_demand_still_makes_its_pressure_while_a_measured_one_brakes(stop):
     inputs[:, INPUT.slice("pressure_pa")] = 10e5
     cut = CUT.zeros()
     cut[CUT.slice("pressure")] = 1.0
-    table = replay(start, inputs, p, ["pressure_pa_fl", "state.pressure_pa_fl"], cut=cut)[0]
+    table = replay(start, inputs, p, ["pressure_pa_fl", "state.pressure_pa_fl"], Scene(cut=cut))[0]
     assert table[-1, 0] == 10e5
     assert table[-1, 1] == pytest.approx(25e5, rel=1e-3)
 
@@ -85,7 +96,7 @@ def test_motors_keep_to_their_limits_at_the_measured_speed(stop):
     inputs[:, INPUT.slice("wheel_speed_rad_s")] = 1.0  # a measured crawl: braking has faded out
     cut = CUT.zeros()
     cut[CUT.slice("motor_speed")] = 1.0
-    faded = replay(start, inputs, p, ["motor_torque_nm_fl"], cut=cut)[0]
+    faded = replay(start, inputs, p, ["motor_torque_nm_fl"], Scene(cut=cut))[0]
     driven = replay(start, inputs, p, ["motor_torque_nm_fl"])[0]
     assert np.abs(faded).max() == 0.0
     assert driven.min() < -100.0
@@ -95,7 +106,7 @@ def test_one_wheel_can_be_cut_alone(stop):
     start, inputs, p = stop
     cut = CUT.zeros()
     cut[CUT.slice("pressure").start] = 1.0  # fl, its measured pressure stays 0
-    table = replay(start, inputs, p, ["friction_torque_nm_fl", "friction_torque_nm_fr"], cut=cut)[0]
+    table = replay(start, inputs, p, ["friction_torque_nm_fl", "friction_torque_nm_fr"], Scene(cut=cut))[0]
     assert table[-1, 0] == 0.0
     assert table[-1, 1] < -300.0
 
@@ -158,7 +169,7 @@ def test_long_steps_of_a_rolling_car_keep_its_swing(stop):
     columns = ["state.wheel_speed_rad_s_fl", "state.speed_mps", "state.imu_longitudinal_mps2"]
 
     def driven(method, steps):
-        return replay(start, inputs, p, columns, cut=cut, steps=steps, step_s=0.01 / steps, method=method)[0]
+        return replay(start, inputs, p, columns, Scene(cut=cut), steps=steps, step_s=0.01 / steps, method=method)[0]
 
     exact = driven(RUNGE_KUTTA_4, 20)
     error = np.abs(driven(EXPONENTIAL, 2) - exact)
@@ -180,7 +191,9 @@ def test_a_light_wheel_does_not_go_wild_where_a_rolling_car_begins_to_creep(pape
     def driven(method, steps):
         start = initial_state(light, 3.3, 350.0, 0.7)
         columns = ["state.wheel_speed_rad_s_fl", "state.speed_mps"]
-        return replay(start, inputs, pack(light), columns, cut=cut, steps=steps, step_s=0.01 / steps, method=method)[0]
+        return replay(
+            start, inputs, pack(light), columns, Scene(cut=cut), steps=steps, step_s=0.01 / steps, method=method
+        )[0]
 
     exact = driven(RUNGE_KUTTA_4, 20)
     assert exact[0, 1] > 3.0 > exact[-1, 1] > 0.5
@@ -202,8 +215,8 @@ def test_long_steps_of_a_car_that_stands_rest(paper_car, inertia, slope, speed_m
     def driven(method, steps):
         start = initial_state(light, speed_mps, 350.0, 0.7)
         columns = ["state.wheel_speed_rad_s_fl", "state.imu_longitudinal_mps2"]
-        how = {"steps": steps, "step_s": 0.01 / steps, "method": method, "theta": theta}
-        return replay(start, inputs, pack(light), columns, **how)[0]
+        how = {"steps": steps, "step_s": 0.01 / steps, "method": method}
+        return replay(start, inputs, pack(light), columns, Scene(theta=theta), **how)[0]
 
     error = np.abs(driven(EXPONENTIAL, 1) - driven(RUNGE_KUTTA_4, 20))[150:]
     assert (error.max(axis=0) < most).all(), error.max(axis=0)
@@ -216,8 +229,8 @@ def test_long_steps_keep_the_mark_of_a_soft_hub(stop):
 
     def mark(method, steps):
         both = [
-            replay(start, inputs, p, ["state.wheel_speed_rad_s_fl"], steps=steps, step_s=0.01 / steps, method=method,
-                   theta=one)[0, :, 0]
+            replay(start, inputs, p, ["state.wheel_speed_rad_s_fl"], Scene(theta=one), steps=steps,
+                   step_s=0.01 / steps, method=method)[0, :, 0]
             for one in (NEUTRAL, theta)
         ]  # fmt: skip
         return both[1] - both[0]
@@ -264,7 +277,7 @@ def test_inertial_sensor_on_a_grade(paper_car):
     inputs[:, INPUT.slice("pressure_demand_pa")] = 40e5
     start = initial_state(paper_car, 0.0, 423.15, 0.7)
     road = road_table((RoadSegment(-1e9, grade=0.05),))
-    table = replay(start, inputs, pack(paper_car), ["imu_longitudinal_mps2", "pitch_rad"], road=road)[0]
+    table = replay(start, inputs, pack(paper_car), ["imu_longitudinal_mps2", "pitch_rad"], Scene(road=road))[0]
     felt, pitch = table[-1]
     assert felt == pytest.approx(9.81 * math.sin(math.atan(0.05) - pitch), abs=2e-3)
     assert pitch < 0.0  # nose up
@@ -282,16 +295,16 @@ def test_dead_motor_and_refusing_battery(stop):
     start, inputs, p = stop
     switch = healthy()
     switch[SWITCH.slice("motor_alive").start] = 0.0
-    table = replay(start, inputs, p, ["motor_torque_nm_fl", "motor_torque_nm_fr"], switch=switch)[0]
+    table = replay(start, inputs, p, ["motor_torque_nm_fl", "motor_torque_nm_fr"], Scene(switch=switch))[0]
     assert table[-1].tolist() == pytest.approx([0.0, -80.0], abs=0.1)
     switch = healthy()
     switch[SWITCH.slice("battery_accepts")] = 0.0
-    table = replay(start, inputs, p, ["motor_torque_nm_fl", "motor_available_nm_fl"], switch=switch)[0]
+    table = replay(start, inputs, p, ["motor_torque_nm_fl", "motor_available_nm_fl"], Scene(switch=switch))[0]
     assert np.abs(table).max() < 1e-9
     switch = healthy()
     switch[SWITCH.slice("battery_announces")] = 0.0
     columns = ["motor_torque_nm_fl", "motor_available_nm_fl", "charge_power_limit_w"]
-    table = replay(start, inputs, p, columns, switch=switch)[0]
+    table = replay(start, inputs, p, columns, Scene(switch=switch))[0]
     assert table[-1, 0] == pytest.approx(-80.0, abs=0.1)
     assert table[-1, 1] > 80.0
     assert table[-1, 2] == 0.0
@@ -309,7 +322,9 @@ def test_dead_time_is_one(paper_car):
 def test_split_friction_under_left_and_right_wheels(stop):
     start, inputs, p = stop
     road = road_table((RoadSegment(-1e9, 0.9, 0.3),))
-    table = replay(start, inputs[:40], p, ["road_friction_fl", "road_friction_fr", "road_friction_rr"], road=road)[0]
+    table = replay(
+        start, inputs[:40], p, ["road_friction_fl", "road_friction_fr", "road_friction_rr"], Scene(road=road)
+    )[0]
     assert table[0].tolist() == [0.9, 0.3, 0.3]
 
 
@@ -324,7 +339,7 @@ def test_nothing_goes_wild_far_from_the_road(paper_car):
     for method, steps in ((SEMI_IMPLICIT, 10), (RUNGE_KUTTA_4, 10), (EXPONENTIAL, 2)):
         x, y = start.copy(), OUTPUT.zeros()
         for row in inputs:
-            advance(x, row, CUT.zeros(), healthy(), pack(paper_car), road, y, steps, 0.01 / steps, method)
+            advance(x, row, pack(paper_car), y, steps, Scene(road=road), 0.01 / steps, method)
             assert np.isfinite(x).all()
             assert np.isfinite(y).all()
         assert math.hypot(x[X.speed_mps], x[X.lateral_speed_mps]) < 40.0
@@ -334,7 +349,7 @@ def test_nothing_goes_wild_far_from_the_road(paper_car):
 def test_zero_steps_only_look(stop):
     start, inputs, p = stop
     x, y = start.copy(), OUTPUT.zeros()
-    advance(x, inputs[0], CUT.zeros(), healthy(), p, road_table(DRY), y, 0)
+    advance(x, inputs[0], p, y, 0, Scene())
     assert np.array_equal(x, start)
     assert y[Y.wheel_load_n] == pytest.approx(1463.0 * 9.81 * 1.39 / 2.59 / 2.0)
     assert STATE.size == x.size

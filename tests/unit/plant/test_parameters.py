@@ -5,7 +5,7 @@ from importlib import resources
 
 import pytest
 
-from hil.parameters import load_set
+from hil.scenario.parameters import load_set
 from plant.parameters import OstermeyerParameters, PlantParameters
 
 SETS = {"paper_car.toml": PlantParameters, "pad_b.toml": OstermeyerParameters, "pad_c.toml": OstermeyerParameters}

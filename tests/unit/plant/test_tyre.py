@@ -1,4 +1,4 @@
-"""The tyre's symmetries and limits; its curves are held against another code in hil.verify."""
+"""The tyre's symmetries and limits; its curves are held against another code in hil.validation.verify."""
 
 import math
 from dataclasses import replace

@@ -8,7 +8,7 @@ import pytest
 from hil.cli import identify
 from hil.errors import BrakebenchError
 from hil.identify.study import shipped_records
-from hil.parameters import load_set
+from hil.scenario.parameters import load_set
 from plant.parameters.brakes import OstermeyerParameters
 
 

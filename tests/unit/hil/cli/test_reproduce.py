@@ -3,8 +3,8 @@ import json
 import pytest
 
 from hil.cli.main import main
-from hil.reproduce import identification, study
-from hil.reproduce.study import Row
+from hil.validation.reproduce import identification, study
+from hil.validation.reproduce.study import Row
 
 ROW = Row("9", "torque", "%", 6.0, 16.0, 1.0, 1.2, 3.0, "p95", True, "nominal", 3, None)
 

@@ -7,7 +7,7 @@ import pytest
 
 from hil.cli import trials
 from hil.errors import BrakebenchError
-from hil.trials.run import plan
+from hil.validation.blind_trials.run import plan
 
 
 def run(*words):
@@ -28,7 +28,8 @@ def keep(folder, *families, count=2, state="abc"):
                 "family": drawn, "index": index, "size": size, "seed": 1, "sources": state,
                 "reached": True, "noise": "low",
                 "hidden": [grade],
-                "verdict": "named" if named else "none", "named": named, "rivals": [], "undetectable_effects": [], "held_out_error": {},
+                "verdict": "named" if named else "none", "named": named, "rivals": [], "undetectable_effects": [],
+                "held_out_error": {},
                 "causes": [{"effect": e, "parameters": {}, "location": "car", "probability": 0.9} for e in named],
             }  # fmt: skip
     lines = "".join(json.dumps(record) + "\n" for record in records.values())
@@ -54,8 +55,8 @@ def test_a_file_that_cannot_be_written_is_refused_before_anything_is_measured(op
     def never(*_):
         raise AssertionError("measured")
 
-    monkeypatch.setattr("hil.trials.own_error.measure", never)
-    monkeypatch.setattr("hil.trials.apart.measure", never)
+    monkeypatch.setattr("hil.validation.blind_trials.discrepancy_table.measure", never)
+    monkeypatch.setattr("hil.validation.blind_trials.separability.measure", never)
     path = tmp_path / "nowhere" / "measured.toml"
     with pytest.raises(BrakebenchError, match=r"measured.toml.*cannot be written"):
         run(option, path)
@@ -65,7 +66,7 @@ def test_a_measurement_that_breaks_leaves_the_file_as_it_was(tmp_path, monkeypat
     def breaks(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hil.trials.apart.measure", breaks)
+    monkeypatch.setattr("hil.validation.blind_trials.separability.measure", breaks)
     path = tmp_path / "measured.toml"
     path.write_text("before")
     with pytest.raises(KeyboardInterrupt):

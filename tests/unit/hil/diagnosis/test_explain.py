@@ -10,7 +10,7 @@ from plant_logs import STEP_S, log, logs
 from hil.diagnosis.data.log import UnusableError
 from hil.diagnosis.explain import explain
 from hil.diagnosis.vehicle.extension_file import load_extension
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 
 @pytest.mark.slow

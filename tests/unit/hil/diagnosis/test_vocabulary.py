@@ -12,8 +12,8 @@ import hil.diagnosis
 
 ROOM = Path(hil.diagnosis.__file__).parent
 RETIRED = re.compile(
-    r"\b(told|asked|begun|bent|handed in|left over|doubt|strain|strained|contests?|contenders?|odds|apart|races?|worlds?"
-    r"|rigs?)\b"
+    r"\b(told|asked|begun|bent|handed in|left over|doubt|strain|strained|contests?|contenders?|odds|apart|races?"
+    r"|worlds?|rigs?)\b"
 )
 VERDICT = "cannot_tell_apart"
 """A value in the JSON, which stays."""

@@ -7,7 +7,7 @@ from hil.identify.fit import fit
 from hil.identify.model import brake_of
 from hil.identify.record import read_record
 from hil.identify.study import identify, shipped_records
-from hil.parameters import load_set
+from hil.scenario.parameters import load_set
 from plant.parameters.plant import PlantParameters
 
 

@@ -9,10 +9,10 @@ from hil.identify.coverage import TRUTHS, Covered
 from hil.identify.files import as_json, coverage_json, pad_toml
 from hil.identify.study import identify
 from hil.identify.summary import build_report, figures
-from hil.parameters import load_set
 from hil.report.figure import write_figure
 from hil.report.html import render_html
 from hil.report.text import render_text
+from hil.scenario.parameters import load_set
 from plant.parameters.brakes import OstermeyerParameters
 
 

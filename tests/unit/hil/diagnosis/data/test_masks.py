@@ -7,7 +7,7 @@ from hil.diagnosis.data.dataset import Segment
 from hil.diagnosis.data.log import Floats, make_log
 from hil.diagnosis.data.masks import after_wheel_lock
 from hil.diagnosis.data.prepare import prepare
-from plant.effects.signals import WHEELS
+from plant.signals import WHEELS
 
 RADIUS_M = 0.3
 T = np.arange(0.0, 12.0, 0.01)

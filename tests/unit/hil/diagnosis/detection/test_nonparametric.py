@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from plant.effects.bank import term
 
 from hil.diagnosis.detection.nonparametric import (
     BASIS_SIZE,
@@ -18,13 +19,12 @@ from hil.diagnosis.detection.nonparametric import (
 from hil.diagnosis.result.extended_scenario import extended_scenario
 from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.vehicle.load import paper_car
-from hil.effects import EffectError, read_laws, written_laws
-from hil.scenario import load_scenario
-from plant.effects.bank import term
+from hil.scenario.effects import EffectError, read_laws, written_laws
+from hil.scenario.scenario import load_scenario
 
 LAW_TOML = """
 [[laws]]
-joint = "friction.mu"
+injection_point = "friction.mu"
 variable = "speed"
 adds = false
 centre = 15.0

@@ -3,7 +3,7 @@
 import pytest
 
 from hil.diagnosis.detection.shape import _within
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 _BEGINS = THETA.effect("pad_temp_fade").parameter("start_k")
 

@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from hil.bench.result import measure
+from hil.bench.virtual import simulate
 from hil.diagnosis.detection.threshold import ISOLABILITY_SIGMA
 from hil.diagnosis.isolation.experiment import (
     FOLDER,
@@ -14,9 +16,7 @@ from hil.diagnosis.isolation.experiment import (
     write,
 )
 from hil.errors import BrakebenchError
-from hil.result import measure
-from hil.scenario import load_scenario, scenario_names
-from hil.virtual import simulate
+from hil.scenario.scenario import load_scenario, scenario_names
 
 pytestmark = pytest.mark.slow
 TIED = [

@@ -22,9 +22,9 @@ from hil.diagnosis.simulation.measurement_model import SOURCE
 from hil.diagnosis.simulation.parameter_set import ParameterSet, nominal
 from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import paper_car
-from plant.effects.hot_spot import ORDER
-from plant.effects.signals import WHEELS
-from plant.effects.theta import THETA
+from plant.effects.pads.hot_spot import ORDER
+from plant.injection.theta import THETA
+from plant.signals import WHEELS
 
 AMPLITUDE = 0.1
 RADIUS_M, BRAKES_S = 0.308, 2.0

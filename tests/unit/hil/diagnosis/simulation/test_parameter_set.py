@@ -10,7 +10,7 @@ from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.simulation.parameter_set import ZEROS, nominal, recording_nuisances
 from hil.diagnosis.vehicle.keys import LATENCY_S
 from hil.diagnosis.vehicle.load import load_vehicle, paper_car
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 
 SIX = {
     "mass_kg": 1650.0, "wheelbase_m": 2.72, "cog_to_front_axle_m": 1.3, "rolling_radius_m": 0.318,

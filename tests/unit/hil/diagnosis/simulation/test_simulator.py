@@ -13,7 +13,7 @@ from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.simulation.substeps import STEPS
 from hil.diagnosis.vehicle.load import load_vehicle, paper_car
 from plant.effects.effect import NODES
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 from plant.model import initial_state, pack, replay
 from plant.vectors import INPUT, P
 

@@ -8,7 +8,7 @@ from hil.diagnosis.simulation.parameter_set import nominal, recording_nuisances
 from hil.diagnosis.vehicle.load import load_vehicle, paper_car
 from hil.diagnosis.vehicle.priors import HALF_WIDTH_TO_SIGMA
 from hil.diagnosis.vehicle.spec import Vehicle, rest_friction
-from plant.effects.theta import THETA
+from plant.injection.theta import THETA
 from plant.vectors import PARAMETER, P
 
 SIX = {

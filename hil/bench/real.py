@@ -1,0 +1,157 @@
+"""The bench in real time: recorder, plant and ECU as processes on their buses."""
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from dbc.frame import BusName, Frame, Received
+from hil.bench.bench_run import BenchError, BenchRun, BenchState, Say, silent
+from hil.bench.node_process import NODE_PERIOD_NS, grants_in
+from hil.bench.stimulus import BENCH_PHASE_NS
+from hil.bus.bus import Bus
+from hil.bus.channel import bench_channel, claim_channel
+from hil.bus.open import open_bus
+from hil.rt.clock import WallClock
+from hil.rt.loop import Loop, Tick
+from hil.rt.process import Child, StopSignal, interrupts_held, wait_for_end
+from hil.scenario.scenario import Scenario
+
+READY_TIMEOUT_S = 120.0  # a first start compiles the plant
+OTHERS_TIMEOUT_NS = 120_000_000_000  # how long we wait for a node that somebody else starts
+SETTLE_NS = 500_000_000  # how long a bench keeps recording after a process died, so that the reaction is on record
+NODES = ("plant", "ecu")
+
+
+class RealBench(BenchRun):
+    """Starts, watches and stops recorder, plant and ECU for one scenario.
+
+    Parameters
+    ----------
+    scenario, out, seed, say, stop : as of `BenchRun`.
+    bus : vehicle bus, or ``auto``.
+    realtime : as of the commands ``plant`` and ``ecu``.
+    without : nodes that somebody else puts on the bus: ``plant``, ``ecu``.
+    whole : the stimulus node hears the vehicle bus too, and may send there.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        bus: str,
+        out: Path,
+        seed: int = 1,
+        realtime: bool = False,
+        say: Say = silent,
+        stop: StopSignal | None = None,
+        without: Sequence[str] = (),
+        whole: bool = False,
+    ) -> None:
+        self._stack = contextlib.ExitStack()
+        claim = self._stack.enter_context(claim_channel(bus))
+        super().__init__(scenario, out, seed, say, stop)
+        self.spec, self.note = claim.spec, claim.note
+        self.state = BenchState.CLAIMED
+        self._node_options = ["--realtime"] if realtime else []
+        self._without = frozenset(without)
+        self._whole = whole
+        self._children: list[Child] = []
+        self._buses: dict[BusName, Bus] = {}
+        self._ticks: Iterator[Tick] = iter(())
+        self._waiting: list[tuple[int, Child]] = []
+        self._stopped = False
+        if self._without:
+            self.hold_timeout_ns = OTHERS_TIMEOUT_NS
+
+    @property
+    def processes(self) -> tuple[Child, ...]:
+        """The processes started so far: recorder, plant, ECU."""
+        return tuple(self._children)
+
+    def _begin(self) -> None:
+        self._join(BusName.BENCH, bench_channel(self.spec))
+        if self._whole:
+            self._join(BusName.VEHICLE, self.spec)
+        self._spawn("recorder", ["record", str(self.log)])
+        self._await_ready(self._children)
+        self._children[0].release()
+        self.state = BenchState.RECORDING
+        self._say("starting plant and ECU (the first start on a machine compiles the plant: some 15 s)")
+        order = {"plant": self.scenario.start_order.plant_s, "ecu": self.scenario.start_order.ecu_s}
+        for name in NODES:
+            if name in self._without:
+                self._say(f"waiting for somebody's {name} on {self.spec}")
+                continue
+            self._spawn(name, [name, self.scenario.source, "--seed", str(self._seed), *self._node_options])
+            self._waiting.append((round(order[name] * 1e9), self._children[-1]))
+        self._await_ready(self._children[1:])
+        self._say(self._punctuality())
+        self._release(0)
+        self._ticks = Loop(WallClock(), NODE_PERIOD_NS, BENCH_PHASE_NS).ticks()
+
+    def _punctuality(self) -> str:
+        """What the nodes run with, for people."""
+        if not self._node_options:
+            return "scheduled as any program: --realtime asks for more, `brakebench doctor` says what it would get"
+        return f"real time: {grants_in(child.error_path.read_text() for child in self._children[1:])}"
+
+    def _join(self, name: BusName, spec: str) -> None:
+        self._buses[name] = self._stack.enter_context(open_bus(spec, name))
+
+    def _spawn(self, name: str, arguments: list[str]) -> None:
+        words = self.out / f"{name}.txt"
+        with interrupts_held():  # else a process could be started that nobody ends
+            self._children.append(Child(name, [*arguments, "--bus", self.spec], words))
+
+    def _await_ready(self, children: Sequence[Child]) -> None:
+        for child in children:
+            if not child.wait_ready(READY_TIMEOUT_S):
+                raise BenchError(f"did not start: {child.why()}; see {child.error_path.name}")
+
+    def _release(self, now_ns: int) -> None:
+        """Let the nodes begin whose time has come."""
+        for due_ns, child in self._waiting:
+            if due_ns <= now_ns:
+                child.release()
+        self._waiting = [(due_ns, child) for due_ns, child in self._waiting if due_ns > now_ns]
+
+    def _pass_period(self) -> int:
+        now_ns = self._direct()
+        dead = [child for child in self._children if child.ended]
+        if dead:
+            why = f"{dead[0].why()}; see {dead[0].error_path.name}"
+            while self._direct() < now_ns + SETTLE_NS:
+                pass
+            raise BenchError(why)
+        return now_ns
+
+    def _direct(self) -> int:
+        """One tick of the stimulus node; its time, ns."""
+        tick = next(self._ticks)
+        self._release(tick.now_ns)
+        received: list[Received] = [item for bus in self._buses.values() for item in bus.receive(0.0)]
+        frames: list[Frame] = self.stimulus_node.step(tick.now_ns, received)
+        for name, bus in self._buses.items():
+            mine = [frame for frame in frames if frame.bus is name]
+            if mine:
+                bus.send(mine)
+        return tick.now_ns
+
+    def _end(self) -> None:
+        """Stop the nodes first, the recorder last; whoever fails to end well breaks the run."""
+        nodes, recorder = self._children[1:], self._children[:1]
+        if not self._stopped:
+            self.alive_at_end = sum(not child.ended for child in nodes)
+        self._stopped = True
+        waiting, self._waiting = self._waiting, []
+        for _, child in waiting:  # who waits for its release does not hear us
+            child.release()
+        for group in (nodes, recorder):
+            for child in group:
+                child.ask_to_stop()
+            wait_for_end(group)
+            for child in group:
+                child.stop()
+        for child in self._children:
+            if child.failed and self.state is not BenchState.BROKEN:
+                self._break(child.why())
+        self._stack.close()

@@ -1,0 +1,30 @@
+"""Files that appear whole or not at all."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from hil.log.frames import LogError
+
+
+@contextmanager
+def atomic_write(path: Path, overwrite: bool = False) -> Iterator[Path]:
+    """Yield a temporary path beside ``path``; put it in place when the block ends without an error.
+
+    Raises
+    ------
+    LogError
+        When ``path`` exists and may not be replaced, or cannot be written.
+    """
+    if path.exists() and not overwrite:
+        raise LogError(path, "exists already; use --force to replace it, or give another name")
+    # The suffix stays: writers choose their format by it.
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    try:
+        yield temporary
+        temporary.replace(path)
+    except OSError as error:
+        raise LogError(path, f"cannot be written: {error.strerror or error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)

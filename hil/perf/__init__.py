@@ -1,1 +1,0 @@
-"""Paired measurements of speed: us against a peer or a limit, in one run."""

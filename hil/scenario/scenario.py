@@ -1,0 +1,311 @@
+"""A scenario: one TOML file, validated, as one value."""
+
+import hashlib
+import math
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from dbc.bench_messages import PhysicalFault
+from dbc.contract import contract
+from dbc.frame import BusName
+from ecu.parameters.ecu import EcuParameters
+from hil.faults.frames import FrameFaults
+from hil.faults.physical import ALL_WHEELS, FAULT_NAMES, WHEELS, FaultEvent
+from hil.scenario.effects import Effects, read_effects
+from hil.scenario.parameters import load_set, override
+from hil.scenario.table import Files, ScenarioError, Table, as_number
+from hil.scenario.tyre_file import load_tir
+from plant.manoeuvre import DirectDemands, Manoeuvre, SpeedPhase, Trace
+from plant.parameters.plant import PlantParameters
+from plant.road import DRY, RoadSegment
+
+DEFAULT_SCENARIO = "stop72"
+LONGEST_S = 3600.0
+EXPECTABLE = (
+    "stop_distance_m",
+    "stop_time_s",
+    "mean_decel_mps2",
+    "energy_recuperated_j",
+    "frames_lost",
+    "frames_corrupt",
+    "overruns",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """What a result must lie between; ``name`` is a key of ``run --json``."""
+
+    name: str
+    minimum: float
+    maximum: float
+
+
+@dataclass(frozen=True, slots=True)
+class SignalExpectation:
+    """Limits of every sample of a signal, SI, between two times of the manoeuvre."""
+
+    signal: str
+    from_s: float
+    to_s: float
+    minimum: float
+    maximum: float
+
+    @property
+    def name(self) -> str:
+        """What is expected of what, for people."""
+        until = "the end" if self.to_s >= LONGEST_S else f"{self.to_s:g} s"
+        return f"{self.signal} from {self.from_s:g} s to {until}"
+
+
+@dataclass(frozen=True, slots=True)
+class StartOrder:
+    """How much later than the bench each node joins, s."""
+
+    plant_s: float = 0.0
+    ecu_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """Everything that decides a run, seed apart.
+
+    Attributes
+    ----------
+    name, title : short name and one line for people.
+    source, sha256 : the file, and the hash of its text and of the CSV files it names.
+    plant, ecu : parameter sets with the scenario's changes.
+    plant_set, ecu_set : names of the sets they started from.
+    manoeuvre : driver, road, start.
+    start_order : which node joins when.
+    blending : blending factor over time that the bench sends; empty leaves it to the controller.
+    faults : what breaks when.
+    frame_faults : what befalls frames on their way.
+    effects : what this car has and the baseline has not.
+    expectations, signal_expectations : what decides between exit code 0 and 1.
+    """
+
+    name: str
+    title: str
+    source: str
+    sha256: str
+    plant: PlantParameters
+    ecu: EcuParameters
+    plant_set: str
+    ecu_set: str
+    manoeuvre: Manoeuvre
+    start_order: StartOrder
+    blending: Trace
+    faults: tuple[FaultEvent, ...]
+    frame_faults: tuple[FrameFaults, ...]
+    effects: Effects
+    expectations: tuple[Expectation, ...]
+    signal_expectations: tuple[SignalExpectation, ...]
+
+
+def scenario_names() -> list[str]:
+    """Names of the scenarios that come with brakebench."""
+    return sorted(item.name.removesuffix(".toml") for item in _library().iterdir() if item.name.endswith(".toml"))
+
+
+def load_scenario(name: str) -> Scenario:
+    """Read a scenario by name (of the library) or by path.
+
+    Raises
+    ------
+    hil.scenario.table.ScenarioError, hil.scenario.parameters.ParameterError
+        No such scenario, or a wrong field; the message names file, key and what is allowed.
+    """
+    source = find_scenario(name)
+    try:
+        text = source.read_bytes()
+        values = tomllib.loads(text.decode("utf-8"))
+    except OSError as error:
+        raise ScenarioError(f"{source}: cannot be read ({error.strerror})") from error
+    except (ValueError, RecursionError) as error:  # of the text's encoding or of TOML
+        raise ScenarioError(f"{source}: not valid TOML: {error}") from error
+    files = Files(source.parent if isinstance(source, Path) else _library())
+    top = Table(values, source.name, files)
+    title = top.text("title")
+    plant_table, ecu_table, start = top.table("plant"), top.table("ecu"), top.table("start")
+    plant_set, ecu_set = plant_table.text("set", "paper_car"), ecu_table.text("set", "paper_ecu")
+    order = StartOrder(start.number("plant_after_s", 0.0, 0.0, 10.0), start.number("ecu_after_s", 0.0, 0.0, 10.0))
+    scenario = Scenario(
+        name=source.name.removesuffix(".toml"),
+        title=title,
+        source=str(source),
+        sha256="",
+        plant=_plant(plant_table, plant_set, files),
+        ecu=override(load_set(_set("ecu", ecu_set), EcuParameters), ecu_table.rest(), f"{source.name}: ecu"),
+        plant_set=plant_set,
+        ecu_set=ecu_set,
+        manoeuvre=_manoeuvre(top, start),
+        start_order=order,
+        blending=_blending(top),
+        faults=tuple(event for table in top.tables("faults") for event in _faults(table)),
+        frame_faults=tuple(_frame_faults(table) for table in top.tables("frame_faults")),
+        effects=read_effects(top.table("effects").rest(), f"{source.name}: effects"),
+        expectations=tuple(_expectations(top.table("expect"))),
+        signal_expectations=tuple(_signal_expectation(table) for table in top.tables("expect_signal")),
+    )
+    top.done()
+    return replace(scenario, sha256=hashlib.sha256(b"".join([text, *files.read])).hexdigest())
+
+
+def _library() -> Traversable:
+    return resources.files("hil.scenario") / "library"
+
+
+def find_scenario(name: str) -> Path | Traversable:
+    """File of a scenario, by name (of the library) or by path; ScenarioError where there is none of that name."""
+    path = Path(name)
+    if path.suffix == ".toml" or "/" in name:
+        return path
+    if name in scenario_names():
+        return _library() / f"{name}.toml"
+    raise ScenarioError(
+        f"no scenario {name!r}; the library has {', '.join(scenario_names())}; a file of your own ends in .toml"
+    )
+
+
+def _set(package: str, name: str) -> Path | Traversable:
+    """A parameter set by name (of the package) or by path."""
+    return Path(name) if name.endswith(".toml") else resources.files(package) / "parameters" / f"{name}.toml"
+
+
+def _plant(table: Table, name: str, files: Files) -> PlantParameters:
+    """A set with the scenario's changes; a tyre file's coefficients come before single changes."""
+    car = load_set(_set("plant", name), PlantParameters)
+    if table.has("tyre_file"):
+        path = Path(str(files.folder / table.text("tyre_file")))
+        car = replace(car, tyre=load_tir(path, car.tyre).tyre)
+        files.read.append(path.read_bytes())
+    return override(car, table.rest(), table.where)
+
+
+def _manoeuvre(top: Table, start: Table) -> Manoeuvre:
+    driver, end, direct = top.table("driver"), top.table("end"), top.table("direct")
+    manoeuvre = Manoeuvre(
+        initial_speed_mps=start.number("speed_mps", None, -15.0, 60.0),
+        initial_disc_temperature_k=start.number("disc_temperature_k", 423.15, 200.0, 1200.0),
+        initial_state_of_charge=start.number("state_of_charge", 0.7, 0.0, 1.0),
+        duration_s=end.number("duration_s", None, 0.1, LONGEST_S),
+        end_after_standstill_s=_standstill(end),
+        pedal=driver.trace("pedal", 0.0, 1.0),
+        steering_wheel_rad=driver.trace("steering_wheel_rad", -15.0, 15.0),
+        speed_phases=tuple(_speed_phase(table) for table in driver.tables("hold_speed")),
+        road=tuple(_segment(table) for table in top.tables("road")) or DRY,
+        direct=DirectDemands(
+            pressure_pa=_four(direct.table("pressure_pa"), 0.0, 25e6),
+            motor_nm=_four(direct.table("motor_nm"), -1500.0, 1500.0),
+        ),
+        wait_for_demands=start.switch("wait_for_ecu", True),
+    )
+    for table in (start, driver, end, direct):
+        table.done()
+    return manoeuvre
+
+
+def _standstill(end: Table) -> float | None:
+    """``false`` runs to the end of the duration."""
+    if end.has("after_standstill_s") and end.peek("after_standstill_s") is False:
+        end.take("after_standstill_s")
+        return None
+    return end.number("after_standstill_s", 1.0, 0.0, LONGEST_S)
+
+
+def _speed_phase(table: Table) -> SpeedPhase:
+    phase = SpeedPhase(
+        table.number("start_s", None, 0.0), table.number("end_s", None, 0.0), table.number("speed_mps", None, 0.0, 60.0)
+    )
+    table.done()
+    return phase
+
+
+def _blending(top: Table) -> Trace:
+    """One number, or a course over time."""
+    number = as_number(top.peek("blending"))
+    if number is None:
+        return top.trace("blending", 0.0, 1.0)
+    return ((0.0, top.number("blending", None, 0.0, 1.0)),)
+
+
+def _faults(table: Table) -> Iterator[FaultEvent]:
+    """One fault, and its end where ``until_s`` is given."""
+    at_s = table.number("at_s", None, 0.0, LONGEST_S)
+    fault = PhysicalFault[table.choice("fault", FAULT_NAMES).upper()]
+    names = table.names("wheels", WHEELS)
+    wheels = sum(1 << WHEELS.index(name) for name in names) if names else ALL_WHEELS
+    yield FaultEvent(at_s, fault, wheels)
+    if table.has("until_s"):
+        yield FaultEvent(table.number("until_s", None, at_s, LONGEST_S), fault, wheels, active=False)
+    table.done()
+
+
+def _frame_faults(table: Table) -> FrameFaults:
+    """Shares of some messages of the vehicle bus, or of all, between two times of the manoeuvre."""
+    known = {spec.name: spec.can_id for spec in contract(BusName.VEHICLE).by_id.values()}
+    from_s = table.number("from_s", -math.inf, 0.0, LONGEST_S)
+    faults = FrameFaults(
+        **{name: table.number(name, 0.0, 0.0, 1.0) for name in ("drop", "duplicate", "stale", "late")},
+        longest_ticks=int(table.number("longest_ticks", 2, 1, 100)),
+        can_ids=frozenset(known[name] for name in table.names("messages", sorted(known))),
+        from_s=from_s,
+        until_s=table.number("until_s", math.inf, max(from_s, 0.0), LONGEST_S),
+    )
+    table.done()
+    return faults
+
+
+def _segment(table: Table) -> RoadSegment:
+    friction = table.number("friction", 1.0, 0.0, 2.0)
+    segment = RoadSegment(
+        start_m=table.number("start_m", None),
+        friction_left=table.number("friction_left", friction, 0.0, 2.0),
+        friction_right=table.number("friction_right", friction, 0.0, 2.0),
+        grade=table.number("grade", 0.0, -0.5, 0.5),
+    )
+    table.done()
+    return segment
+
+
+def _four(table: Table, low: float, high: float) -> tuple[Trace, Trace, Trace, Trace]:
+    everywhere = table.trace("all", low, high)
+    fl, fr, rl, rr = (table.trace(wheel, low, high) or everywhere for wheel in WHEELS)
+    table.done()
+    return fl, fr, rl, rr
+
+
+def _expectations(table: Table) -> Iterator[Expectation]:
+    for name in EXPECTABLE:
+        limits = table.table(name)
+        low, high = _limits(limits)
+        if math.isfinite(low) or math.isfinite(high):
+            yield Expectation(name, low, high)
+    table.done()
+
+
+def _limits(table: Table) -> tuple[float, float]:
+    low, high = table.number("min", -math.inf), table.number("max", math.inf)
+    table.done()
+    return low, high
+
+
+def _signal_expectation(table: Table) -> SignalExpectation:
+    """``signal`` is MESSAGE.SIGNAL of either bus; one of ``min`` and ``max`` at least."""
+    known = {f"{s.name}.{f.signal}" for bus in BusName for s in contract(bus).by_id.values() for f in s.fields}
+    name = table.text("signal")
+    if name not in known:
+        near = get_close_matches(name, sorted(known), 3) or ["MESSAGE.SIGNAL of brake.dbc or bench.dbc"]
+        raise ScenarioError(f"{table.at('signal')}: no signal {name!r}; did you mean {', '.join(near)}?")
+    from_s = table.number("from_s", 0.0, 0.0, LONGEST_S)
+    to_s = table.number("to_s", LONGEST_S, from_s, LONGEST_S)
+    low, high = _limits(table)
+    if low == -math.inf and high == math.inf:
+        raise ScenarioError(f"{table.at('min')}: expected min, max or both")
+    return SignalExpectation(name, from_s, to_s, low, high)

@@ -1,0 +1,120 @@
+"""Blind trials: draw a case, explain its logs, open the answer, note what came out; append and resume."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from hil.diagnosis.data.log import UnusableError
+from hil.diagnosis.detection.result import Settings
+from hil.diagnosis.explain import explain
+from hil.diagnosis.result.answer import Answer
+from hil.errors import BrakebenchError
+from hil.validation.blind_trials import oracle
+from hil.validation.blind_trials.sources import state
+from hil.validation.reference_car.case import Case
+from hil.validation.reference_car.cases import draw, followed_by
+from hil.validation.reference_car.files import read_answer, write
+
+SIZES = (15.0, 8.0, 5.0, 3.0)
+"""Signal-to-noise ratios of the family of single causes, in the order they are run."""
+SURE = (15.0, 8.0)
+"""Those at which parameters, gain and calibration are scored."""
+Record = dict[str, Any]
+Say = Callable[[str], None]
+
+
+def plan(family: str, count: int) -> list[tuple[str, int, float | None]]:
+    """Cases of a family in the order they are run: which family they are drawn from, number, size.
+
+    ``single`` has ``count`` cases a size, effects in turn. ``parameters``, ``gain`` and ``calibration`` have ``count``
+    in all, half of them at each size of `SURE`, and share them with ``single``.
+    """
+    if family == "single":
+        return [("single", k, size) for size in SIZES for k in range(count)]
+    if family in ("parameters", "gain", "calibration"):
+        halves = ((count + 1) // 2, count // 2)
+        return [("single", k, size) for size, half in zip(SURE, halves, strict=True) for k in range(half)]
+    return [(family, k, None) for k in range(count)]
+
+
+def run_family(
+    family: str, count: int, seed: int, out: Path, say: Say, settings: Settings | None = None
+) -> list[Record]:
+    """Run what is not yet in ``out/cases.jsonl``; all records of the family, in order of the plan.
+
+    Several processes may do so with different families.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / "cases.jsonl"
+    done = {_key(record): record for record in _read(path) if record["seed"] == seed}
+    records = []
+    for drawn, index, size in plan(family, count):
+        key = (drawn, index, size)
+        if key not in done:
+            done[key] = run_case(draw(drawn, index, seed, size), seed, size, settings)
+            with path.open("ab", buffering=0) as file:  # one write: other families may be appending too
+                file.write(f"{json.dumps(done[key])}\n".encode())
+        records.append(done[key])
+        say(f"{family} {index} {'' if size is None else size}: {done[key]['verdict']} {done[key]['named'][:1]}")
+    return records
+
+
+def _key(record: Record) -> tuple[str, int, float | None]:
+    return str(record["family"]), int(record["index"]), record["size"]
+
+
+def _read(path: Path) -> list[Record]:
+    if not path.exists():
+        return []
+    lines = path.read_text(encoding="utf-8").splitlines()
+    try:
+        return [json.loads(line) for line in lines if line.strip()]
+    except ValueError as error:
+        raise BrakebenchError(f"{path}: a line is no JSON ({error}); remove it, the case is run again") from error
+
+
+def run_case(case: Case, seed: int, size: float | None, settings: Settings | None = None) -> Record:
+    """Hide, explain, open; ``seed`` is the trials', ``size`` the signal-to-noise ratio asked for.
+
+    Where ``oracle`` is given, it is the held-out error of a model that knows what is hidden (`oracle.oracle`).
+    A confounded case has ``follow_up``: what is said of the manoeuvres that decide, by themselves.
+    """
+    sources = state()  # of what runs now: a case takes minutes, and files may change
+    with TemporaryDirectory() as folder:
+        answered, said = _explained(case, Path(folder), settings)
+        truth = read_answer(Path(folder) / "logs")
+    record = {
+        "family": case.family, "index": case.index, "seed": seed, "size": size, "sources": sources,
+        "snr": truth["snr"], "reached": truth["reached"], "noise": case.noise_level,
+        "hidden": truth["causes"], **said,
+    }  # fmt: skip
+    if case.family == "single" and size in SURE and answered is not None:
+        record["oracle"] = oracle.told(answered.diagnosis, truth["causes"][0])
+    if case.family == "unlisted":
+        record["oracle"] = oracle.untouched(case)
+    if case.family == "confounded":
+        with TemporaryDirectory() as folder:
+            record["follow_up"] = _explained(followed_by(case), Path(folder), settings)[1]
+    return record
+
+
+def _explained(case: Case, folder: Path, settings: Settings | None) -> tuple[Answer | None, Record]:
+    """What `explain` says of the case's logs; data that nothing can be concluded from are an answer too."""
+    logs = folder / "logs"
+    write(case, logs)
+    try:
+        answered = explain(logs, logs / "vehicle.toml", out=folder / "out", settings=settings)
+    except UnusableError as error:
+        return None, {
+            "verdict": "unusable", "why": str(error), "named": [], "causes": [], "rivals": [],
+            "undetectable_effects": [], "held_out_error": {},
+        }  # fmt: skip
+    assert isinstance(answered, Answer)  # the reference car's logs tell forces
+    found = answered.json
+    return answered, {
+        "verdict": found["verdict"], "named": [cause["effect"] for cause in found["causes"]],
+        "causes": found["causes"], "rivals": [rival["effect"] for rival in found["rivals"]],
+        "undetectable_effects": found["undetectable_effects"], "held_out_error": found["held_out_error"],
+    }  # fmt: skip

@@ -1,0 +1,1 @@
+"""Takes what the code declares and gives the generated pages and figures of the documents."""

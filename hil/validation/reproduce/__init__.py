@@ -1,0 +1,1 @@
+"""Takes the paper's manoeuvres and gives its claims and figures, regenerated."""

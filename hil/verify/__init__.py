@@ -1,1 +1,0 @@
-"""The plant held against what is not ours: balances, closed forms, independent models; each as numbers and figures."""

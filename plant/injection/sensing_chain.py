@@ -1,0 +1,82 @@
+"""All sensing effects of a theta, in the order in which a signal meets them."""
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.effects.effect import Effect
+from plant.effects.sensing.catalogue import SENSING
+from plant.effects.sensing.kind import Memory, Numbers
+from plant.injection.theta import THETA, Theta
+from plant.layout import Vector
+
+
+@cache
+def _strengths(layout: Theta) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Where the numbers lie that switch effects on, and where those of each effect begin among them."""
+    places = np.arange(layout.size)
+    of_each = [
+        np.concatenate([places[layout.slice(effect.name, p.name)] for p in effect.strengths]) for effect in SENSING
+    ]
+    return np.concatenate(of_each), np.cumsum([0, *map(len, of_each)])[:-1]
+
+
+class Chain:
+    """What the nodes make of their signals; keeps its memory from call to call.
+
+    Parameters
+    ----------
+    theta : numbers of all effects.
+    layout : where they lie.
+    """
+
+    def __init__(self, theta: Vector, layout: Theta = THETA) -> None:
+        self._theta = theta
+        self._layout = layout
+        self._memory: dict[tuple[str, str], Memory] = {}
+        strengths, begins = _strengths(layout)
+        on = np.logical_or.reduceat(theta[strengths] != 0.0, begins)
+        self._active = [effect for effect, is_on in zip(SENSING, on, strict=True) if is_on]
+        self._nodes = {node for effect in self._active for node in effect.nodes}
+
+    def _numbers(self, effect: Effect, time_s: Vector) -> Numbers:
+        onset, until = (self._theta[self._layout.slice(effect.name, name)][0] for name in ("onset_s", "until_s"))
+        within = ((time_s >= onset) & (time_s < until))[:, None]
+        always = bool(within.all())
+        numbers = {}
+        for parameter in effect.parameters:
+            values = self._theta[self._layout.slice(effect.name, parameter.name)]
+            if always or parameter.shape:
+                numbers[parameter.name] = np.repeat(values[None], len(time_s), axis=0)
+            else:
+                numbers[parameter.name] = np.where(within, values, 0.0)
+        return numbers
+
+    def touches(self, node: str) -> bool:
+        """Whether any effect changes a node's signals."""
+        return node in self._nodes
+
+    def sense(self, node: str, time_s: Vector, values: Vector) -> Vector:
+        """What a node reports of true ``values``, shape (samples, signals), at ``time_s`` of the model."""
+        for effect in self._active:
+            if node in effect.nodes and effect.sense is not None:
+                memory = self._memory.setdefault((effect.name, node), {})
+                values = effect.sense(node, time_s, values, self._numbers(effect, time_s), memory)
+        return values
+
+    def undo(self, node: str, time_s: Vector, values: Vector) -> Vector:
+        """True values of what a node reported, on whole arrays.
+
+        Raises
+        ------
+        ValueError
+            An effect that is on has no inverse (filters, steps, drop-outs).
+        """
+        for effect in reversed(self._active):
+            if node not in effect.nodes:
+                continue
+            if effect.undo is None:
+                raise ValueError(f"{effect.name} cannot be undone: information is lost; leave {node} as an output")
+            values = effect.undo(node, time_s, values, self._numbers(effect, time_s), {})
+        return values

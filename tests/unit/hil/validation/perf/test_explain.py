@@ -1,0 +1,80 @@
+"""The comparison of `explain` with its rivals: how figures are formed, and one small run of it."""
+
+import json
+import math
+
+import pytest
+
+from hil.cli.main import main
+from hil.errors import BrakebenchError
+from hil.validation.perf import explain
+from hil.validation.perf.explain import Outcome, rows_of, told
+from hil.validation.perf.rivals import NONE, RIVALS, Guess
+
+GRADE, NOTHING = Guess("road_grade", {"road_grade": 1.0, NONE: 0.0}), Guess(NONE, {NONE: 1.0})
+
+
+def _entry(effect: str, probability: float) -> dict[str, object]:
+    return {"effect": effect, "probability": probability}
+
+
+def test_our_answer_leaves_the_rest_to_nothing():
+    guess = told({"causes": [_entry("road_grade", 0.7)], "rivals": [_entry("imu_bias", 0.2)]})
+    assert guess.named == "road_grade"
+    assert guess.probability == pytest.approx({"road_grade": 0.7, "imu_bias": 0.2, NONE: 0.1})
+    assert told({"causes": [], "rivals": []}) == NOTHING
+
+
+def test_a_tied_set_shares_no_more_than_1():
+    guess = told({"causes": [_entry("road_grade", 1.0)], "rivals": [_entry("imu_bias", 0.5), _entry("imu_bias", 0.3)]})
+    assert guess.probability == pytest.approx({"road_grade": 2 / 3, "imu_bias": 1 / 3, NONE: 0.0})
+
+
+def test_the_brier_score_is_of_all_names():
+    assert Outcome("road_grade", GRADE, 1.0).brier == 0.0
+    assert Outcome("mass_offset", GRADE, 1.0).brier == 2.0  # a name it never thought of counts
+    assert Outcome(NONE, Guess("a", {"a": 0.6, "b": 0.2, NONE: 0.2}), 1.0).brier == pytest.approx(0.36 + 0.04 + 0.64)
+
+
+def test_ratios_of_shares_stay_finite():
+    ours = [Outcome("road_grade", GRADE, 8.0), Outcome(NONE, NOTHING, 8.0), Outcome(NONE, NOTHING, 4.0)]
+    other = [Outcome("road_grade", NOTHING, 2.0), Outcome(NONE, GRADE, 2.0), Outcome(NONE, GRADE, 2.0)]
+    top, alarms, brier, time = rows_of(ours, other, "another")
+    assert (top.ours, top.other, top.ratio) == (1.0, 0.0, 2.0)
+    assert (alarms.ours, alarms.other, alarms.ratio) == (0.0, 1.0, 3.0)
+    assert (brier.ours, brier.other, brier.ratio) == (0.0, 2.0, 7.0)
+    assert (time.ours, time.other, time.ratio) == (8.0, 2.0, 0.25)
+    assert all(row.ratio == pytest.approx(1.0) for row in rows_of(ours, ours, "ourselves"))
+
+
+def test_without_pysindy_it_says_what_to_install(monkeypatch, capsys):
+    monkeypatch.setitem(__import__("sys").modules, "pysindy.optimizers", None)
+    with pytest.raises(BrakebenchError, match=r"pip install 'brakebench\[perf\]'"):
+        explain.measure()
+    assert main(["perf", "explain"]) == 2
+    assert "pysindy is not installed" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_all_rows_of_one_single_and_one_null_on_a_few_of_their_logs(monkeypatch, capsys):
+    pytest.importorskip("pysindy", reason="pysindy is not installed")
+    whole = explain.write
+
+    def few(case, folder):
+        whole(case, folder)
+        for log in folder.glob("*.parquet"):
+            if log.name not in explain.WARM_UP:
+                log.unlink()
+
+    monkeypatch.setattr(explain, "write", few)
+    monkeypatch.setattr(explain, "SINGLES", (0,))
+    monkeypatch.setattr(explain, "NULLS", (0,))
+    assert main(["perf", "explain", "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    assert len({(row["name"], row["other_is"]) for row in rows}) == len(rows) == 4 * len(RIVALS)
+    assert {row["other_is"] for row in rows} == set(RIVALS)
+    for row in rows:
+        assert all(math.isfinite(row[key]) for key in ("ours", "other", "ratio"))
+        assert row["ratio"] > 0.0
+        assert row["unit"] != "share" or 0.0 <= row["ours"] <= 1.0 >= row["other"] >= 0.0
