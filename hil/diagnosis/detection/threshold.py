@@ -11,8 +11,8 @@ shortlisted), ``UNMEASURED_RATIO``, ``UNSURE`` and ``FEW`` beside ``model_discre
 (`hil.diagnosis.estimation.terms`: prior sd of a candidate), ``FORM_SD_SHARE`` (`hil.diagnosis.estimation.uncertainty`:
 sd of a value by the form of its equation, in the Occam factor of a shape), ``HUBER``
 (`hil.diagnosis.noise.innovations`) and the prior sds and bounds of the nuisance parameters
-(`hil.diagnosis.vehicle.priors`). ``BASIS_SIZE`` (`hil.diagnosis.detection.nonparametric`) is the degrees of freedom of a
-nonparametric term's threshold.
+(`hil.diagnosis.vehicle.priors`). ``BASIS_SIZE`` (`hil.diagnosis.detection.nonparametric`) is the degrees of freedom of
+a nonparametric term's threshold.
 """
 
 from dataclasses import dataclass, replace
