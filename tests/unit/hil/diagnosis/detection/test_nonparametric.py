@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from plant.effects.bank import term
 
 from hil.diagnosis.detection.nonparametric import (
     BASIS_SIZE,
@@ -21,6 +20,7 @@ from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.vehicle.load import paper_car
 from hil.scenario.effects import EffectError, read_laws, written_laws
 from hil.scenario.scenario import load_scenario
+from plant.injection.bank import term
 
 LAW_TOML = """
 [[laws]]

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import pytest
-from plant.effects.theta import THETA
 
 from hil.diagnosis.data.log import UnusableError
 from hil.diagnosis.result.extended_scenario import extended_scenario
 from hil.scenario.scenario import load_scenario
+from plant.injection.theta import THETA
 
 EXTENSION = """
 [effects.imu_bias]
