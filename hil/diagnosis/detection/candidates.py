@@ -1,4 +1,8 @@
-"""The field of a race: what every candidate shows at a model, how much it explains there, and who is worth a look."""
+"""The candidates of a dataset: their Jacobian at a model, and what each of them gains there.
+
+Takes the simulator and what the vehicle set states; gives score tests (`hil.diagnosis.detection.score_test`) and the
+shortlist of those that are scored again with their own noise.
+"""
 
 from collections.abc import Sequence
 from copy import copy
@@ -7,12 +11,21 @@ from dataclasses import replace
 import numpy as np
 
 from hil.diagnosis.data.axle_torques import undriven
-from hil.diagnosis.detection.onset import OnsetTime, onset_penalty, segment_starts
-from hil.diagnosis.detection.onset_scan import scan_onset_by_segment
 from hil.diagnosis.detection.profile_fit import CandidateFits
-from hil.diagnosis.detection.result import Diagnosis
-from hil.diagnosis.detection.score_test import ScoreTest, score, scores, shortlist
-from hil.diagnosis.detection.zero_gradient import has_zero_gradient, line_search
+from hil.diagnosis.detection.score_test import (
+    OnsetTime,
+    ScoreTest,
+    candidate_key,
+    has_zero_gradient,
+    line_search,
+    onset_penalty,
+    scan_onset_by_segment,
+    score,
+    scores,
+    segment_starts,
+    shortlist,
+)
+from hil.diagnosis.detection.threshold import SCORED_WITH_OWN_NOISE
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Tracks
 from hil.diagnosis.estimation.information import (
     InformationBlocks,
@@ -25,121 +38,112 @@ from hil.diagnosis.noise.model import Noise, SampleMasks
 from hil.diagnosis.simulation.hot_spots import phase_penalty
 from hil.diagnosis.simulation.simulator import Simulator
 
-_PLAUSIBLE = 12
-
 
 class CandidateSet:
-    """All candidates of a case; ``tracks`` are their sensitivities where they were last taken.
+    """All candidates of a dataset; ``jacobian`` are the signatures where `linearise_at` was called last.
 
-    Nodes that are ``quiet`` tell nothing but noise (`unexcited_sensors`).
+    Parameters
+    ----------
+    undiagnosable : effects that the vehicle set says too little for.
+    unexcited : nodes whose channels carry only noise (`unexcited_sensors`).
     """
 
-    def __init__(self, rig: Simulator, frame: SampleMasks, untold: Sequence[str], quiet: Sequence[str] = ()) -> None:
-        self._rig, self._frame = rig, frame
-        self._columns = columns(untold)
-        without = undriven(drive.log for drive in rig.dataset.recordings)
-        listed = candidates(self._columns, without, rig.vehicle.suspension_stated, quiet)
-        self.candidates = [self._priced(one) for one in listed]
+    def __init__(
+        self, simulator: Simulator, masks: SampleMasks, undiagnosable: Sequence[str], unexcited: Sequence[str] = ()
+    ) -> None:
+        self._simulator, self._masks = simulator, masks
+        self._columns = columns(undiagnosable)
+        without = undriven(recording.log for recording in simulator.dataset.recordings)
+        listed = candidates(self._columns, without, simulator.vehicle.suspension_stated, unexcited)
+        self.candidates = [self._with_penalty(one) for one in listed]
         self.jacobian: Tracks = {}
 
-    def _priced(self, candidate: Candidate) -> Candidate:
-        """Of hot spots the data chose the angles."""
-        turned = candidate.effect.name == "hot_spot"
-        return (
-            replace(candidate, selection_penalty=phase_penalty(self._rig.hot_spot_visibility, candidate.members()))
-            if turned
-            else candidate
-        )
+    def _with_penalty(self, candidate: Candidate) -> Candidate:
+        """The data chose the phase angles of hot spots."""
+        if candidate.effect.name != "hot_spot":
+            return candidate
+        penalty = phase_penalty(self._simulator.hot_spot_visibility, candidate.members())
+        return replace(candidate, selection_penalty=penalty)
 
     def linearise_at(self, fitter: Fitter, model: Model) -> None:
-        """Take the sensitivities at a model."""
-        world = fitter.parameter_set(model.z, model.terms)
-        self._rig.cache_baseline(world)
-        worlds = [column.stepped(world) for column in self._columns]
+        """Renew the Jacobian at a model."""
+        base = fitter.parameter_set(model.z, model.terms)
+        self._simulator.cache_baseline(base)
+        stepped = [column.stepped(base) for column in self._columns]
         steps = [column.step for column in self._columns]
-        self.jacobian = finite_difference_jacobian(self._rig, self._frame, model.channels, worlds, steps)
+        self.jacobian = finite_difference_jacobian(self._simulator, self._masks, model.channels, stepped, steps)
 
     def at(self, fitter: Fitter, model: Model) -> "CandidateSet":
-        """The same candidates, their sensitivities taken at another model."""
+        """The same candidates with the Jacobian at another model."""
         other = copy(self)
         other.linearise_at(fitter, model)
         return other
 
-    def scores(self, fitter: Fitter, sums: InformationBlocks, model: Model, noise: Noise) -> list[ScoreTest]:
-        """What each explains beside a model by one step; what does nothing at first, by a replay at full size."""
+    def scores(self, fitter: Fitter, blocks: InformationBlocks, model: Model, noise: Noise) -> list[ScoreTest]:
+        """Score test of each candidate given a model, by ``blocks`` of its nuisances, terms and all candidates."""
         accepted = len(model.terms)
-        projected = marginalise(sums.total(), sums.nuisances, range(accepted), model.z, fitter.at_bounds(model.z))
-        in_use = {id(term.candidate): term.value for term in model.terms}
-        now = [in_use.get(id(candidate), 0.0) for candidate in self.candidates]
-        found = scores(self.candidates, projected, accepted, now)
-        self._rig.cache_baseline(fitter.parameter_set(model.z, model.terms))
-        hidden = [item for item in found if has_zero_gradient(item)]
-        shown = CandidateFits.at_once(lambda item: line_search(fitter, model, noise, item), hidden)
-        met = dict(zip(map(id, hidden), shown, strict=True))
-        return [met.get(id(item), item) for item in found]
-
-    def scores_and_information(
-        self, fitter: Fitter, found: Diagnosis, model: Model, noise: Noise
-    ) -> tuple[list[ScoreTest], InformationBlocks]:
-        """What each explains beside a model by one step, and the products that tell it."""
-        if model.terms:
-            sums = fitter.information_blocks(model, self.jacobian, noise)
-            return self.scores(fitter, sums, model, noise), sums
-        assert found.information is not None  # screened before any cause is looked for
-        return found.scores, found.information
+        marginal = marginalise(blocks.total(), blocks.nuisances, range(accepted), model.z, fitter.at_bounds(model.z))
+        values = {id(term.candidate): term.value for term in model.terms}
+        tests = scores(
+            self.candidates, marginal, accepted, [values.get(id(candidate), 0.0) for candidate in self.candidates]
+        )
+        self._simulator.cache_baseline(fitter.parameter_set(model.z, model.terms))
+        behind_limits = [item for item in tests if has_zero_gradient(item)]
+        searched = CandidateFits.at_once(lambda item: line_search(fitter, model, noise, item), behind_limits)
+        by_search = dict(zip(map(id, behind_limits), searched, strict=True))
+        return [by_search.get(id(item), item) for item in tests]
 
     def shortlist(
-        self, fitter: Fitter, listed: list[ScoreTest], sums: InformationBlocks, model: Model, bent: bool
+        self, fitter: Fitter, tests: list[ScoreTest], blocks: InformationBlocks, model: Model, biased: bool
     ) -> list[ScoreTest]:
-        """Those that explain most by one step and are not in the model yet; of all places, where numbers are bent."""
-        held, starts = fitter.at_bounds(model.z), segment_starts(self._rig.dataset)
-        listed = scan_onset_by_segment(
-            listed, sums, len(model.terms), model.z, held, starts, onset_penalty(self._frame)
+        """The best that are not in the model yet, with an onset where that gains more.
+
+        Where the nuisance parameters may be ``biased``, so is the order of locations, and all locations take part.
+        """
+        fixed, starts = fitter.at_bounds(model.z), segment_starts(self._simulator.dataset)
+        tests = scan_onset_by_segment(
+            tests, blocks, len(model.terms), model.z, fixed, starts, onset_penalty(self._masks)
         )
-        used = {candidate_key(term.candidate) for term in model.terms}
-        listed = [item for item in listed if candidate_key(item.candidate) not in used]
-        best = shortlist(listed, _PLAUSIBLE)
-        if bent:  # and which place is first is bent too
-            best = list(dict.fromkeys([*sorted(listed, key=lambda s: -s.log_bayes_factor)[:_PLAUSIBLE], *best]))
+        accepted = {candidate_key(term.candidate) for term in model.terms}
+        tests = [item for item in tests if candidate_key(item.candidate) not in accepted]
+        best = shortlist(tests, SCORED_WITH_OWN_NOISE)
+        if biased:
+            by_bayes_factor = sorted(tests, key=lambda s: -s.log_bayes_factor)
+            best = list(dict.fromkeys([*by_bayes_factor[:SCORED_WITH_OWN_NOISE], *best]))
         return best
 
     def scores_given(self, fitter: Fitter, model: Model, noise: Noise) -> list[ScoreTest]:
-        """What all other effects explain beside those of a model, by one step."""
-        sums, accepted = fitter.information_blocks(model, self.jacobian, noise), len(model.terms)
-        projected = marginalise(sums.total(), sums.nuisances, range(accepted), model.z, fitter.at_bounds(model.z))
+        """Score test of each effect parameter that is not in a model, given its terms (marginalised)."""
+        blocks, accepted = fitter.information_blocks(model, self.jacobian, noise), len(model.terms)
+        marginal = marginalise(blocks.total(), blocks.nuisances, range(accepted), model.z, fitter.at_bounds(model.z))
         used = {candidate_key(term.candidate)[:2] for term in model.terms}
-        listed = scores(self.candidates, projected, accepted, [0.0] * len(self.candidates))
-        return [item for item in listed if candidate_key(item.candidate)[:2] not in used]
+        tests = scores(self.candidates, marginal, accepted, [0.0] * len(self.candidates))
+        return [item for item in tests if candidate_key(item.candidate)[:2] not in used]
 
-    def scores_from_onset(self, fitter: Fitter, model: Model, noise: Noise, moment: OnsetTime) -> list[ScoreTest]:
-        """What each explains that begins in the manoeuvre of that moment, or in the next one."""
-        sums, accepted = fitter.information_blocks(model, self.jacobian, noise), len(model.terms)
+    def scores_from_onset(self, fitter: Fitter, model: Model, noise: Noise, onset: OnsetTime) -> list[ScoreTest]:
+        """Score test of each candidate from the segment of an onset on, or from the next one, whichever is better."""
+        blocks, accepted = fitter.information_blocks(model, self.jacobian, noise), len(model.terms)
         columns = [[accepted + k for k in candidate.columns] for candidate in self.candidates]
-        b, q = marginalise_from_onset(sums, columns, range(accepted), model.z, fitter.at_bounds(model.z))
-        starts = segment_starts(self._rig.dataset)
-        first = max(k for k, start in enumerate(starts) if start <= moment)
-        found = []
+        b, q = marginalise_from_onset(blocks, columns, range(accepted), model.z, fitter.at_bounds(model.z))
+        starts = segment_starts(self._simulator.dataset)
+        first = max(k for k, start in enumerate(starts) if start <= onset)
+        tests = []
         for k, candidate in enumerate(self.candidates):
-            blocks = range(first, min(first + 2, len(starts)))
-            looks = [score(candidate, float(b[block, k]), float(q[block, k])) for block in blocks]
-            found.append(max(looks, key=lambda look: look.log_bayes_factor))
-        return found
+            segments = range(first, min(first + 2, len(starts)))
+            both = [score(candidate, float(b[segment, k]), float(q[segment, k])) for segment in segments]
+            tests.append(max(both, key=lambda item: item.log_bayes_factor))
+        return tests
 
 
-def unexcited_sensors(shown: Tracks, noise: Noise) -> list[str]:
-    """Nodes of what drives the car whose channels ``shown``, simulated, are less than the noise of one sample.
+def unexcited_sensors(channels: Tracks, noise: Noise) -> list[str]:
+    """Input nodes whose simulated channels stay below the noise of one sample.
 
-    Their noise drives the simulated car, a little; a scale that takes it away says nothing of the sensor (regression
-    dilution, Fuller 1987, Measurement Error Models, section 1.1: half of what is told is noise).
+    Their noise drives the simulated car a little; a scale that removes it says nothing of the sensor (regression
+    dilution, Fuller 1987, Measurement Error Models, section 1.1).
     """
 
-    def tells(node: str) -> bool:
-        tracks = [name for name in shown if name.startswith(f"{node}.")]
-        return any(np.mean(np.square(shown[name])) > noise.tracks[name].a ** 2 for name in tracks)
+    def excited(node: str) -> bool:
+        names = [name for name in channels if name.startswith(f"{node}.")]
+        return any(np.mean(np.square(channels[name])) > noise.tracks[name].a ** 2 for name in names)
 
-    return [node for node in ("pressure", "motor") if not tells(node)]
-
-
-def candidate_key(candidate: Candidate) -> tuple[str, str, str]:
-    """What tells a candidate from others."""
-    return candidate.effect.name, candidate.parameter.name, candidate.location
+    return [node for node in ("pressure", "motor") if not excited(node)]

@@ -1,10 +1,12 @@
-"""The race of the unlisted laws: how much each explains at each place, beside what listed effects do."""
+"""Group score test of the nonparametric terms: what each gains at each location by one linear step.
+
+Takes a fitter and a parameter set, at which all terms are simulated once; gives a `GroupScore` for each.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.nonparametric import BASIS_SIZE, BasisExpansion, at_each_location, basis_expansions
@@ -16,121 +18,122 @@ from hil.diagnosis.simulation.parameter_set import ParameterSet
 from plant.effects.effect import Scope
 
 _BY_WHEEL, _AXLES = ("friction.mu",), ("front", "rear")
-_SHARE = 0.1
+_STEP_SHARE = 0.1
+"""Finite difference of a coefficient, in typical sizes."""
 
 
 @dataclass(frozen=True, eq=False)
 class GroupScore:
-    """A law at a place: coefficients of one linear step, gain in chi2, log of its Bayes factor.
-
-    ``choices`` is the number of laws and places that it was chosen from.
-    """
+    """Score test of a nonparametric term at a location: coefficients of one linear step, gain in chi-squared, log Bayes
+    factor; ``choices`` is the number of terms and locations that it is chosen from."""
 
     expansion: BasisExpansion
     values: Floats
     gain: float
-    evidence: float
+    log_bayes_factor: float
     choices: int
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """As terms of a model, where they do nothing yet."""
-        return tuple(Term(piece, 0.0) for piece in self.expansion.functions)
+        """As terms of a model, of value 0."""
+        return tuple(Term(function, 0.0) for function in self.expansion.functions)
 
 
 class GroupScoreTest:
-    """Sensitivities to all laws at one model, simulated once; wheel by wheel for the law that leads."""
+    """Group score test of all nonparametric terms at one parameter set; wheel by wheel for the best term."""
 
-    def __init__(self, fitter: Fitter, world: ParameterSet) -> None:
-        self._rig, self._frame, self._world = fitter.simulator, fitter.masks, world
-        self._rig.cache_baseline(world)
+    def __init__(self, fitter: Fitter, base: ParameterSet) -> None:
+        self._simulator, self._masks, self._base = fitter.simulator, fitter.masks, base
+        self._simulator.cache_baseline(base)
         self._parts = {
-            curve: [curve.at(place) for place in _parts(curve)] for curve in basis_expansions(fitter.simulator, world)
+            expansion: [expansion.at(location) for location in _parts(expansion)]
+            for expansion in basis_expansions(fitter.simulator, base)
         }
-        self._columns = self._simulated([part for parts in self._parts.values() for part in parts])
+        self._jacobians = self._linearised([part for parts in self._parts.values() for part in parts])
 
-    def _simulated(self, parts: Sequence[BasisExpansion]) -> dict[tuple[str, str], Tracks]:
-        """Columns of each law and place."""
-        pieces = [piece for part in parts for piece in part.functions]
-        steps = [_SHARE * piece.term.typical for piece in pieces]
-        worlds = [piece.applied(self._world, step) for piece, step in zip(pieces, steps, strict=True)]
-        all_of = finite_difference_jacobian(self._rig, self._frame, self._rig.run(self._world), worlds, steps)
+    def _linearised(self, parts: Sequence[BasisExpansion]) -> dict[tuple[str, str], Tracks]:
+        """Jacobian of the coefficients of each term and location."""
+        functions = [function for part in parts for function in part.functions]
+        steps = [_STEP_SHARE * function.term.typical for function in functions]
+        stepped = [function.applied(self._base, step) for function, step in zip(functions, steps, strict=True)]
+        whole = finite_difference_jacobian(
+            self._simulator, self._masks, self._simulator.run(self._base), stepped, steps
+        )
         return {
             (part.term.name, part.location): {
-                name: values[:, BASIS_SIZE * k : BASIS_SIZE * (k + 1)] for name, values in all_of.items()
+                name: values[:, BASIS_SIZE * k : BASIS_SIZE * (k + 1)] for name, values in whole.items()
             }
             for k, part in enumerate(parts)
         }
 
     def scores(self, fitter: Fitter, model: Model, noise: Noise) -> list[GroupScore]:
-        """Every law at every place it was simulated for, the best first, by the fitter's sensitivities to numbers."""
-        found = self._ranked(fitter, model, noise)
-        leading = next(curve for curve in self._parts if curve.term is found[0].expansion.term)
+        """Every term at every location that the simulated parts add up to, by log Bayes factor, best first."""
+        ranked = self._ranked(fitter, model, noise)
+        leading = next(expansion for expansion in self._parts if expansion.term is ranked[0].expansion.term)
         if len(self._parts[leading]) == len(_AXLES):
             self._parts[leading] = [leading.at(wheel) for wheel in Scope.WHEEL.members]
-            self._rig.cache_baseline(self._world)
-            self._columns |= self._simulated(self._parts[leading])
-            found = self._ranked(fitter, model, noise)
-        return found
+            self._simulator.cache_baseline(self._base)
+            self._jacobians |= self._linearised(self._parts[leading])
+            ranked = self._ranked(fitter, model, noise)
+        return ranked
 
-    def columns(self, entry: GroupScore) -> Tracks:
-        """Sensitivities to the coefficients of a law at a place."""
-        curve = next(curve for curve in self._parts if curve.term is entry.expansion.term)
-        parts = self._parts[curve]
-        taken = next(taken for placed, taken in _offered(curve, parts) if placed.location == entry.expansion.location)
-        listed = [self._columns[parts[k].term.name, parts[k].location] for k in taken]
-        return {name: np.sum([columns[name] for columns in listed], axis=0) for name in listed[0]}
+    def jacobian(self, entry: GroupScore) -> Tracks:
+        """Jacobian of the coefficients of a term at a location, tracks of (samples, BASIS_SIZE)."""
+        expansion = next(expansion for expansion in self._parts if expansion.term is entry.expansion.term)
+        parts = self._parts[expansion]
+        taken = next(at for placed, at in _offered(expansion, parts) if placed.location == entry.expansion.location)
+        listed = [self._jacobians[parts[k].term.name, parts[k].location] for k in taken]
+        return {name: np.sum([tracks[name] for tracks in listed], axis=0) for name in listed[0]}
 
     def _ranked(self, fitter: Fitter, model: Model, noise: Noise) -> list[GroupScore]:
-        listed = [self._columns[part.term.name, part.location] for parts in self._parts.values() for part in parts]
-        joined = {name: np.hstack([columns[name] for columns in listed]) for name in self._frame.names}
-        sums = fitter.information_blocks(model, joined, noise)
-        accepted = len(model.terms)
-        projected = marginalise(sums.total(), sums.nuisances, range(accepted), model.z, fitter.at_bounds(model.z))
-        b, q = projected.b[accepted:], projected.q[accepted:, accepted:]
-        offered = {curve: _offered(curve, parts) for curve, parts in self._parts.items()}
+        listed = [self._jacobians[part.term.name, part.location] for parts in self._parts.values() for part in parts]
+        joined = {name: np.hstack([tracks[name] for tracks in listed]) for name in self._masks.names}
+        blocks, accepted = fitter.information_blocks(model, joined, noise), len(model.terms)
+        marginal = marginalise(blocks.total(), blocks.nuisances, range(accepted), model.z, fitter.at_bounds(model.z))
+        b, q = marginal.b[accepted:], marginal.q[accepted:, accepted:]
+        offered = {expansion: _offered(expansion, parts) for expansion, parts in self._parts.items()}
         choices = sum(map(len, offered.values()))
-        found, at = [], 0
-        for curve, parts in self._parts.items():
-            size = BASIS_SIZE * len(parts)
-            own = slice(at, at + size)
-            for placed, taken in offered[curve]:
-                moves = np.hstack([np.eye(BASIS_SIZE) * float(k in taken) for k in range(len(parts))])
-                found.append(_entry(placed, moves @ b[own], moves @ q[own, own] @ moves.T, choices))
-            at += size
-        return sorted(found, key=lambda entry: -entry.evidence)
+        entries, at = [], 0
+        for expansion, parts in self._parts.items():
+            own = slice(at, at + BASIS_SIZE * len(parts))
+            for placed, taken in offered[expansion]:
+                sums = np.hstack([np.eye(BASIS_SIZE) * float(k in taken) for k in range(len(parts))])
+                entries.append(_group_score(placed, sums @ b[own], sums @ q[own, own] @ sums.T, choices))
+            at = own.stop
+        return sorted(entries, key=lambda entry: -entry.log_bayes_factor)
 
 
-def _parts(curve: BasisExpansion) -> Sequence[str]:
-    """Places that are simulated at first; all others are sums of them."""
-    return _AXLES if curve.term.injection_point in _BY_WHEEL else ("car",)
+def _parts(expansion: BasisExpansion) -> Sequence[str]:
+    """Locations that are simulated at first; all others are sums of them."""
+    return _AXLES if expansion.term.injection_point in _BY_WHEEL else ("car",)
 
 
-def _offered(curve: BasisExpansion, parts: Sequence[BasisExpansion]) -> list[tuple[BasisExpansion, list[int]]]:
-    """The law at every place that parts add up to, with those parts."""
-    found = []
-    for placed in at_each_location(curve):
+def _offered(expansion: BasisExpansion, parts: Sequence[BasisExpansion]) -> list[tuple[BasisExpansion, list[int]]]:
+    """The term at every location that parts add up to, with the indices of those parts."""
+    offered = []
+    for placed in at_each_location(expansion):
         members = set(placed.functions[0].members())
         taken = [k for k, part in enumerate(parts) if set(part.functions[0].members()) <= members]
         if sum(len(parts[k].functions[0].members()) for k in taken) == len(members):
-            found.append((placed, taken))
-    return found
+            offered.append((placed, taken))
+    return offered
 
 
-def _entry(curve: BasisExpansion, b: Floats, q: Floats, choices: int) -> GroupScore:
-    usual = curve.term.typical
-    values = np.linalg.solve(q + np.eye(BASIS_SIZE) / usual**2, b)
+def _group_score(expansion: BasisExpansion, b: Floats, q: Floats, choices: int) -> GroupScore:
+    typical = expansion.term.typical
+    values = np.linalg.solve(q + np.eye(BASIS_SIZE) / typical**2, b)
     gain = float(values @ b)
-    return GroupScore(curve, values, gain, 0.5 * gain + _volume(q, usual) - float(np.log(choices)), choices)
+    log_bayes_factor = 0.5 * gain + _log_volume_ratio(q, typical) - float(np.log(choices))
+    return GroupScore(expansion, values, gain, log_bayes_factor, choices)
 
 
-def _volume(information: Floats, usual: float) -> float:
-    """Log of the share of its prior that the data leave a law; hats they say nothing of cost nothing."""
-    return -0.5 * float(np.linalg.slogdet(np.eye(BASIS_SIZE) + usual**2 * information)[1])
+def _log_volume_ratio(information: Floats, typical: float) -> float:
+    """Log of posterior over prior volume of the coefficients; basis functions without information cost nothing."""
+    return -0.5 * float(np.linalg.slogdet(np.eye(BASIS_SIZE) + typical**2 * information)[1])
 
 
 def best_of_each_term(entries: Sequence[GroupScore], count: int) -> list[GroupScore]:
-    """The first of each law, of so many laws."""
+    """The best location of each of the ``count`` best terms."""
     best: dict[str, GroupScore] = {}
     for entry in entries:
         best.setdefault(entry.expansion.term.name, entry)
@@ -138,24 +141,19 @@ def best_of_each_term(entries: Sequence[GroupScore], count: int) -> list[GroupSc
 
 
 def fitted_hypothesis(entry: GroupScore, model: Model, noise: Noise, reference: float) -> FittedHypothesis:
-    """A model with the law as its last terms; it takes its cost off ``reference``."""
+    """A model whose last terms are the nonparametric term; its gain is against the cost ``reference``."""
     values = np.array([term.value for term in model.terms[-BASIS_SIZE:]])
-    share = log_occam_factor(entry, values, model.covariance[-BASIS_SIZE:, -BASIS_SIZE:])
-    return FittedHypothesis(model.terms[-1], model, model.cost, share, 0.0, noise, reference - model.cost)
+    occam = log_occam_factor(entry, values, model.covariance[-BASIS_SIZE:, -BASIS_SIZE:])
+    return FittedHypothesis(model.terms[-1], model, model.cost, occam, 0.0, noise, reference - model.cost)
 
 
 def log_occam_factor(entry: GroupScore, values: Floats, covariance: Floats) -> float:
-    """Log of the prior's density and of the share of it that is left, at the fitted coefficients.
+    """Log of prior density and of posterior over prior volume at the fitted coefficients.
 
     Parameters
     ----------
-    values, covariance : (PIECES,) and (PIECES, PIECES) of the law's coefficients, from the data alone.
+    values, covariance : (BASIS_SIZE,) and (BASIS_SIZE, BASIS_SIZE) of the coefficients, from the data alone.
     """
-    usual = entry.expansion.term.typical
-    density = -0.5 * float(values @ values) / usual**2
-    return density + _volume(np.linalg.inv(covariance), usual) - float(np.log(entry.choices))
-
-
-def group_detection_threshold(looks: int, alpha: float) -> float:
-    """Gain that nothing hidden exceeds with probability ``alpha`` in so many looks, the model's error shared out."""
-    return float(chi2.isf(alpha / max(looks, 1), BASIS_SIZE))
+    typical = entry.expansion.term.typical
+    density = -0.5 * float(values @ values) / typical**2
+    return density + _log_volume_ratio(np.linalg.inv(covariance), typical) - float(np.log(entry.choices))

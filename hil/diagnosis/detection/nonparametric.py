@@ -1,7 +1,8 @@
-"""Causes nobody listed: curves of one variable at a joint, in the same race as the listed effects.
+"""Nonparametric terms: unknown functions of one variable at an injection point, rivals of the listed effects.
 
-A law is ``c_1 f_1(v) + ... + c_5 f_5(v)`` with hats over the range that the logs cover, multiplied or added at a joint
-of the plant (`plant.injection.bank`). Listed effects alone would take a wrong name for what is in no list.
+A term is ``c_1 f_1(v) + ... + c_5 f_5(v)`` with hat functions over the range of ``v`` that the logs cover, multiplied
+or added at an injection point of the plant (`plant.injection.bank`). With listed effects alone, an unlisted cause would
+get a wrong name. Takes a simulator and a parameter set, gives the basis expansions and, of fitted ones, the curves.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,7 +21,7 @@ from plant.injection_points import INJECTION_POINTS
 
 BASIS_SIZE = 5
 _WHEELS = Scope.WHEEL.members
-_CALLED = {
+_VARIABLE_NAMES = {
     Variable.SPEED: "speed", Variable.WHEEL_SPEED: "wheel_speed", Variable.PRESSURE: "pressure",
     Variable.DISC_TEMPERATURE: "disc_temperature", Variable.APPLIED_TIME: "time_since_on", Variable.TIME: "time",
     Variable.MOTOR_TORQUE: "motor_torque", Variable.ACCELERATION: "acceleration", Variable.YAW_RATE: "yaw_rate",
@@ -35,13 +36,15 @@ _COLUMNS = {
     Variable.DISTANCE: ["state.distance_m"],
 }  # fmt: skip
 _APPLIED_S = (0.0, 4.0)
+"""Range of the time since a brake was applied, s."""
 _EDGE, _LEAST_RANGE = 0.01, 1e-6
+"""Quantile at either end that a range leaves out; smallest range, in the variable's unit."""
 
 
 @dataclass(frozen=True)
 class NonparametricTerm:
-    """Where and on what an unlisted cause may depend: joint, variable, whether it is added, usual size (of the joint's
-    unit, or a share), and whether single wheels are told apart in the race."""
+    """An unknown function: where it enters, the variable it depends on, whether it is added or a factor, and its
+    typical size (unit of the injection point, or a share)."""
 
     injection_point: str
     variable: Variable
@@ -51,11 +54,11 @@ class NonparametricTerm:
     @property
     def name(self) -> str:
         """For people and keys."""
-        return f"{self.injection_point}({_CALLED[self.variable]})"
+        return f"{self.injection_point}({_VARIABLE_NAMES[self.variable]})"
 
     @property
     def scope(self) -> Scope:
-        """Whether each wheel has its own."""
+        """Wheel where the injection point has four members, else car."""
         return Scope.WHEEL if INJECTION_POINTS[self.injection_point][0] == 4 else Scope.CAR
 
 
@@ -63,7 +66,9 @@ NONPARAMETRIC_TERMS = (
     *(NonparametricTerm("friction.mu", v, False, 0.2) for v in (
         Variable.SPEED, Variable.PRESSURE, Variable.DISC_TEMPERATURE, Variable.APPLIED_TIME, Variable.TIME,
     )),
-    *(NonparametricTerm("motor.torque", v, False, 0.06) for v in (Variable.WHEEL_SPEED, Variable.MOTOR_TORQUE, Variable.TIME)),
+    *(NonparametricTerm("motor.torque", v, False, 0.06) for v in (
+        Variable.WHEEL_SPEED, Variable.MOTOR_TORQUE, Variable.TIME,
+    )),
     *(NonparametricTerm("body.force", v, True, 200.0) for v in (
         Variable.SPEED, Variable.TIME, Variable.DISTANCE, Variable.YAW_RATE,
     )),
@@ -73,12 +78,12 @@ NONPARAMETRIC_TERMS = (
     NonparametricTerm("imu.ax", Variable.SPEED, True, 0.05),
     NonparametricTerm("imu.ax", Variable.ACCELERATION, True, 0.05),
 )  # fmt: skip
-"""The laws in the race; speed is the only variable of what is weakly seen. A force by acceleration is mass."""
+"""All nonparametric terms; what few data show depends on speed alone. A force by acceleration is mass, and no term."""
 
 
 @dataclass(frozen=True, eq=False)
 class BasisFunction(Candidate):
-    """One hat of a law at a place."""
+    """One hat function of a nonparametric term at a location; its coefficient is the parameter."""
 
     term: NonparametricTerm
     centre: float
@@ -91,27 +96,27 @@ class BasisFunction(Candidate):
 
     @property
     def variable(self) -> str:
-        """What it depends on."""
-        return _CALLED[self.term.variable]
+        """Name of the variable."""
+        return _VARIABLE_NAMES[self.term.variable]
 
     def members(self) -> tuple[int, ...]:
-        """Members of the joint it acts on."""
+        """Members of the injection point it acts on."""
         return LOCATIONS[self.term.scope][self.location]
 
     def row(self, value: float) -> Floats:
-        """Its row of the bank."""
+        """Its row of the bank (`plant.injection.bank`) at this coefficient."""
         coefficients = [value if k in self.members() else 0.0 for k in range(self.term.scope.size)]
         shaped = (self.term.variable, Shape.HAT, self.centre, self.width)
         return term(self.term.injection_point, coefficients, shaped, add=self.term.adds)
 
-    def applied(self, world: ParameterSet, value: float) -> ParameterSet:
-        """The world with this number added."""
-        return replace(world, nonparametric_rows=np.vstack([world.nonparametric_rows, self.row(value)]))
+    def applied(self, base: ParameterSet, value: float) -> ParameterSet:
+        """The parameter set with this coefficient added."""
+        return replace(base, nonparametric_rows=np.vstack([base.nonparametric_rows, self.row(value)]))
 
 
 @dataclass(frozen=True, eq=False)
 class BasisExpansion:
-    """A law at a place with its hats."""
+    """A nonparametric term at a location with its basis functions."""
 
     term: NonparametricTerm
     location: str
@@ -119,59 +124,60 @@ class BasisExpansion:
 
     @property
     def variable(self) -> str:
-        """Name of what it depends on."""
-        return _CALLED[self.term.variable]
+        """Name of the variable."""
+        return _VARIABLE_NAMES[self.term.variable]
 
-    def at(self, place: str) -> "BasisExpansion":
-        """The same law elsewhere."""
-        return replace(
-            self, location=place, functions=tuple(replace(piece, location=place) for piece in self.functions)
-        )
+    def at(self, location: str) -> "BasisExpansion":
+        """The same term elsewhere."""
+        moved = tuple(replace(function, location=location) for function in self.functions)
+        return replace(self, location=location, functions=moved)
 
 
-def basis_expansions(rig: Simulator, world: ParameterSet) -> list[BasisExpansion]:
-    """Every law over the range its variable covers in the logs, at all wheels; those with a range."""
-    seen = _ranges(rig, world)
-    found = []
-    for law in NONPARAMETRIC_TERMS:
-        low, high = seen[_acting(law), law.variable]
+def basis_expansions(simulator: Simulator, base: ParameterSet) -> list[BasisExpansion]:
+    """Every term whose variable covers a range in the logs, expanded over it, at all wheels."""
+    ranges = _ranges(simulator, base)
+    expansions = []
+    for one in NONPARAMETRIC_TERMS:
+        low, high = ranges[_excitation(one), one.variable]
         if high - low > _LEAST_RANGE:
-            found.append(basis_expansion(law, low, high))
-    return found
+            expansions.append(basis_expansion(one, low, high))
+    return expansions
 
 
-def at_each_location(curve: BasisExpansion) -> Iterator[BasisExpansion]:
-    """The law at every place."""
-    return (curve.at(place) for place in LOCATIONS[curve.term.scope])
+def at_each_location(expansion: BasisExpansion) -> Iterator[BasisExpansion]:
+    """The term at every location."""
+    return (expansion.at(location) for location in LOCATIONS[expansion.term.scope])
 
 
-def basis_expansion(law: NonparametricTerm, low: float, high: float) -> BasisExpansion:
-    """A law at all members, its hats evenly over a range of its variable."""
+def basis_expansion(unknown: NonparametricTerm, low: float, high: float) -> BasisExpansion:
+    """A term at all members, its hat functions evenly over a range of its variable."""
     centres = np.linspace(low, high, BASIS_SIZE)
-    unit = INJECTION_POINTS[law.injection_point][1] if law.adds else ""
-    bound = 20.0 * law.typical if law.adds else 0.9
-    numbers = tuple(Parameter(f"c{k + 1}", unit, -bound, bound, law.typical) for k in range(BASIS_SIZE))
+    point, variable = unknown.injection_point, _VARIABLE_NAMES[unknown.variable]
+    unit = INJECTION_POINTS[point][1] if unknown.adds else ""
+    bound = 20.0 * unknown.typical if unknown.adds else 0.9
+    coefficients = tuple(Parameter(f"c{k + 1}", unit, -bound, bound, unknown.typical) for k in range(BASIS_SIZE))
     effect = Effect(
-        name=UNLISTED, row=0, title=f"{law.injection_point} depends on {_CALLED[law.variable]} in a way that no list has",
-        equation="sum c_k hat((v - v_k) / w)", injection_points=(law.injection_point,), scope=law.scope,
-        parameters=numbers,
+        name=UNLISTED, row=0, title=f"{point} depends on {variable} in a way that no list has",
+        equation="sum c_k hat((v - v_k) / w)", injection_points=(point,), scope=unknown.scope, parameters=coefficients,
         source="measured data", signature="", manoeuvre="",
     )  # fmt: skip
     width = float(centres[1] - centres[0])
-    pieces = [
-        BasisFunction(effect, one, "car", (), 1, law, float(c), width) for one, c in zip(numbers, centres, strict=True)
+    functions = [
+        BasisFunction(effect, one, "car", (), 1, unknown, float(c), width)
+        for one, c in zip(coefficients, centres, strict=True)
     ]
-    return BasisExpansion(law, "car", tuple(pieces))
+    return BasisExpansion(unknown, "car", tuple(functions))
 
 
-def _acting(law: NonparametricTerm) -> str:
-    """Over which samples the range counts."""
-    return {"friction.mu": "brake", "motor.torque": "motor"}.get(law.injection_point, "moving")
+def _excitation(unknown: NonparametricTerm) -> str:
+    """Samples over which the range counts."""
+    return {"friction.mu": "brake", "motor.torque": "motor"}.get(unknown.injection_point, "moving")
 
 
-def _ranges(rig: Simulator, world: ParameterSet) -> dict[tuple[str, Variable], tuple[float, float]]:
+def _ranges(simulator: Simulator, base: ParameterSet) -> dict[tuple[str, Variable], tuple[float, float]]:
+    """Range of each variable by samples in which the car moves, brakes, drives by its motors; few outliers left out."""
     names = [name for columns in _COLUMNS.values() for name in columns]
-    table = rig.states(world, names)
+    table = simulator.states(base, names)
     values, at = {}, 0
     for variable, columns in _COLUMNS.items():
         values[variable] = table[:, at : at + len(columns)] + np.zeros((len(table), 4))
@@ -182,23 +188,23 @@ def _ranges(rig: Simulator, world: ParameterSet) -> dict[tuple[str, Variable], t
         "moving": moving, "brake": np.logical_and(moving, values[Variable.PRESSURE] > 2e5),
         "motor": np.logical_and(moving, np.abs(values[Variable.MOTOR_TORQUE]) > 20.0),
     }  # fmt: skip
-    found = {}
-    for acting, mask in masks.items():
+    ranges = {}
+    for excitation, mask in masks.items():
         for variable, of in values.items():
             some = of[mask]
             low, high = np.quantile(some, (_EDGE, 1.0 - _EDGE)) if some.size else (0.0, 0.0)
-            found[acting, variable] = float(low), float(high)
-        found[acting, Variable.APPLIED_TIME] = _APPLIED_S if mask.any() else (0.0, 0.0)
-    return found
+            ranges[excitation, variable] = float(low), float(high)
+        ranges[excitation, Variable.APPLIED_TIME] = _APPLIED_S if mask.any() else (0.0, 0.0)
+    return ranges
 
 
 def estimate_curve(
-    pieces: Sequence[BasisFunction], values: Sequence[float], covariance: Floats, points: int = 21
+    functions: Sequence[BasisFunction], values: Sequence[float], covariance: Floats, points: int = 21
 ) -> list[dict[str, float]]:
-    """The curve with its 95 % band: factor less one, or addend in the joint's unit."""
-    centres = np.array([piece.centre for piece in pieces])
+    """The curve with its 95 % band: factor less one, or addend in the injection point's unit."""
+    centres = np.array([function.centre for function in functions])
     x = np.linspace(centres[0], centres[-1], points)
-    hats = np.maximum(1.0 - np.abs(x[:, None] - centres) / pieces[0].width, 0.0)
+    hats = np.maximum(1.0 - np.abs(x[:, None] - centres) / functions[0].width, 0.0)
     y = hats @ np.asarray(values)
     half = 1.96 * np.sqrt(np.maximum(np.einsum("xi,ij,xj->x", hats, covariance, hats), 0.0))
     return [

@@ -1,158 +1,195 @@
-"""Laws in no list, in the race for a cause: one that is ahead of all that is listed, beyond doubt."""
+"""Nonparametric terms against the listed effects.
+
+Takes what one step of the selection knows of the listed candidates (`SelectionStep`); gives a nonparametric term that
+is preferred to all of them and significant, or none.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hil.diagnosis.detection.form_error import FORM_ERROR, FormErrorAllowance
-from hil.diagnosis.detection.group_score_test import (
-    GroupScore,
-    GroupScoreTest,
-    best_of_each_term,
-    fitted_hypothesis,
-    group_detection_threshold,
-)
-from hil.diagnosis.detection.nonparametric import NONPARAMETRIC_TERMS, BasisFunction
+from hil.diagnosis.detection.group_score_test import GroupScoreTest, best_of_each_term, fitted_hypothesis
+from hil.diagnosis.detection.nonparametric import BASIS_SIZE, NONPARAMETRIC_TERMS, BasisFunction
 from hil.diagnosis.detection.profile_fit import CandidateFits, FittedHypothesis, at_bound, criterion
-from hil.diagnosis.detection.restart import RefitHypothesis
-from hil.diagnosis.detection.result import Diagnosis, Progress, Settings
+from hil.diagnosis.detection.restart import RefitHypothesis, Refits
+from hil.diagnosis.detection.result import Progress, Settings
 from hil.diagnosis.detection.shape import fit_shape_parameters
-from hil.diagnosis.estimation.gauss_newton import Model
+from hil.diagnosis.detection.significance import FormErrorAllowance, LocalDiscrepancy
+from hil.diagnosis.detection.threshold import (
+    FORM_ERROR,
+    NONPARAMETRIC_MARGIN,
+    NONPARAMETRIC_REFITTED,
+    NONPARAMETRIC_WITH_OWN_NOISE,
+    DetectionThreshold,
+    chi2_quantile,
+)
+from hil.diagnosis.estimation.gauss_newton import Fitter, Model
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation_nonparametric
-from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
+from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.noise.model import Noise
 
-NONPARAMETRIC_MARGIN = 5.0
-"""By how much more than the best listed cause a law in no list must explain, log of the odds."""
-_BESIDE, _TRIED = 4, 2
-"""Laws that are looked at with noise of their own; and fitted, where the vehicle's numbers go far."""
-Again = Callable[
-    [Model, Sequence[FittedHypothesis], RefitHypothesis, float, int, float],
-    tuple[list[FittedHypothesis], tuple[Model, Noise]],
-]
-"""Fits contenders from the car as handed in, too (`hil.diagnosis.detection.restart`)."""
+RefitFromNominal = Callable[[Model, Sequence[FittedHypothesis], RefitHypothesis, float, int, float], Refits]
+"""`hil.diagnosis.detection.restart.refit_from_nominal` without its first argument, the first two others swapped."""
 
 
 @dataclass(frozen=True, eq=False)
 class SelectionStep:
-    """One round of the search: the model so far, the best ``listed`` cause beside it and what that ``left``.
+    """One step of the selection, listed candidates fitted.
 
-    There is none ``listed`` where none is worth a fit; ``clear`` says whether any listed cause is beyond doubt.
-
-    ``reference`` is the cost without a cause more, with the ``noise`` beside one; ``error`` says what a contender's
-    gain is divided by; ``bent``, whether something may have bent the vehicle's numbers.
+    Attributes
+    ----------
+    model : so far, with cost ``reference`` given ``noise``, the noise given the best candidate.
+    threshold : as lowered by the step.
+    fits : of the candidates.  fitted : those fitted, with their gains.  significant : of those, best first.
+    allowance : chi-squared that the accepted causes may leave.  discrepancy : divisors of the gains.
+    biased : whether the nuisance parameters may be.
     """
 
-    contest: CandidateFits
     model: Model
     noise: Noise
     reference: float
-    listed: FittedHypothesis | None
-    clear: bool
-    left: FormErrorAllowance
-    error: Callable[[FittedHypothesis, FittedHypothesis], float]
-    bent: bool
+    threshold: DetectionThreshold
+    fits: CandidateFits
+    fitted: list[FittedHypothesis]
+    significant: list[FittedHypothesis]
+    allowance: FormErrorAllowance
+    discrepancy: LocalDiscrepancy
+    biased: bool
+
+    @property
+    def best(self) -> FittedHypothesis | None:
+        """The best listed candidate, significant or not; None where none was worth a fit."""
+        return min(self.fitted, key=criterion, default=None)
 
 
 def is_preferred(
-    law: FittedHypothesis, listed: FittedHypothesis | None, clear: bool, reference: float, asked: float
+    one: FittedHypothesis, listed: FittedHypothesis | None, significant: bool, reference: float, least: float
 ) -> bool:
-    """Whether a law is ahead of the best listed cause, if there is one, and explains what is asked of it.
+    """Whether a nonparametric term is preferred to the best listed cause, if there is one, and gains the ``least``.
 
-    A listed cause that is as far off as it may be is no rival to one that explains more. Where no listed one is beyond
-    doubt (``clear``), the law is to be likelier than the best, but need not explain so much beside it.
+    A listed cause at its bound is no rival to one that explains more. Where no listed one is ``significant``, the term
+    must be more probable than the best, but need not gain the least beyond it.
 
     Parameters
     ----------
-    reference : the cost without a cause more.  asked : of chi-squared, by which the law's cost is to be less.
+    reference : cost without a further cause.  least : in chi-squared.
     """
     known, rival = reference, 0.0
-    if listed is not None and law.cost >= listed.cost:
+    if listed is not None and one.cost >= listed.cost:
         return False
     if listed is not None and not at_bound(listed.term):
-        known = min(listed.cost, reference) if clear else reference
+        known = min(listed.cost, reference) if significant else reference
         rival = (1.0 + FORM_ERROR**2) * max(0.5 * (reference - criterion(listed)), 0.0)
-    clearly = 0.5 * (reference - criterion(law)) >= rival + NONPARAMETRIC_MARGIN
-    return clearly and known - law.cost >= asked
+    clearly = 0.5 * (reference - criterion(one)) >= rival + NONPARAMETRIC_MARGIN
+    return clearly and known - one.cost >= least
 
 
 class NonparametricSearch:
-    """The laws at a model, simulated once."""
+    """Nonparametric terms at one linearisation; they are simulated when first needed."""
 
-    def __init__(self, numbers: NuisanceFit, settings: Settings, say: Progress) -> None:
-        self._numbers, self._settings, self._say = numbers, settings, say
-        self._race: GroupScoreTest | None = None
+    def __init__(self, candidates: Sequence[Candidate], settings: Settings, progress: Progress) -> None:
+        self._candidates, self._settings, self._progress = candidates, settings, progress
+        self._test: GroupScoreTest | None = None
 
-    def invalidate(self) -> None:
-        """What laws show is asked for at another model from now on."""
-        self._race = None
+    def best(
+        self, fitter: Fitter, step: SelectionStep, refit_from_nominal: RefitFromNominal
+    ) -> FittedHypothesis | None:
+        """The best term, if it is preferred to the best listed cause and significant.
 
-    def best(self, found: Diagnosis, now: SelectionStep, again: Again) -> FittedHypothesis | None:
-        """The best law where it is ahead of the best listed cause, beyond noise and the model's own error.
-
-        ``again`` fits laws from the car as handed in, too. A listed cause of another shape than the usual
-        (`hil.diagnosis.detection.shape`) takes the place of a law that is not ahead of it.
+        A listed cause with another value of its shape parameter (`hil.diagnosis.detection.shape`) takes its place where
+        the term is not preferred to that.
         """
-        model, reference = now.model, now.reference
+        model = step.model
         if not self._settings.dictionary or any(isinstance(term.candidate, BasisFunction) for term in model.terms):
             return None
-        fitter = self._numbers.fitter
-        if self._race is None:
-            self._say("curves in no list")
-            self._race = GroupScoreTest(fitter, fitter.parameter_set(model.z, model.terms))
-        race = self._race
-        entries, seen = self._seen(race, now)
-
-        def refitted_law(one: FittedHypothesis, model: Model, noise: Noise) -> FittedHypothesis:
-            return fitted_hypothesis(entries[one.term.candidate.name], model, noise, reference)
-
-        def replayed(one: FittedHypothesis) -> FittedHypothesis:
-            met = fitter.at(one.model.z, one.model.terms, one.noise)
-            return refitted_law(one, replace(met, covariance=one.model.covariance), one.noise)
-
-        if now.bent:
-            tried = [replayed(one) for one in sorted(seen, key=criterion)[:_TRIED]]
-            best_listed = np.inf if now.listed is None else criterion(now.listed)
-            seen, without = again(model, tried, refitted_law, reference, 1, best_listed)
-            reference = min(reference, without[0].cost)
-        law = min(seen, key=criterion)
-        best = entries[law.term.candidate.name]
-        self._say(
-            f"best curve: {best.expansion.term.name} at {best.expansion.location}, gain {reference - law.cost:.0f}"
-        )
-        least = self._asked(found, race, best, now.left)
-
-        def stands(law: FittedHypothesis, listed: FittedHypothesis | None, clear: bool) -> bool:
-            return is_preferred(law, listed, clear, reference, least * now.error(law, law))
-
-        if stands(law, now.listed, now.clear) and self._settings.relinearise and not now.bent:
-            (law,), without = again(model, [replayed(law)], refitted_law, reference, 1, np.inf)
-            reference = min(reference, without[0].cost)
-        if not stands(law, now.listed, now.clear):
+        if self._test is None:
+            self._progress("simulating nonparametric terms")
+            self._test = GroupScoreTest(fitter, fitter.parameter_set(model.z, model.terms))
+        attempt = _Attempt(fitter, step, self._test, refit_from_nominal)
+        one = attempt.best()
+        self._progress(f"best nonparametric term: {attempt.text(one)}, gain {attempt.reference - one.cost:.0f}")
+        least = attempt.least(one, self._settings.alpha)
+        if attempt.is_preferred(one, least) and self._settings.relinearise and not step.biased:
+            (one,) = attempt.refit([attempt.simulated(one)])
+        if not attempt.is_preferred(one, least):
             return None
-        fitted = fitter.fit(fitter.at(law.model.z, law.model.terms, law.noise), law.noise, 3)
-        law = refitted_law(law, fitted, law.noise)
-        if not stands(law, now.listed, now.clear):
+        fitted = fitter.fit(fitter.at(one.model.z, one.model.terms, one.noise), one.noise, 3)
+        one = attempt.hypothesis(one, fitted, one.noise)
+        if not attempt.is_preferred(one, least):
             return None
-        listed = [item.candidate for item in found.scores]
-        shaped = fit_shape_parameters(now.contest, fitter, listed, law)
-        return law if shaped is None or stands(law, shaped, True) else shaped
+        shaped = fit_shape_parameters(step.fits, fitter, self._candidates, one)
+        if shaped is None or attempt.is_preferred_to(one, shaped, True, least):
+            return one
+        return shaped
 
-    def _seen(self, race: GroupScoreTest, now: SelectionStep) -> tuple[dict[str, GroupScore], list[FittedHypothesis]]:
-        """The best laws, by name, and by one linear step with the noise beside each."""
-        leading = best_of_each_term(race.scores(self._numbers.fitter, now.model, now.noise), _BESIDE)
-        contest = now.contest
-        beside = contest.at_once(lambda entry: contest.linear_prediction(entry.terms, race.columns(entry)), leading)
-        seen = [fitted_hypothesis(entry, *one, contest.reference) for entry, one in zip(leading, beside, strict=True)]
-        return {law.term.candidate.name: entry for law, entry in zip(seen, leading, strict=True)}, seen
 
-    def _asked(self, found: Diagnosis, race: GroupScoreTest, best: GroupScore, left: FormErrorAllowance) -> float:
-        """Gain that is asked of a law: beyond noise, the model's own error, and what the causes so far leave."""
-        least = (
-            group_detection_threshold(found.number_of_tests + len(NONPARAMETRIC_TERMS), self._settings.alpha)
-            * found.inflation
+class _Attempt:
+    """Fits of nonparametric terms at one step; ``reference`` is the lowest cost seen without them."""
+
+    def __init__(
+        self, fitter: Fitter, step: SelectionStep, test: GroupScoreTest, refit_from_nominal: RefitFromNominal
+    ) -> None:
+        self._fitter, self._step, self._test, self._refit_from_nominal = fitter, step, test, refit_from_nominal
+        self.reference = step.reference
+        tops = best_of_each_term(test.scores(fitter, step.model, step.noise), NONPARAMETRIC_WITH_OWN_NOISE)
+        fits = step.fits
+        models = fits.at_once(lambda entry: fits.linear_prediction(entry.terms, test.jacobian(entry)), tops)
+        self._predicted = [
+            fitted_hypothesis(entry, *one, fits.reference) for entry, one in zip(tops, models, strict=True)
+        ]
+        names = (one.term.candidate.name for one in self._predicted)
+        self._entries = dict(zip(names, tops, strict=True))
+
+    def best(self) -> FittedHypothesis:
+        """By one linear step with its own noise; simulated and fitted, where nuisance parameters may be biased."""
+        if not self._step.biased:
+            return min(self._predicted, key=criterion)
+        tried = sorted(self._predicted, key=criterion)[:NONPARAMETRIC_REFITTED]
+        listed = self._step.best
+        return min(
+            self.refit([self.simulated(one) for one in tried], np.inf if listed is None else criterion(listed)),
+            key=criterion,
         )
-        signature = {name: columns @ best.values[:, None] for name, columns in race.columns(best).items()}
-        left_there = left.of_signature(best.expansion.functions[0].effect, signature)
-        return least * variance_inflation_nonparametric(best.expansion.term.name, best.expansion.location) + left_there
+
+    def hypothesis(self, one: FittedHypothesis, model: Model, noise: Noise) -> FittedHypothesis:
+        """The same term with another fit."""
+        return fitted_hypothesis(self._entries[one.term.candidate.name], model, noise, self.reference)
+
+    def simulated(self, one: FittedHypothesis) -> FittedHypothesis:
+        """A linear prediction, simulated."""
+        model = self._fitter.at(one.model.z, one.model.terms, one.noise)
+        return self.hypothesis(one, replace(model, covariance=one.model.covariance), one.noise)
+
+    def refit(self, some: Sequence[FittedHypothesis], rival_criterion: float = np.inf) -> list[FittedHypothesis]:
+        """From the nominal vehicle, too; that may lower the reference."""
+        refits, without = self._refit_from_nominal(
+            self._step.model, some, self.hypothesis, self.reference, 1, rival_criterion
+        )
+        self.reference = min(self.reference, without[0].cost)
+        return refits
+
+    def is_preferred(self, one: FittedHypothesis, least: float) -> bool:
+        """To the best listed cause."""
+        return self.is_preferred_to(one, self._step.best, bool(self._step.significant), least)
+
+    def is_preferred_to(
+        self, one: FittedHypothesis, listed: FittedHypothesis | None, significant: bool, least: float
+    ) -> bool:
+        """See `is_preferred`; ``least`` is divided over the local discrepancy."""
+        factor = self._step.discrepancy.factor(one, one, self._step.threshold)
+        return is_preferred(one, listed, significant, self.reference, least * factor)
+
+    def least(self, one: FittedHypothesis, alpha: float) -> float:
+        """Chi-squared that a term needs beyond noise, model discrepancy and what the accepted causes leave."""
+        entry, threshold = self._entries[one.term.candidate.name], self._step.threshold
+        tests = threshold.number_of_tests + len(NONPARAMETRIC_TERMS)
+        least = chi2_quantile(tests, alpha, BASIS_SIZE) * threshold.inflation
+        signature = {name: values @ entry.values[:, None] for name, values in self._test.jacobian(entry).items()}
+        left = self._step.allowance.of_signature(entry.expansion.functions[0].effect, signature)
+        return least * variance_inflation_nonparametric(entry.expansion.term.name, entry.expansion.location) + left
+
+    def text(self, one: FittedHypothesis) -> str:
+        """Term and location."""
+        expansion = self._entries[one.term.candidate.name].expansion
+        return f"{expansion.term.name} at {expansion.location}"

@@ -1,84 +1,117 @@
-"""Causes that the vehicle's numbers stood in for: fitted from the car as handed in, too.
+"""Hypotheses fitted from the nominal vehicle, too: causes that nuisance parameters absorbed.
 
-Numbers that went far leave little of a cause that acts alike, and another one fits what they leave better. From where
-they stand a fit does not find back.
+Nuisance parameters that absorbed a cause leave little of it, and another cause fits the rest better; from there a fit
+does not find back. Takes fitted hypotheses; gives each with the better of both fits, and the best fit without any.
 """
 
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.profile_fit import CandidateFits, FittedHypothesis, criterion
+from hil.diagnosis.detection.threshold import (
+    AS_GOOD_SHARE,
+    FIRST_REFITTED,
+    OVERTAKING_CRITERION,
+    RIVAL_SHARE,
+)
 from hil.diagnosis.estimation.gauss_newton import BIASED_BIRGE_RATIO, Model
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import Noise
 
 _ROUNDS = 3
-_RIVAL, _AS_GOOD = 1.0 / 3.0, 0.9
-"""Shares of what the best explains: below the one, numbers that went far hide no rival; below the other, sensitivities
-taken anew make none of a cause beside which they did not."""
-_OVERTAKES = 25.0
-"""By how much in odds sensitivities taken anew let one overtake another (they gave 0.4 to 20; docs/decisions/0086)."""
-_FIRST = 2
-"""How many of the best are fitted before the others, which go on while they explain a third of what those do."""
 RefitHypothesis = Callable[[FittedHypothesis, Model, Noise], FittedHypothesis]
+"""Gives a hypothesis with another fit, its last terms being the cause."""
+Refits = tuple[list[FittedHypothesis], tuple[Model, Noise]]
+"""Hypotheses with the better of two fits each; the best model without any, and its noise."""
 
 
 def refit_from_nominal(
-    numbers: NuisanceFit, fitted: Sequence[FittedHypothesis], beside: Model, refitted: RefitHypothesis, reference: float, anew: int,
-    best: float = np.inf,
-) -> tuple[list[FittedHypothesis], tuple[Model, Noise]]:  # fmt: skip
-    """The same contenders, each fitted from the car as handed in where that explains more; the best fit without any.
+    nuisance_fit: NuisanceFit, fitted: Sequence[FittedHypothesis], given: Model, refit: RefitHypothesis,
+    reference: float, relinearised: int, rival_criterion: float = np.inf,
+) -> Refits:  # fmt: skip
+    """Fit the hypotheses from the nominal vehicle, and the model without any from where the best of them end.
 
-    What takes less than a third as much off the ``reference`` as the very best (or others, whose odds are ``best``) is
-    not followed to its end. So many of the others (one or more) get sensitivities ``anew`` where their numbers are far
-    from where they were last taken, at first those of the model that is ``beside`` them. With those the numbers are
-    fitted without them, too. ``refitted`` gives a contender with another model and noise.
+    Parameters
+    ----------
+    given : the model that each of them extends, with cost ``reference``.
+    relinearised : at least one: so many of the best get Jacobians of their own, where their nuisance parameters are far
+        from those of the last Jacobian.
+    rival_criterion : of the best among other hypotheses; a fit that stays far behind is not continued.
     """
-    fitter = numbers.fitter
+    fits = _NominalFits(nuisance_fit, given, refit, reference)
+    order = sorted(range(len(fitted)), key=lambda k: criterion(fitted[k]))
+    first, rest, best = order[:FIRST_REFITTED], order[FIRST_REFITTED:], rival_criterion
+    refits = dict(zip(first, fits.from_nominal([fitted[k] for k in first], best), strict=True))
+    best = min(best, *map(criterion, refits.values()))
+    refits |= dict(zip(rest, fits.from_nominal([fitted[k] for k in rest], best), strict=True))
+    leading = sorted(order, key=lambda k: criterion(refits[k]))[:relinearised]
+    best = min(best, criterion(refits[leading[0]]))
+    last_fitter, without = nuisance_fit.fitter, []
+    for k in leading:
+        far = fits.needs_jacobian(refits[k], best)
+        if k == leading[0] or far:
+            model, noise = refits[k].model, refits[k].noise
+            if far:
+                model, noise = fits.relinearised(refits[k])
+                refits[k] = min(refits[k], refit(refits[k], model, noise), key=criterion)
+            without.append(fits.without(model, noise))
+    nuisance_fit.fitter = last_fitter
+    return [refits[k] for k in range(len(fitted))], min(without, key=lambda fit: fit[0].cost)
 
-    def near(one: FittedHypothesis, best: float, share: float = _RIVAL) -> bool:
-        return criterion(one) <= reference - share * max(reference - best, 0.0)
 
-    def again(one: FittedHypothesis, best: float) -> FittedHypothesis:
-        own, noise = fitter.copy(), one.noise
-        model = own.at(np.zeros(len(numbers.nuisances)), one.model.terms, noise)
+class _NominalFits:
+    """The fits of `refit_from_nominal`; ``linearised_at`` are the nuisance parameters of the last Jacobian."""
+
+    def __init__(self, nuisance_fit: NuisanceFit, given: Model, refit: RefitHypothesis, reference: float) -> None:
+        self._nuisance_fit, self._given, self._refit, self._reference = nuisance_fit, given, refit, reference
+        self._fitter, self._linearised_at = nuisance_fit.fitter, given.z
+
+    def from_nominal(self, fitted: Sequence[FittedHypothesis], best: float) -> list[FittedHypothesis]:
+        """Each hypothesis from the nominal vehicle, where that is better; ``best`` is the best criterion so far."""
+        return CandidateFits.at_once(lambda one: self._from_nominal(one, best), fitted)
+
+    def _from_nominal(self, one: FittedHypothesis, best: float) -> FittedHypothesis:
+        own, noise = self._fitter.copy(), one.noise
+        model = own.at(np.zeros(len(self._nuisance_fit.nuisances)), one.model.terms, noise)
         model = own.fit(model, noise, 4, follow=True)
-        begun = refitted(one, model, noise)
-        if fitter.birge_ratio(one.model.z) < BIASED_BIRGE_RATIO and begun.cost >= one.cost:
-            return one  # numbers that are not bent are found from either side
-        if not near(begun, best):
-            return min(one, begun, key=criterion)
+        start = self._refit(one, model, noise)
+        if not self._biased(one.model.z) and start.cost >= one.cost:
+            return one  # unbiased nuisance parameters are reached from either side
+        if not self._near(start, best, RIVAL_SHARE):
+            return min(one, start, key=criterion)
         for _ in range(_ROUNDS - 1):
             noise = own.estimate_noise(model, noise)
             model = own.fit(model, noise, 4, follow=True)
         noise = own.estimate_noise(model, noise)
-        return min(one, refitted(one, own.fit(model, noise, 2), noise), key=criterion)
+        return min(one, self._refit(one, own.fit(model, noise, 2), noise), key=criterion)
 
-    order = sorted(range(len(fitted)), key=lambda k: criterion(fitted[k]))
-    found = dict(zip(order, CandidateFits.at_once(lambda k: again(fitted[k], best), order[:_FIRST]), strict=False))
-    best = min(best, *map(criterion, found.values()))
-    rest = order[_FIRST:]
-    found |= dict(zip(rest, CandidateFits.at_once(lambda k: again(fitted[k], best), rest), strict=True))
-    leading = sorted(order, key=lambda k: criterion(found[k]))[:anew]
-    best, bare, around = min(best, criterion(found[leading[0]])), [], beside.z
-    for k in leading:
-        one = found[k]
-        bent = fitter.birge_ratio(one.model.z) >= BIASED_BIRGE_RATIO
-        as_good = near(one, best, _AS_GOOD) and criterion(one) - best < _OVERTAKES
-        far = near(one, best) if bent else as_good and numbers.linearisation_stale(one.model, around)
-        if k != leading[0] and not far:
-            continue
+    def _near(self, one: FittedHypothesis, best: float, share: float) -> bool:
+        """Whether the criterion improves by this share of what the best does."""
+        return criterion(one) <= self._reference - share * max(self._reference - best, 0.0)
+
+    def _biased(self, z: Floats) -> bool:
+        return self._fitter.birge_ratio(z) >= BIASED_BIRGE_RATIO
+
+    def needs_jacobian(self, one: FittedHypothesis, best: float) -> bool:
+        """Whether the last Jacobian may hide that it is the best: its nuisance parameters are biased or far away."""
+        if self._biased(one.model.z):
+            return self._near(one, best, RIVAL_SHARE)
+        as_good = self._near(one, best, AS_GOOD_SHARE) and criterion(one) - best < OVERTAKING_CRITERION
+        return as_good and self._nuisance_fit.linearisation_stale(one.model, self._linearised_at)
+
+    def relinearised(self, one: FittedHypothesis) -> tuple[Model, Noise]:
+        """The model of a hypothesis fitted with a Jacobian of its own."""
         model, noise = one.model, one.noise
-        if far:
-            numbers.relinearise(model.z, model.terms)
-            begun, around = numbers.fitter.at(model.z, model.terms, noise), model.z
-            if bent:
-                model, noise = numbers.fit(begun, noise)
-            else:
-                model, noise = numbers.fitter.alternate_noise_and_fit(begun, noise, 2)
-            found[k] = min(one, refitted(one, model, noise), key=criterion)
-        without = numbers.fitter.fit(numbers.fitter.at(model.z, beside.terms, noise), noise, 6)
-        bare.append(numbers.fitter.alternate_noise_and_fit(without, noise, 2))
-    numbers.fitter = fitter
-    return [found[k] for k in range(len(fitted))], min(bare, key=lambda fit: fit[0].cost)
+        self._nuisance_fit.relinearise(model.z, model.terms)
+        start, self._linearised_at = self._nuisance_fit.fitter.at(model.z, model.terms, noise), model.z
+        if self._biased(model.z):
+            return self._nuisance_fit.fit(start, noise)
+        return self._nuisance_fit.fitter.alternate_noise_and_fit(start, noise, 2)
+
+    def without(self, model: Model, noise: Noise) -> tuple[Model, Noise]:
+        """The model that the hypotheses extend, fitted from where one of them ended."""
+        fitter = self._nuisance_fit.fitter
+        start = fitter.fit(fitter.at(model.z, self._given.terms, noise), noise, 6)
+        return fitter.alternate_noise_and_fit(start, noise, 2)

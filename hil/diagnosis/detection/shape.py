@@ -1,7 +1,8 @@
-"""Listed causes of another shape than the usual one: a fade that begins elsewhere shows as its curve, in no list.
+"""Shape parameters: a listed effect whose curve has another shape than the typical one.
 
-The race has every cause at the usual value of what says how it acts (`plant.effects.effect.shape`). Where a law in no
-list leads, the listed causes at its joint are asked at all values of that number.
+All candidates are tested with typical shape parameters (where a fade begins, how pads dry,
+`plant.effects.effect.shape`). Where a nonparametric term leads, takes the listed effects at its injection point and
+location; gives the best of them with its shape parameter fitted.
 """
 
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ from scipy.optimize import minimize_scalar
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.nonparametric import BasisFunction
 from hil.diagnosis.detection.profile_fit import CandidateFits, FittedHypothesis, refitted
+from hil.diagnosis.detection.threshold import SHAPE_MIN_SHARE
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
 from hil.diagnosis.estimation.information import finite_difference_jacobian, information_blocks, solve
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation
@@ -24,51 +26,49 @@ from hil.diagnosis.simulation.parameter_set import ParameterSet
 from plant.effects.effect import Parameter
 from plant.injection.theta import THETA
 
-_OFFERED = 9
-"""Values of a shape that are looked at by one step, evenly between its bounds, in proportion where these are far
-apart."""
-_FAR_APART = 4.0
+_GRID = 9
+"""Values of a shape parameter tested by one step, evenly between its bounds, by a constant factor where these are far
+from each other."""
+_WIDE_RATIO = 4.0
 _ROUNDS, _TURNS, _SETTLED = 8, 4, 1.0
-"""Values that are fitted, how often in turn, and how little less cost ends it."""
-_FAR_BEHIND = 0.5
-"""Share of what a law explains, below which a shape as offered is not followed: the values around it are no further
-off than an eighth of its range."""
-_SHARE, _RISES = 0.1, 1.0
-"""A finite difference, of what is usual; and what in chi-squared tells how well a shape is known."""
+"""Values that are fitted, fits in turn at each, and the decrease of the cost that ends them."""
+_STEP_SHARE, _RISES = 0.1, 1.0
+"""Finite difference, in typical sizes; rise of chi-squared that tells the curvature."""
 _TWO_SIDED_95 = 1.96
 
 
 @dataclass(frozen=True, eq=False)
 class ShapedCandidate(Candidate):
-    """A listed effect's number at a place, its ``shape`` ``at`` a value of its own; how well that is known."""
+    """A candidate whose effect has its parameter ``shape`` at the value ``at``, known to ``deviation`` (sd)."""
 
     shape: Parameter
     at: float
     deviation: float = 0.0
 
-    def applied(self, world: ParameterSet, value: float) -> ParameterSet:
-        """The world with this number added, and the shape set."""
-        world = super().applied(world, value)
-        world.theta[THETA.slice(self.effect.name, self.shape.name)] = self.at
-        return world
+    def applied(self, base: ParameterSet, value: float) -> ParameterSet:
+        """The parameter set with ``value`` added, and the shape parameter set."""
+        changed = super().applied(base, value)
+        changed.theta[THETA.slice(self.effect.name, self.shape.name)] = self.at
+        return changed
 
     def interval(self) -> tuple[float, float]:
-        """95 % interval of the shape, within its bounds."""
+        """95 % interval of the shape parameter, within its bounds."""
         half = _TWO_SIDED_95 * self.deviation
         return max(self.at - half, self.shape.low), min(self.at + half, self.shape.high)
 
 
 def fit_shape_parameters(
-    contest: CandidateFits, fitter: Fitter, listed: Sequence[Candidate], law: FittedHypothesis
+    fits: CandidateFits, fitter: Fitter, listed: Sequence[Candidate], nonparametric: FittedHypothesis
 ) -> FittedHypothesis | None:
-    """The best listed cause at the joint and the place of a law, of any shape; None where no effect there has one.
+    """The best listed effect where a nonparametric term acts, of any shape; None where no effect there has a shape.
 
     Parameters
     ----------
-    contest : the race that the law leads.  listed : all candidates.  law : its pieces are the last terms of its model.
+    fits : of the step in which the term leads.  listed : all candidates.
+    nonparametric : the hypothesis with the term.
     """
-    piece = law.term.candidate
-    assert isinstance(piece, BasisFunction)
+    function = nonparametric.term.candidate
+    assert isinstance(function, BasisFunction)
     offered = [
         ShapedCandidate(
             one.effect,
@@ -82,91 +82,99 @@ def fit_shape_parameters(
         )
         for one in listed
         for shape in one.effect.parameters
-        if shape.shape and piece.term.injection_point in one.effect.injection_points and one.location == piece.location
-        for at in _values(shape)
+        if shape.shape
+        and function.term.injection_point in one.effect.injection_points
+        and one.location == function.location
+        for at in _grid(shape)
     ]
     if not offered:
         return None
-    terms = tuple(term for term in law.model.terms if not isinstance(term.candidate, BasisFunction))
-    bare = fitter.at(law.model.z, terms, law.noise)
-    world = fitter.parameter_set(bare.z, terms)
-    fitter.simulator.cache_baseline(world)
-    steps = [_SHARE * one.parameter.typical for one in offered]
-    worlds = [one.applied(world, step) for one, step in zip(offered, steps, strict=True)]
-    columns = finite_difference_jacobian(fitter.simulator, fitter.masks, bare.channels, worlds, steps)
+    noise = nonparametric.noise
+    terms = tuple(term for term in nonparametric.model.terms if not isinstance(term.candidate, BasisFunction))
+    bare = fitter.at(nonparametric.model.z, terms, noise)
+    base = fitter.parameter_set(bare.z, terms)
+    fitter.simulator.cache_baseline(base)
+    steps = [_STEP_SHARE * one.parameter.typical for one in offered]
+    stepped = [one.applied(base, step) for one, step in zip(offered, steps, strict=True)]
+    jacobian = finite_difference_jacobian(fitter.simulator, fitter.masks, bare.channels, stepped, steps)
 
-    def foreseen(k: int) -> Model:
-        own = {name: values[:, k : k + 1] for name, values in columns.items()}
-        return contest.linear_prediction([Term(offered[k], 0.0)], own)[0]
+    def predicted(k: int) -> Model:
+        own = {name: values[:, k : k + 1] for name, values in jacobian.items()}
+        return fits.linear_prediction([Term(offered[k], 0.0)], own)[0]
 
-    best: dict[str, tuple[Model, ShapedCandidate]] = {}  # of each effect, as foreseen by one step, which far off errs
-    for model, one in sorted(zip(contest.at_once(foreseen, range(len(offered))), offered, strict=True), key=_cost):
+    best: dict[str, tuple[Model, ShapedCandidate]] = {}  # of each effect, by one step, which errs far from the start
+    for model, one in sorted(zip(fits.at_once(predicted, range(len(offered))), offered, strict=True), key=_cost):
         best.setdefault(one.effect.name, (model, one))
-    replayed = contest.at_once(lambda seen: fitter.at(seen[0].z, seen[0].terms, law.noise), list(best.values()))
-    return _fitted(fitter, bare, min(zip(replayed, (one for _, one in best.values()), strict=True), key=_cost)[1], law)
+    simulated = fits.at_once(lambda pair: fitter.at(pair[0].z, pair[0].terms, noise), list(best.values()))
+    start = min(zip(simulated, (one for _, one in best.values()), strict=True), key=_cost)[1]
+    return _fitted(fitter, bare, start, nonparametric)
 
 
-def _cost(seen: tuple[Model, ShapedCandidate]) -> float:
-    return seen[0].cost
+def _cost(pair: tuple[Model, ShapedCandidate]) -> float:
+    return pair[0].cost
 
 
-def _values(shape: Parameter) -> list[float]:
-    """Values of a shape to look at."""
-    far_apart = shape.high > _FAR_APART * shape.low > 0.0
-    return list(map(float, (np.geomspace if far_apart else np.linspace)(shape.low, shape.high, _OFFERED)))
+def _grid(shape: Parameter) -> list[float]:
+    """Values of a shape parameter to test."""
+    wide = shape.high > _WIDE_RATIO * shape.low > 0.0
+    return list(map(float, (np.geomspace if wide else np.linspace)(shape.low, shape.high, _GRID)))
 
 
-def _fitted(fitter: Fitter, bare: Model, begun: ShapedCandidate, law: FittedHypothesis) -> FittedHypothesis | None:
-    """The cause with the shape that explains most, near the one at which it is offered; None far behind the law."""
-    seen: list[tuple[float, Model]] = []
+def _fitted(
+    fitter: Fitter, bare: Model, start: ShapedCandidate, nonparametric: FittedHypothesis
+) -> FittedHypothesis | None:
+    """The effect with the best shape between the neighbours of ``start``; None far behind the nonparametric term."""
+    tried: list[tuple[float, Model]] = []
+    noise = nonparametric.noise
 
-    def found_from(z: Floats, term: Term) -> Model:
+    def fitted_from(z: Floats, term: Term) -> Model:
         own = fitter.copy()
-        model = own.refit_amplitudes(own.at(z, (*bare.terms, term), law.noise), law.noise)
+        model = own.refit_amplitudes(own.at(z, (*bare.terms, term), noise), noise)
         for _ in range(_TURNS):
             before = model.cost
-            model = own.fit(model, law.noise, 4, follow=True)
+            model = own.fit(model, noise, 4, follow=True)
             if before - model.cost < _SETTLED:
                 break
         return model
 
     def cost(at: float) -> float:
-        best = min((model for _, model in seen), key=lambda model: model.cost, default=None)
-        term = Term(replace(begun, at=at), begun.parameter.typical if best is None else best.terms[-1].value)
+        best = min((model for _, model in tried), key=lambda model: model.cost, default=None)
+        term = Term(replace(start, at=at), start.parameter.typical if best is None else best.terms[-1].value)
         starts = [bare.z] if best is None else [bare.z, best.z]
-        found = CandidateFits.at_once(lambda z: found_from(z, term), starts)
-        seen.append((at, min(found, key=lambda model: model.cost)))
-        return seen[-1][1].cost
+        models = CandidateFits.at_once(lambda z: fitted_from(z, term), starts)
+        tried.append((at, min(models, key=lambda model: model.cost)))
+        return tried[-1][1].cost
 
-    offered = _values(begun.shape)
-    number = offered.index(begun.at)
-    beyond = offered[max(number - 1, 0)], offered[min(number + 1, len(offered) - 1)]
-    if bare.cost - cost(begun.at) < _FAR_BEHIND * (bare.cost - law.cost):
+    grid = _grid(start.shape)
+    index = grid.index(start.at)
+    neighbours = grid[max(index - 1, 0)], grid[min(index + 1, len(grid) - 1)]
+    if bare.cost - cost(start.at) < SHAPE_MIN_SHARE * (bare.cost - nonparametric.cost):
         return None
-    minimize_scalar(cost, bounds=beyond, method="bounded", options={"maxiter": _ROUNDS})
-    at, model = min(seen, key=lambda one: one[1].cost)
-    by_noise = _deviation(at, model.cost, [(other, of.cost) for other, of in seen], begun.shape)
-    by_form = FORM_SD_SHARE * (beyond[1] - beyond[0])
+    minimize_scalar(cost, bounds=neighbours, method="bounded", options={"maxiter": _ROUNDS})
+    at, model = min(tried, key=lambda one: one[1].cost)
+    by_noise = _deviation(at, model.cost, [(other, of.cost) for other, of in tried], start.shape)
+    by_form = FORM_SD_SHARE * (neighbours[1] - neighbours[0])
     deviation = hypot(
-        by_noise * sqrt(variance_inflation(begun)), by_form, _by_numbers(fitter, model, law.noise, by_noise)
+        by_noise * sqrt(variance_inflation(start)), by_form, _deviation_by_nuisances(fitter, model, noise, by_noise)
     )
-    term = replace(model.terms[-1], candidate=replace(begun, at=at, deviation=deviation))
+    term = replace(model.terms[-1], candidate=replace(start, at=at, deviation=deviation))
     model = replace(model, terms=(*model.terms[:-1], term))
-    found = refitted(replace(law, gain=0.0), model, law.noise)
-    told = sqrt(2.0 * pi) * deviation / (begun.shape.high - begun.shape.low)
-    return replace(found, log_occam_factor=found.log_occam_factor + min(log(max(told, 1e-12)), 0.0))
+    hypothesis = refitted(replace(nonparametric, gain=0.0), model, noise)
+    share = sqrt(2.0 * pi) * deviation / (start.shape.high - start.shape.low)
+    return replace(hypothesis, log_occam_factor=hypothesis.log_occam_factor + min(log(max(share, 1e-12)), 0.0))
 
 
-def _deviation(at: float, least: float, seen: Sequence[tuple[float, float]], shape: Parameter) -> float:
-    """Standard deviation of a shape: how far off costs one more in chi-squared, by the nearest seen on both sides."""
-    rises = [(other - at, abs(other - at) / sqrt(cost - least)) for other, cost in seen if cost > least + _RISES]
+def _deviation(at: float, least: float, tried: Sequence[tuple[float, float]], shape: Parameter) -> float:
+    """Standard deviation of a shape parameter: the distance that costs one more in chi-squared, by the nearest value
+    tried on each side, the larger."""
+    rises = [(other - at, abs(other - at) / sqrt(cost - least)) for other, cost in tried if cost > least + _RISES]
     sides = [[one for one in rises if one[0] < 0.0], [one for one in rises if one[0] > 0.0]]
     nearest = [min(side, key=lambda one: abs(one[0]))[1] for side in sides if side]
     return min(max(nearest, default=shape.high - shape.low), shape.high - shape.low)
 
 
-def _by_numbers(fitter: Fitter, model: Model, noise: Noise, step: float) -> float:
-    """Standard deviation of a shape by numbers that mattered to nothing before it (`Fitter.columns_at`)."""
+def _deviation_by_nuisances(fitter: Fitter, model: Model, noise: Noise, step: float) -> float:
+    """Standard deviation of a shape parameter by nuisance parameters on which nothing depended before the effect."""
     *others, term = model.terms
     shape = term.candidate
     assert isinstance(shape, ShapedCandidate)
@@ -178,14 +186,14 @@ def _by_numbers(fitter: Fitter, model: Model, noise: Noise, step: float) -> floa
     }
     count, free = len(model.z), range(len(model.terms) + 1)
     variances = []
-    for numbers in (fitter.nuisance_jacobian, fitter.nuisance_jacobian_at(model)):
-        columns = {name: np.hstack([values, own[name]]) for name, values in numbers.items()}
+    for nuisances in (fitter.nuisance_jacobian, fitter.nuisance_jacobian_at(model)):
+        columns = {name: np.hstack([values, own[name]]) for name, values in nuisances.items()}
         total = information_blocks(model.residual, columns, fitter.masks, noise, count).total()
         variances.append(float(solve(total, count, free, model.z)[1][-1, -1]))
     return sqrt(max(variances[1] - variances[0], 0.0))
 
 
 def _within(at: float, step: float, shape: Parameter) -> float:
-    """A step of a shape, up where there is room for it, else as far as the further of its bounds."""
+    """A step of a shape parameter, up where there is room for it, else as far as the further of its bounds."""
     up, down = shape.high - at, at - shape.low
     return min(step, up) if step <= up or up >= down else -min(step, down)

@@ -1,114 +1,210 @@
-"""What is beyond doubt: a gain beyond noise and the model's own error, and a value that is away from nothing."""
+"""Significance: whether a cause gains more than noise, model discrepancy and the form of accepted causes explain, and
+whether its value is away from zero.
 
-from dataclasses import replace
+Takes fitted hypotheses and the `hil.diagnosis.detection.threshold.DetectionThreshold`; says which are significant, and
+takes out what is not needed at the end (`eliminate_backward`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from hil.diagnosis.data.log import Floats
+from hil.diagnosis.detection.candidates import CandidateSet
 from hil.diagnosis.detection.nonparametric import BasisFunction
 from hil.diagnosis.detection.profile_fit import FittedHypothesis, at_bound, criterion, log_bayes_factor
-from hil.diagnosis.detection.result import INDISTINGUISHABLE, Diagnosis, Progress, causes_in
-from hil.diagnosis.detection.score_test import detection_threshold
+from hil.diagnosis.detection.result import Progress, causes_in
+from hil.diagnosis.detection.threshold import (
+    FORM_ERROR,
+    FORM_ERROR_SAME_POINT,
+    INDISTINGUISHABLE,
+    STRUCTURE_MISMATCH,
+    DetectionThreshold,
+    chi2_quantile,
+)
 from hil.diagnosis.estimation.aliases import resolve_aliases
-from hil.diagnosis.estimation.gauss_newton import Fitter
+from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Tracks
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation, with_uncertainty
+from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.estimation.uncertainty import standard_deviations
+from hil.diagnosis.noise.model import Noise, SampleMasks, whiten
+from plant.effects.effect import Effect
 
-_FORM_DIFFERS = 4.0
-"""Strain beyond which the car of the logs is of another form than the model's, as one of a page is: numbers that nobody
-stated went far. Drives of the independent car: 0.6 to 1.3 (docs/decisions/0073)."""
-AMPLITUDE_ALPHA = 0.05
-"""Chance that noise takes any of all values so far from nothing as is asked of one, in its own deviations, which know
-how far manoeuvres disagree: a second question beside what a cause explains (decision 0078)."""
+# --- what divides a gain in these logs
 
 
-def nuisance_variance_inflation(fitter: Fitter, z: Floats, told: float) -> float:
-    """What a gain is divided by where the vehicle's numbers ``z``, of which the data tell ``told``, lie far off."""
-    return with_uncertainty(fitter.birge_ratio(z, told))
+def nuisance_variance_inflation(fitter: Fitter, z: Floats, effective_parameters: float) -> float:
+    """Divisor of a gain by how far the nuisance parameters ``z`` lie outside their tolerance (Birge ratio)."""
+    return with_uncertainty(fitter.birge_ratio(z, effective_parameters))
 
 
-def structure_mismatch(strain: float) -> bool:
-    """Whether the car of the logs is another than the model's, by what its numbers are ``nuisance_variance_inflation``."""
-    return strain > _FORM_DIFFERS
+def structure_mismatch(inflation: float) -> bool:
+    """Whether the measured car has another structure than the model, by `nuisance_variance_inflation`."""
+    return inflation > STRUCTURE_MISMATCH
 
 
-def local_inflation(most_left: float, found: Diagnosis) -> float:
-    """How much more than noise a model explains falsely, by the ``most_left`` for any other cause beside one.
+def local_inflation(largest_other_gain: float, threshold: DetectionThreshold) -> float:
+    """How much more than noise the largest other candidate gains given a cause, at least 1.
 
-    Were that one all there is, this would be what the largest of so many looks at noise reaches every second time. The
-    inflation by the bulk is asked for anyway.
+    Were the cause all there is, this would be what the largest of so many tests reaches by noise every second time. The
+    inflation of the threshold, by the bulk of the candidates, applies anyway.
     """
-    return max(most_left / float(chi2.isf(0.5 / found.number_of_tests, 1)) / found.inflation, 1.0)
+    expected = chi2_quantile(threshold.number_of_tests, 0.5)
+    return max(largest_other_gain / expected / threshold.inflation, 1.0)
 
 
-def with_gain(contender: FittedHypothesis, reference: float, error: float) -> FittedHypothesis:
-    """With its gain against ``reference``, shared out over the model's own error and that here, less its price."""
-    gained = (reference - contender.cost) / variance_inflation(contender.term.candidate)
-    return replace(contender, gain=gained / error - contender.total_penalty, discrepancy_factor=error)
+class LocalDiscrepancy:
+    """Divisors of the gains at one step of the selection; what other candidates gain is remembered by model."""
+
+    def __init__(self, fitter: Fitter, candidates: CandidateSet, effective_parameters: float) -> None:
+        self._fitter, self._candidates, self._effective_parameters = fitter, candidates, effective_parameters
+        self._known: dict[Model, float] = {}
+
+    def factor(self, one: FittedHypothesis, best: FittedHypothesis, threshold: DetectionThreshold) -> float:
+        """By the nuisance parameters of ``one``; where these say that the structure differs, at most what other
+        candidates gain given the ``best``."""
+        inflation = nuisance_variance_inflation(self._fitter, one.model.z, self._effective_parameters)
+        if not structure_mismatch(inflation):
+            return inflation
+        if best.model not in self._known:
+            others = self._candidates.scores_given(self._fitter, best.model, best.noise)
+            largest = max((item.gain for item in others), default=0.0)
+            self._known[best.model] = local_inflation(largest, threshold)
+        return min(inflation, self._known[best.model])
 
 
-def is_significant(contender: FittedHypothesis, least: float, fitter: Fitter, told: float) -> bool:
-    """Whether a cause gains the ``least`` that is asked and is likelier than none.
+# --- what the form of accepted causes leaves
 
-    As far off as it may be it explains more than it can be: in a car of another form that is the form.
+
+class FormErrorAllowance:
+    """What the accepted causes of a model may leave for a further one: a share of the chi-squared they ``explained``.
+
+    At their own injection points that share of all of it. Elsewhere as far as both act together: if their equations err
+    by a share f in every channel of every segment, a signature with energies e there takes at most
+    f^2 (sum sqrt(e P))^2 / sum e off chi-squared, P being the energies of the causes (Cauchy and Schwarz).
     """
-    ended = at_bound(contender.term) and structure_mismatch(
-        nuisance_variance_inflation(fitter, contender.model.z, told)
+
+    def __init__(self, explained: float, fitter: Fitter, model: Model, noise: Noise, jacobian: Tracks) -> None:
+        self._explained, self._jacobian, self._masks, self._noise = explained, jacobian, fitter.masks, noise
+        self._injection_points = {point for term in model.terms for point in term.candidate.effect.injection_points}
+        self._known: dict[str, float] = {}
+        if model.terms:
+            values = np.array(model.values())
+            own = {name: (of @ values)[:, None] for name, of in fitter.term_jacobian(model).items()}
+            self._energies = signature_energies(own, self._masks, noise)
+
+    def of(self, candidate: Candidate) -> float:
+        """In chi-squared, for a candidate; remembered."""
+        if candidate.name not in self._known:
+            at = list(candidate.columns)
+            own = {name: values[:, at].sum(axis=1, keepdims=True) for name, values in self._jacobian.items()}
+            self._known[candidate.name] = self.of_signature(candidate.effect, own)
+        return self._known[candidate.name]
+
+    def of_signature(self, effect: Effect, signature: Tracks) -> float:
+        """In chi-squared, for an effect with this signature, (samples, 1)."""
+        if not self._injection_points:
+            return 0.0
+        if self._injection_points.intersection(effect.injection_points):
+            return FORM_ERROR_SAME_POINT**2 * self._explained
+        overlap = signature_overlap(self._energies, signature_energies(signature, self._masks, self._noise))
+        return FORM_ERROR**2 * self._explained * overlap
+
+
+def signature_energies(signature: Tracks, masks: SampleMasks, noise: Noise) -> Floats:
+    """Squares of a whitened signature, (samples, 1), summed by channel and segment."""
+    whitened, _ = whiten({name: values.astype(np.float64) for name, values in signature.items()}, masks, noise)
+    segments = np.asarray(masks.segment_id, np.int64)
+    count = int(segments.max()) + 1
+    return np.concatenate([np.bincount(segments, whitened[name][:, 0] ** 2, count) for name in masks.names])
+
+
+def signature_overlap(one: Floats, other: Floats) -> float:
+    """How far two signatures lie in the same channels and segments, by their energies there: 0 to 1."""
+    together = float(np.sqrt(one * other).sum()) ** 2
+    return together / max(float(one.sum() * other.sum()), 1e-300)
+
+
+# --- tests of one hypothesis
+
+
+def with_gain(hypothesis: FittedHypothesis, reference: float, discrepancy_factor: float) -> FittedHypothesis:
+    """With its gain against the cost ``reference``: divided by both discrepancies, less its penalty."""
+    gain = (reference - hypothesis.cost) / variance_inflation(hypothesis.term.candidate)
+    return replace(
+        hypothesis, gain=gain / discrepancy_factor - hypothesis.total_penalty, discrepancy_factor=discrepancy_factor
     )
-    return contender.gain >= least and log_bayes_factor(contender) > 0.0 and not ended
+
+
+def is_significant(hypothesis: FittedHypothesis, least: float, fitter: Fitter, effective_parameters: float) -> bool:
+    """Whether a cause gains ``least`` and is more probable than none.
+
+    At its bound it explains more than it can be: in a car of another structure it stands for the structure.
+    """
+    inflation = nuisance_variance_inflation(fitter, hypothesis.model.z, effective_parameters)
+    bounded = at_bound(hypothesis.term) and structure_mismatch(inflation)
+    return hypothesis.gain >= least and log_bayes_factor(hypothesis) > 0.0 and not bounded
 
 
 def is_significant_given(
-    clear: FittedHypothesis, better: FittedHypothesis, least: float, fitter: Fitter, told: float, relinearise: bool
-) -> bool:
-    """Whether a cause that is beyond doubt is so even when a better one, which is not, is let in as an error."""
-    if criterion(clear) - criterion(better) < INDISTINGUISHABLE:
+    hypothesis: FittedHypothesis, better: FittedHypothesis, least: float, fitter: Fitter, effective_parameters: float,
+    relinearise: bool,
+) -> bool:  # fmt: skip
+    """Whether a significant cause stays so when a better one, which is not significant, is let in as an error."""
+    if criterion(hypothesis) - criterion(better) < INDISTINGUISHABLE:
         return True
-    joint = fitter.at(better.model.z, (*better.model.terms, clear.term), better.noise)
-    both = fitter.fit(joint, better.noise, 2, relinearise)
-    return (better.cost - both.cost) / variance_inflation(clear.term.candidate) >= least * _no_more(
-        clear, nuisance_variance_inflation(fitter, both.z, told)
-    )
+    start = fitter.at(better.model.z, (*better.model.terms, hypothesis.term), better.noise)
+    both = fitter.fit(start, better.noise, 2, relinearise)
+    inflation = nuisance_variance_inflation(fitter, both.z, effective_parameters)
+    gain = (better.cost - both.cost) / variance_inflation(hypothesis.term.candidate)
+    return gain >= least * _at_most_as_accepted(hypothesis, inflation)
 
 
-def _no_more(contender: FittedHypothesis, strain: float) -> float:
-    """What a gain is divided by where numbers are strained: no more than when the contender was accepted."""
-    return min(strain, contender.discrepancy_factor) if structure_mismatch(strain) else strain
+def _at_most_as_accepted(hypothesis: FittedHypothesis, inflation: float) -> float:
+    """Divisor of a gain where the structure differs: not more than when the hypothesis was accepted."""
+    return min(inflation, hypothesis.discrepancy_factor) if structure_mismatch(inflation) else inflation
 
 
-def eliminate_backward(found: Diagnosis, bare: Fitter, told: float, say: Progress) -> None:
-    """Take out each cause in turn; what is not missed, or may as well be nothing, stays out.
+# --- backward elimination
 
-    ``bare`` is the fitter of the model without any.
-    """
-    fitter, asked = found.fitter, float(np.sqrt(detection_threshold(found.number_of_tests, AMPLITUDE_ALPHA)))
-    for k in reversed(range(len(found.final.terms))):
-        model, term = found.final, found.final.terms[k]
+
+@dataclass(frozen=True, eq=False)
+class Elimination:
+    """What is left: the model, the hypotheses for each of its terms, and a remark on each term taken out."""
+
+    model: Model
+    hypotheses: Sequence[list[FittedHypothesis]]
+    remarks: tuple[str, ...] = ()
+
+
+def eliminate_backward(
+    fitter: Fitter, model: Model, noise: Noise, hypotheses: Sequence[list[FittedHypothesis]],
+    threshold: DetectionThreshold, effective_parameters: float, progress: Progress,
+) -> Elimination:  # fmt: skip
+    """Take out each cause in turn, the last first; what is not missed, or may as well be zero, stays out."""
+    left, needed = list(hypotheses), threshold.amplitude
+    remarks: list[str] = []
+    for k in reversed(range(len(model.terms))):
+        term = model.terms[k]
         if isinstance(term.candidate, BasisFunction):
             continue
-        error = variance_inflation(term.candidate)
-        away = abs(term.value) / (
-            float(standard_deviations(fitter, found.final, found.noise)[k]) * float(np.sqrt(error))
-        )
-        sure = away >= asked
-        if sure and causes_in(model) == 1:
-            return
+        discrepancy = variance_inflation(term.candidate)
+        sd = float(standard_deviations(fitter, model, noise)[k]) * float(np.sqrt(discrepancy))
+        distance = abs(term.value) / sd
+        if distance >= needed and causes_in(model) == 1:
+            return Elimination(model, tuple(left), tuple(remarks))
         rest = tuple(other for j, other in enumerate(model.terms) if j != k)
-        without = fitter.fit(fitter.at(model.z, rest, found.noise), found.noise, 5)
-        asked_of_gain = (
-            found.detection_threshold
-            * error
-            * _no_more(found.hypotheses[k][0], nuisance_variance_inflation(fitter, model.z, told))
-        )
-        if not sure or without.cost - model.cost < asked_of_gain:
-            why = "not needed beside the others" if sure else f"{away:.1f} deviations from nothing, asked {asked:.1f}"
-            found.remarks.append(f"{term.candidate.name} = {term.value:.3g} is not told: {why}")
-            say(found.remarks[-1])
-            found.final = without
-            del found.hypotheses[k]
-    if found.final.terms:
-        found.final = resolve_aliases(found.final, fitter.nuisances, fitter.base)
-        return
-    found.final, found.noise, found.fitter = found.base, found.first_noise, bare
-    bare.simulator.denoise_inputs(bare.parameter_set(found.base.z, found.base.terms))
+        without = fitter.fit(fitter.at(model.z, rest, noise), noise, 5)
+        inflation = nuisance_variance_inflation(fitter, model.z, effective_parameters)
+        least = threshold.gain * discrepancy * _at_most_as_accepted(left[k][0], inflation)
+        if distance < needed or without.cost - model.cost < least:
+            why = f"{distance:.1f} standard deviations from zero, {needed:.1f} needed"
+            why = "the other causes explain as much" if distance >= needed else why
+            remarks.append(f"{term.candidate.name} = {term.value:.3g} is not named: {why}")
+            progress(remarks[-1])
+            model = without
+            del left[k]
+    if model.terms:
+        model = resolve_aliases(model, fitter.nuisances, fitter.base)
+    return Elimination(model, tuple(left), tuple(remarks))

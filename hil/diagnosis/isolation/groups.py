@@ -10,10 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
+from hil.diagnosis.detection.threshold import ISOLABILITY_SIGMA
 from hil.diagnosis.estimation.terms import Candidate
 
-ISOLABILITY_SIGMA = 2.0
-"""Standard deviations that must remain of a signature after its best imitation for the two to be isolable."""
 MAX_RIVALS = 4
 """Rivals that imitate together, at most."""
 _MIN_REDUCTION = 0.02

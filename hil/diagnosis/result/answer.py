@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from hil.diagnosis.detection.candidates import candidate_key
 from hil.diagnosis.detection.nonparametric import BasisFunction, estimate_curve
-from hil.diagnosis.detection.onset import nearest, segment_starts
+from hil.diagnosis.detection.onset import nearest
 from hil.diagnosis.detection.profile_fit import FittedHypothesis, delta_chi2, delta_criterion, rival_hypotheses
-from hil.diagnosis.detection.result import INDISTINGUISHABLE, Diagnosis
+from hil.diagnosis.detection.result import Diagnosis
+from hil.diagnosis.detection.score_test import candidate_key, segment_starts
 from hil.diagnosis.detection.shape import ShapedCandidate
+from hil.diagnosis.detection.threshold import DISTINCT, INDISTINGUISHABLE, UNDETECTABLE_SHARE
 from hil.diagnosis.estimation.gauss_newton import Term
 from hil.diagnosis.estimation.information import marginalise
 from hil.diagnosis.estimation.model_discrepancy import UNLISTED, variance_inflation_nonparametric
@@ -29,10 +30,6 @@ from hil.diagnosis.result.residual_patterns import WORDS, ResidualPattern
 
 _MAX_COMPARED = 5
 """Effects of an isolability group between which a discriminating manoeuvre is sought, at most."""
-_UNDETECTABLE_SHARE = 0.5
-"""Share of undetectable effects beyond which a null result is no clean bill: the verdict is ``not_testable``."""
-_DISTINCT = 4.6
-"""Criterion difference (Bayes factor ten to one) below which a cause of another name is not isolated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +83,7 @@ def _verdict(diagnosis: Diagnosis, causes: list[dict[str, Any]], group: Isolabil
     if not causes:
         effects = {score.candidate.effect.name for score in diagnosis.scores}
         undetectable = effects.intersection(diagnosis.undetectable_effects)
-        return "not_testable" if len(undetectable) > _UNDETECTABLE_SHARE * len(effects) else "none"
+        return "not_testable" if len(undetectable) > UNDETECTABLE_SHARE * len(effects) else "none"
     if any(isinstance(term.candidate, BasisFunction) for term in diagnosis.final.terms):
         return "unlisted"
     named = _named(diagnosis)
@@ -96,7 +93,7 @@ def _verdict(diagnosis: Diagnosis, causes: list[dict[str, Any]], group: Isolabil
         best, *others = rival_hypotheses(hypotheses, named)
         for other in others:
             another = other.term.candidate.effect.name != best.term.candidate.effect.name
-            if another and delta_criterion(other, best) < _DISTINCT:
+            if another and delta_criterion(other, best) < DISTINCT:
                 return "cannot_tell_apart"
     return "named"
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.profile_fit import FittedHypothesis, delta_chi2
-from hil.diagnosis.detection.result import INDISTINGUISHABLE
+from hil.diagnosis.detection.threshold import INDISTINGUISHABLE
 from hil.diagnosis.estimation.gauss_newton import Model
 from hil.diagnosis.result.answer import Answer
 from hil.diagnosis.result.cross_validation import HeldOutError, probabilities

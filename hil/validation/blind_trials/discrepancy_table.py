@@ -37,7 +37,7 @@ def measure(count: int, seed: int, say: Callable[[str], None]) -> tuple[Gains, G
     Once with all that the car's set states, and once without its suspension, discs and latencies.
 
     All places count, not the better ones: the best of nine explains twice what one does by chance alone, and how many
-    tests are made is the threshold's business (`hil.diagnosis.detection.score_test.detection_threshold`). What may be
+    tests are made is the threshold's business (`hil.diagnosis.detection.threshold.chi2_quantile`). What may be
     on one side of nothing only counts where it is there: else half its tests would be zeros, and its error seem smaller
     than that of the same term by another name. They are made where the whole search ends, which may have restarted from
     numbers that explain more.

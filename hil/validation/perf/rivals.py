@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.detection.result import FALSE_ALARM_PROBABILITY
-from hil.diagnosis.detection.score_test import detection_threshold
+from hil.diagnosis.detection.threshold import FALSE_ALARM_PROBABILITY, chi2_quantile
 from hil.validation.perf.signatures import Problem
 
 NONE = "none"
@@ -103,7 +102,7 @@ def _guess(names: Iterable[str], gains: Floats, given: Problem) -> Guess:
     listed, looks = list(names), len(gains)
     best = int(np.argmax(gains))
     logs = 0.5 * (gains - np.log(given.samples)) - np.log(looks)
-    named = listed[best] if gains[best] > detection_threshold(looks, FALSE_ALARM_PROBABILITY) else NONE
+    named = listed[best] if gains[best] > chi2_quantile(looks, FALSE_ALARM_PROBABILITY) else NONE
     return Guess(named, _softmax([NONE, *listed], np.array([0.0, *logs]), given))
 
 

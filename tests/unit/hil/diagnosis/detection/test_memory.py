@@ -1,4 +1,4 @@
-"""A diagnosis lets go of its sensitivities, some hundreds of megabytes, when it is done: many are run in a row."""
+"""A diagnosis frees its Jacobians, some hundreds of megabytes, when it is done: many are run in a row."""
 
 import gc
 

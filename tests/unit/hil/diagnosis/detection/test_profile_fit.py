@@ -1,4 +1,4 @@
-"""Contenders for a cause: what is at the end of its range, and how far one is behind another."""
+"""Fitted hypotheses: what is at a bound, and how far one is behind another."""
 
 from typing import Any
 
@@ -18,36 +18,34 @@ from hil.diagnosis.estimation.terms import candidates, columns
 CANDIDATES = {c.name: c for c in candidates(columns())}
 
 
-@pytest.mark.parametrize(("share", "ended"), [(1.0, True), (0.999, False), (0.0, False)])
-def test_a_value_as_far_off_as_it_may_be_is_at_its_end(share: float, ended: bool) -> None:
+@pytest.mark.parametrize(("share", "bounded"), [(1.0, True), (0.999, False), (0.0, False)])
+def test_the_largest_allowed_value_is_at_a_bound(share: float, bounded: bool) -> None:
     drag = CANDIDATES["headwind.drag_gain@car"]
-    assert at_bound(Term(drag, share * drag.parameter.high)) is ended
+    assert at_bound(Term(drag, share * drag.parameter.high)) is bounded
 
 
-def _fitted(cost: float, evidence: float, error: float, name: str = "mass_offset@car") -> FittedHypothesis:
+def _fitted(cost: float, occam: float, error: float, name: str = "mass_offset@car") -> FittedHypothesis:
     nothing: Any = None
-    return FittedHypothesis(
-        Term(CANDIDATES[name], 100.0), nothing, cost, evidence, 1.0, nothing, discrepancy_factor=error
-    )
+    return FittedHypothesis(Term(CANDIDATES[name], 100.0), nothing, cost, occam, 1.0, nothing, discrepancy_factor=error)
 
 
-@pytest.mark.parametrize(("error", "shared_by"), [(np.inf, 1.0), (1.0, 1.0), (4.0, 4.0)])
-def test_what_divides_gains_divides_their_difference(error: float, shared_by: float) -> None:
-    """A mass was 85 behind its motors, in lateral channels alone, in a car of another form."""
+@pytest.mark.parametrize(("error", "divisor"), [(np.inf, 1.0), (1.0, 1.0), (4.0, 4.0)])
+def test_what_divides_gains_divides_their_difference(error: float, divisor: float) -> None:
+    """A mass was 85 behind its motors, in lateral channels alone, in a car of another structure."""
     best, other = _fitted(-300.0, -4.0, error), _fitted(-260.0, -3.0, 9.0)
-    assert delta_chi2(other, best) == pytest.approx(40.0 / shared_by)
-    assert delta_criterion(other, best) == pytest.approx(38.0 / shared_by)
+    assert delta_chi2(other, best) == pytest.approx(40.0 / divisor)
+    assert delta_criterion(other, best) == pytest.approx(38.0 / divisor)
     assert delta_chi2(best, best) == delta_criterion(best, best) == 0.0
 
 
-def test_what_is_named_beside_a_cause_is_no_rival_of_it() -> None:
-    """Ground speed 2 % off and a drag of one wheel: both were named, and could not be told from each other."""
+def test_what_is_named_as_another_cause_is_no_rival() -> None:
+    """Ground speed 2 % off and a drag of one wheel: both were named, and could not be isolated from each other."""
     names = ["speed_scale@car", "residual_drag@rr", "residual_drag@rear", "mass_offset@car"]
     listed = [_fitted(10.0 * k, 0.0, 1.0, name) for k, name in enumerate(names)]
     left = rival_hypotheses(listed, {"speed_scale", "residual_drag"})
     assert [c.term.candidate.name for c in left] == ["speed_scale@car", "mass_offset@car"]
 
 
-def test_other_places_of_a_cause_stay_in_its_race() -> None:
+def test_other_locations_of_a_cause_stay_rivals() -> None:
     listed = [_fitted(10.0 * k, 0.0, 1.0, name) for k, name in enumerate(["residual_drag@rr", "residual_drag@rear"])]
     assert rival_hypotheses(listed, {"residual_drag"}) == listed

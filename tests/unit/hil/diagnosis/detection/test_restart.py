@@ -1,4 +1,4 @@
-"""Causes that the vehicle's numbers stood in for."""
+"""Causes that nuisance parameters absorbed."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from outsider import VEHICLE
 from pulses import log_as_driven
 
 from hil.diagnosis.data.prepare import prepare
-from hil.diagnosis.detection.profile_fit import FittedHypothesis, criterion, refitted
+from hil.diagnosis.detection.profile_fit import criterion, refitted, unscored
 from hil.diagnosis.detection.restart import refit_from_nominal
 from hil.diagnosis.estimation.gauss_newton import Term
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
@@ -21,25 +21,25 @@ DEVIATIONS = {"wheel": 0.02, "ax": 0.02, "gps": 0.03, "pressure": 1e4, "motor": 
 
 
 @pytest.mark.slow
-def test_pads_that_brake_gains_stood_in_for_are_found():
+def test_pads_that_brake_gains_absorbed_are_estimated():
     vehicle = load_vehicle(VEHICLE)
-    case = prepare([log_as_driven(vehicle, 0.318)], 0.318)
-    rig, base = Simulator(case, vehicle), nominal(vehicle)
-    numbers = NuisanceFit(rig, SampleMasks.of(case), vehicle, base, relinearise=True)
+    dataset = prepare([log_as_driven(vehicle, 0.318)], 0.318)
+    simulator, base = Simulator(dataset, vehicle), nominal(vehicle)
+    nuisance_fit = NuisanceFit(simulator, SampleMasks.of(dataset), vehicle, base, relinearise=True)
     (pads,) = [one for one in candidates(columns()) if one.name == "pad_mu_gain@car"]
     rng = np.random.default_rng(2)
-    (drive,) = case.recordings
-    for group, told in rig.run(pads.applied(base, WEAKER)).items():
-        drive.measured[group][:] = told + DEVIATIONS.get(group, 0.02) * rng.standard_normal(told.shape)
-    numbers.relinearise(np.zeros(len(numbers.nuisances)))
-    bent, noise = numbers.fit(*numbers.fitter.start())
-    gains = [k for k, one in enumerate(numbers.nuisances) if one.name.startswith("brake_gain")]
-    assert (bent.z[gains] < -2.0).any()
-    begun = numbers.fitter.at(bent.z, (Term(pads, 0.0),), noise)
-    stuck = refitted(FittedHypothesis(begun.terms[0], begun, begun.cost, 0.0, 1.0, noise), begun, noise)
-    fitter = numbers.fitter
-    (found,), (without, _) = refit_from_nominal(numbers, [stuck], bent, refitted, stuck.cost, anew=1)
-    assert numbers.fitter is fitter
-    assert found.term.value == pytest.approx(WEAKER, abs=0.02)
-    assert criterion(found) < criterion(stuck)
-    assert found.cost + 100.0 < min(without.cost, fitter.cost(bent.residual, bent.z, noise))
+    (recording,) = dataset.recordings
+    for group, values in simulator.run(pads.applied(base, WEAKER)).items():
+        recording.measured[group][:] = values + DEVIATIONS.get(group, 0.02) * rng.standard_normal(values.shape)
+    nuisance_fit.relinearise(np.zeros(len(nuisance_fit.nuisances)))
+    biased, noise = nuisance_fit.fit(*nuisance_fit.fitter.start())
+    gains = [k for k, one in enumerate(nuisance_fit.nuisances) if one.name.startswith("brake_gain")]
+    assert (biased.z[gains] < -2.0).any()
+    start = nuisance_fit.fitter.at(biased.z, (Term(pads, 0.0),), noise)
+    stuck = refitted(unscored(start, noise, 1.0), start, noise)
+    fitter = nuisance_fit.fitter
+    (better,), (without, _) = refit_from_nominal(nuisance_fit, [stuck], biased, refitted, stuck.cost, 1)
+    assert nuisance_fit.fitter is fitter
+    assert better.term.value == pytest.approx(WEAKER, abs=0.02)
+    assert criterion(better) < criterion(stuck)
+    assert better.cost + 100.0 < min(without.cost, fitter.cost(biased.residual, biased.z, noise))

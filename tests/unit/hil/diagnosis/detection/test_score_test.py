@@ -1,4 +1,4 @@
-"""The race: estimates, bounds and thresholds of the linear screen."""
+"""Score tests: estimates, bounds, inflation and model discrepancy."""
 
 import tomllib
 from dataclasses import replace
@@ -9,7 +9,6 @@ import pytest
 
 from hil.diagnosis.detection.nonparametric import NONPARAMETRIC_TERMS
 from hil.diagnosis.detection.score_test import (
-    detection_threshold,
     inflation_factor,
     score,
     scores,
@@ -23,30 +22,25 @@ from hil.diagnosis.estimation.terms import LOCATIONS, candidates, columns, locat
 CANDIDATES = {c.name: c for c in candidates(columns())}
 
 
-def test_a_score_finds_the_value_that_made_the_residual() -> None:
+def test_a_score_test_estimates_the_value_that_made_the_residual() -> None:
     candidate = CANDIDATES["mass_offset@car"]
     q, true = 1.0, 120.0
-    found = score(candidate, q * true, q)
-    assert found.value == pytest.approx(true, rel=1e-3)
-    assert found.raw_gain == pytest.approx(q * true**2, rel=1e-3)
+    test = score(candidate, q * true, q)
+    assert test.value == pytest.approx(true, rel=1e-3)
+    assert test.raw_gain == pytest.approx(q * true**2, rel=1e-3)
 
 
 def test_a_value_of_the_forbidden_sign_explains_nothing() -> None:
-    found = score(CANDIDATES["residual_drag@fl"], -50.0, 10.0)
-    assert found.value == 0.0
-    assert found.gain == 0.0
+    test = score(CANDIDATES["residual_drag@fl"], -50.0, 10.0)
+    assert test.value == 0.0
+    assert test.gain == 0.0
 
 
 def test_what_leaves_no_trace_cannot_score() -> None:
     assert score(CANDIDATES["mass_offset@car"], 1.0, 0.0).max_snr == 0.0
 
 
-def test_more_looks_ask_for_more() -> None:
-    assert detection_threshold(1, 0.05) == pytest.approx(3.841, abs=1e-3)
-    assert detection_threshold(100, 0.003) > detection_threshold(10, 0.003) > detection_threshold(1, 0.003)
-
-
-def test_the_models_own_error_raises_what_is_asked() -> None:
+def test_model_discrepancy_raises_the_inflation() -> None:
     quiet = [score(c, 0.3, 1e4) for c in CANDIDATES.values()]
     loud = [score(c, 0.05 * c.parameter.typical * 1e6, 1e6) for c in CANDIDATES.values()]
     assert inflation_factor(quiet) == 1.0
@@ -54,8 +48,8 @@ def test_the_models_own_error_raises_what_is_asked() -> None:
     assert inflation_factor(loud) > 1.0
 
 
-def test_a_cause_that_shows_through_others_is_no_error_of_the_model() -> None:
-    """Signatures that all resemble one: the cause inflates what every one explains, and nothing beside it.
+def test_a_cause_that_shows_through_others_is_no_inflation() -> None:
+    """Signatures that all resemble one: the cause inflates what every one gains, and nothing given it.
 
     Noise along what they share is explained by all of them at once, so one draw says little: the median of eleven does.
     """
@@ -64,7 +58,7 @@ def test_a_cause_that_shows_through_others_is_no_error_of_the_model() -> None:
     tau = np.ones(count)
     for candidate in listed:
         tau[candidate.columns[0]] = candidate.prior_sd
-    cause, beside = listed[0], []
+    cause, inflations = listed[0], []
     for seed in range(11):
         rng = np.random.default_rng(seed)
         shared = rng.standard_normal(3000)
@@ -72,36 +66,34 @@ def test_a_cause_that_shows_through_others_is_no_error_of_the_model() -> None:
         hidden = 0.3 * cause.prior_sd * signatures[:, cause.columns[0]]
         joined = np.column_stack((rng.standard_normal(3000) + hidden, signatures))
         total = InformationBlocks((joined.T @ joined)[None], 0, 3000, 0.0)
-        found = scores(listed, marginalise(total.total(), 0), 0, [0.0] * len(listed))
-        assert inflation_factor(found) > 3.0
-        beside.append(inflation_factor(scores_given_best(found, total, np.zeros(0), ())))
-    assert np.median(beside) == pytest.approx(1.0, abs=0.3)
+        tests = scores(listed, marginalise(total.total(), 0), 0, [0.0] * len(listed))
+        assert inflation_factor(tests) > 3.0
+        inflations.append(inflation_factor(scores_given_best(tests, total, np.zeros(0), ())))
+    assert np.median(inflations) == pytest.approx(1.0, abs=0.3)
 
 
-def test_a_gain_is_shared_out_over_the_models_own_error() -> None:
+def test_a_gain_is_divided_by_the_model_discrepancy() -> None:
     candidate = CANDIDATES["tyre_relaxation@car"]
-    found = score(candidate, 0.1 * 1e4, 1e4)
+    test = score(candidate, 0.1 * 1e4, 1e4)
     assert variance_inflation(candidate) > 1.0
-    assert found.gain == pytest.approx(found.raw_gain / variance_inflation(candidate))
+    assert test.gain == pytest.approx(test.raw_gain / variance_inflation(candidate))
 
 
-def test_dive_errs_more_where_nobody_states_the_springs() -> None:
+def test_dive_has_more_discrepancy_where_the_springs_are_not_stated() -> None:
     candidate = CANDIDATES["pitch_dive@car"]
     assert variance_inflation(replace(candidate, suspension_stated=False)) > variance_inflation(candidate)
     assert variance_inflation(candidate) == variance_inflation(replace(candidate, suspension_stated=True))
 
 
-def test_every_entry_of_the_models_own_error_is_a_candidates_number_or_a_law_at_a_kind_of_place() -> None:
+def test_every_entry_of_the_discrepancy_table_is_a_parameter_or_nonparametric_term_at_a_kind_of_location() -> None:
     kinds = {(c.effect.name, c.parameter.name, location_kind(c.location)) for c in CANDIDATES.values()}
-    kinds |= {
-        (UNLISTED, law.name, location_kind(place)) for law in NONPARAMETRIC_TERMS for place in LOCATIONS[law.scope]
-    }
+    kinds |= {(UNLISTED, one.name, location_kind(at)) for one in NONPARAMETRIC_TERMS for at in LOCATIONS[one.scope]}
     source = resources.files("hil.diagnosis.estimation") / "model_discrepancy.toml"
     tables = tomllib.loads(source.read_text(encoding="utf-8"))
     entries = [
         ((effect, name, kind), ratio)
-        for effect, numbers in (*tables["ratio"].items(), *tables["unsprung"].items())
-        for name, ratios in numbers.items()
+        for effect, parameters in (*tables["ratio"].items(), *tables["unsprung"].items())
+        for name, ratios in parameters.items()
         for kind, ratio in ratios.items()
     ]
     assert {entry for entry, _ in entries} <= kinds
@@ -109,7 +101,7 @@ def test_every_entry_of_the_models_own_error_is_a_candidates_number_or_a_law_at_
 
 
 def test_both_the_best_explanation_and_the_clearest_are_fitted() -> None:
-    """A number in which the model errs much explains most; one in which it errs little is still among the leaders."""
+    """A parameter with much discrepancy explains most; one with little is still shortlisted."""
     erring = [s for s in (score(c, 40.0, 100.0) for c in CANDIDATES.values()) if variance_inflation(s.candidate) > 4.0]
     clear = min(CANDIDATES.values(), key=variance_inflation)
     listed = [*erring, score(clear, 30.0 / abs(clear.parameter.typical), 100.0 / clear.parameter.typical**2)]

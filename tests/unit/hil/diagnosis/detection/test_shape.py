@@ -1,4 +1,4 @@
-"""Listed causes of another shape: how far one is moved to see what it answers."""
+"""Shape parameters: how far one is moved for a finite difference."""
 
 import pytest
 
@@ -19,5 +19,5 @@ _BEGINS = THETA.effect("pad_temp_fade").parameter("start_k")
     ],
 )
 def test_a_shape_stays_within_its_bounds(at, step, moved):
-    """One that was hardly known was moved by its whole range, beyond its bounds."""
+    """One with a large deviation was moved by its whole range, beyond its bounds."""
     assert _within(at, step, _BEGINS) == pytest.approx(moved)

@@ -6,6 +6,7 @@ import pytest
 
 from hil.bench.result import measure
 from hil.bench.virtual import simulate
+from hil.diagnosis.detection.threshold import ISOLABILITY_SIGMA
 from hil.diagnosis.isolation.experiment import (
     FOLDER,
     MAX_RECOMMENDATIONS,
@@ -14,7 +15,6 @@ from hil.diagnosis.isolation.experiment import (
     separation,
     write,
 )
-from hil.diagnosis.isolation.groups import ISOLABILITY_SIGMA
 from hil.errors import BrakebenchError
 from hil.scenario.scenario import load_scenario, scenario_names
 

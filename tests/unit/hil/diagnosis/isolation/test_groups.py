@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hil.diagnosis.detection.threshold import ISOLABILITY_SIGMA
 from hil.diagnosis.estimation.terms import candidates, columns
-from hil.diagnosis.isolation.groups import ISOLABILITY_SIGMA, imitation, isolability_group, remaining, summed
+from hil.diagnosis.isolation.groups import imitation, isolability_group, remaining, summed
 
 COLUMNS = columns()
 CANDIDATES = candidates(COLUMNS)
