@@ -1,6 +1,7 @@
 """For all tests: how long an example takes says nothing on a shared machine, and the first one compiles."""
 
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
-settings.register_profile("brakebench", deadline=None)
+pytest_plugins = ["drawn"]
+settings.register_profile("brakebench", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("brakebench")
