@@ -26,13 +26,14 @@ def _bump(speed_mps: float, pressure_pa: np.ndarray) -> np.ndarray:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize("first_seed", [7, 507, 807])
+@pytest.mark.parametrize("first_seed", [7, *(pytest.param(seed, marks=pytest.mark.long) for seed in (507, 807))])
 def test_nothing_is_named_where_the_car_is_only_simpler(first_seed: int) -> None:
     assert explain(logs(_plain, first_seed), vehicle=VEHICLE).json["verdict"] == "none"
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
+@pytest.mark.long
 def test_a_car_that_only_rolls_says_too_little() -> None:
     """Neither brakes nor motors act: most effects would not show, so that nothing was found is no clean bill."""
     answer = explain([drive("coast", 7, _plain)], vehicle=VEHICLE).json
@@ -81,6 +82,7 @@ def _step(speed_mps: float, pressure_pa: np.ndarray) -> np.ndarray:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
+@pytest.mark.long
 def test_a_listed_cause_at_its_end_gives_way_to_a_law_that_explains_more() -> None:
     """It was `mu_speed`, as steep as it may be: a straight line along a step."""
     found = explain(logs(_step), vehicle=VEHICLE).json
