@@ -29,6 +29,17 @@ SOURCES = {
 """What the outcome of each run depends on."""
 
 
+def lab_tests() -> set[str]:
+    """Files whose tests run in the lab of a real SocketCAN."""
+    files = [ROOT / path for path in SOURCES["lab"] if path.startswith("tests/")]
+    return {
+        path.relative_to(ROOT).as_posix()
+        for file in files
+        for path in (file.rglob("test_*.py") if file.is_dir() else (file,))
+        if path.name.startswith("test_")
+    }
+
+
 def state(name: str) -> str:
     """Sixteen hexadecimal digits that differ when the outcome of a run may."""
     return digest(ROOT / path for path in SOURCES[name])[:16]

@@ -20,6 +20,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
+import passed
 from candump import Candump
 from slcan_device import SlcanDevice
 from started import COMMAND, Started
@@ -41,6 +42,17 @@ def pytest_report_header() -> str | None:
     modules = [line.split()[0] for line in Path("/proc/modules").read_text().splitlines()]
     found = ", ".join(sorted(name for name in modules if name.startswith(("can", "vcan", "slcan"))))
     return f"SocketCAN: Linux {platform.release()} ({LAB}), modules {found or 'built in'}"
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Note that the lab's tests pass, where that is asked for and all of them ran."""
+    if LAB is None or not session.config.getoption("--write-passed"):
+        return
+    stats = session.config.pluginmanager.get_plugin("terminalreporter").stats  # type: ignore[union-attr]
+    whole = not any(stats.get(kind) for kind in ("skipped", "deselected", "xfailed"))
+    ran = {report.nodeid.partition("::")[0] for report in stats.get("passed", [])}
+    if session.exitstatus == pytest.ExitCode.OK and whole and ran >= passed.lab_tests():
+        passed.write("lab", {"kernel": f'"{platform.release()} ({LAB})"', "tests": session.testscollected})
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
