@@ -2,6 +2,6 @@
 
 from hypothesis import HealthCheck, settings
 
-pytest_plugins = ["drawn"]
+pytest_plugins = ["drawn", "shared"]
 settings.register_profile("brakebench", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("brakebench")

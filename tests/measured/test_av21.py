@@ -19,8 +19,8 @@ def log(measured_data) -> Log:
 
 
 @pytest.fixture(scope="module")
-def answer(log, tmp_path_factory):
-    return explain(log, "av21", out=tmp_path_factory.mktemp("av21")).json
+def answer(log, shared):
+    return shared("av21", lambda folder: explain(log, "av21", out=folder).json)
 
 
 def _cause(answer: dict, effect: str, wheel: str) -> dict:
