@@ -102,9 +102,15 @@ def test_what_changes_the_stop_is_found_by_halving():
 
 @pytest.mark.slow
 def test_doubled_factors_change_nothing_in_real_time(brakebench, tmp_path, channel):
-    def median_m(env):
-        runs = [json.loads(brakebench("run", "--json", "--bus", channel, env=env).stdout) for _ in range(3)]
-        return statistics.median(run["stop_distance_m"] for run in runs)
-
+    """A busy machine moves single runs: where the first ones differ, medians of three decide."""
     names = ["EHB_DEMAND_FRONT.PRESSURE_DEMAND_FL", "WHEEL_SPEED_REAR.WHEEL_SPEED_RL"]
-    assert median_m(doubled(tmp_path, names)) == pytest.approx(median_m({}), rel=5e-3)
+    plain_m, doubled_m = [], []
+
+    def differ():
+        return statistics.median(doubled_m) != pytest.approx(statistics.median(plain_m), rel=5e-3)
+
+    while not plain_m or (differ() and len(plain_m) < 3):
+        for stops_m, changed in ((plain_m, ()), (doubled_m, names)):
+            done = brakebench("run", "--json", "--bus", channel, env=doubled(tmp_path, changed))
+            stops_m.append(json.loads(done.stdout)["stop_distance_m"])
+    assert not differ(), (plain_m, doubled_m)
