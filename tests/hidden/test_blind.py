@@ -15,7 +15,7 @@ from hil.trials.reading import in_set
 from hil.trials.run import run_case
 
 SEED = 7
-pytestmark = [pytest.mark.slow, pytest.mark.long, pytest.mark.timeout(1200)]
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 SINGLES = [kind.name for kind in SEPARABLE]
 
 

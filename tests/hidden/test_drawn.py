@@ -17,7 +17,7 @@ from hil.trials.run import run_case
 from hil.trials.separable import told_apart
 
 SNR = 15.0
-pytestmark = [pytest.mark.slow, pytest.mark.drawn, pytest.mark.timeout(3600)]
+pytestmark = [pytest.mark.slow, pytest.mark.drawn]
 
 
 def _singles(seed: int) -> Iterator[Case]:

@@ -10,7 +10,7 @@ from hil.study.logs.channel_map import load_map
 from hil.study.logs.read import read_logs
 from hil.study.logs.table import PRESSURE_DEMAND, Log
 
-pytestmark = [pytest.mark.slow, pytest.mark.long, pytest.mark.timeout(1800)]
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 
 
 @pytest.fixture(scope="module")
