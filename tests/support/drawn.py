@@ -50,7 +50,7 @@ class Verdict:
     """Collects outcomes in the process that runs the session, and fails it where they do not pass."""
 
     def __init__(self, write_passed: bool) -> None:
-        self._write = write_passed
+        self._began = passed.state("drawn") if write_passed else ""
         self._outcomes: Outcomes = {}
         self._met = False
         self._lines: list[str] = []
@@ -79,10 +79,10 @@ class Verdict:
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
         if session.exitstatus == pytest.ExitCode.OK:
             self._lines.append("the drawn cases pass")
-            if self._write and SEED not in os.environ:  # a seed of one's choice is no draw
+            if self._began and SEED not in os.environ:  # a seed of one's choice is no draw
                 counts = {kind: sum(key[0] == kind for key in wrong) for kind in _ALLOWED}
                 facts = {"seed": seed(), "missed": counts[SINGLE], "alarms": counts[NULL]}
-                self._lines.append(f"wrote {passed.write('drawn', facts)}")
+                self._lines.append(passed.write("drawn", self._began, facts))
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         """Print misses, alarms and the verdict."""

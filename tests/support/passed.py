@@ -2,7 +2,10 @@
 
     python tests/support/passed.py drawn    # exit code 0 where the drawn cases passed with the sources as they are
 
-Only a run that passes writes its file, and only with ``--write-passed``.
+Only a run that passes writes its file, and only with ``--write-passed``:
+
+    pytest -n 2 -m drawn --write-passed tests/hidden/test_drawn.py
+    .ci/vcan-lab python -m pytest tests/vcan tests/contract/test_bus.py tests/contract/test_clock.py --write-passed
 """
 
 import sys
@@ -51,11 +54,13 @@ def passed(name: str) -> bool:
     return file.exists() and tomllib.loads(file.read_text("utf-8")).get("state") == state(name)
 
 
-def write(name: str, facts: dict[str, Any]) -> Path:
-    """Note that the run passes; ``facts`` are for people."""
-    lines = {"state": f'"{state(name)}"', **facts}
+def write(name: str, began: str, facts: dict[str, Any]) -> str:
+    """Note that a run passes which began with a state; ``facts`` are for people. Says what was done."""
+    if state(name) != began:
+        return f"{FILES[name]} is not written: the sources changed during the run"
+    lines = {"state": f'"{began}"', **facts}
     (ROOT / FILES[name]).write_text("".join(f"{key} = {value}\n" for key, value in lines.items()), "utf-8")
-    return ROOT / FILES[name]
+    return f"{FILES[name]} is written"
 
 
 if __name__ == "__main__":

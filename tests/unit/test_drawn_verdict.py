@@ -92,9 +92,12 @@ def test_a_run_passed_while_its_sources_stay(tmp_path, monkeypatch):
     monkeypatch.setattr(passed, "ROOT", tmp_path)
     monkeypatch.setattr(passed, "SOURCES", {"lab": ("dbc", "tests/vcan")})
     assert not passed.passed("lab")
-    passed.write("lab", {"tests": 3})
+    began = passed.state("lab")
+    passed.write("lab", began, {"tests": 3})
     assert passed.passed("lab")
     (tmp_path / "dbc" / "brake.dbc").write_text("BU_: ECU")
+    assert not passed.passed("lab")
+    assert "not written" in passed.write("lab", began, {"tests": 3})
     assert not passed.passed("lab")
 
 

@@ -33,6 +33,7 @@ LAB = os.environ.get("VCAN_LAB")  # set by .ci/vcan-lab: "kernel" or "uml"
 
 
 FIGURES = pytest.StashKey[list[str]]()
+BEGAN = pytest.StashKey[str]()
 
 
 def pytest_report_header() -> str | None:
@@ -44,15 +45,22 @@ def pytest_report_header() -> str | None:
     return f"SocketCAN: Linux {platform.release()} ({LAB}), modules {found or 'built in'}"
 
 
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Note the state of the sources that are tested."""
+    if LAB is not None and session.config.getoption("--write-passed"):
+        session.config.stash[BEGAN] = passed.state("lab")
+
+
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """Note that the lab's tests pass, where that is asked for and all of them ran."""
-    if LAB is None or not session.config.getoption("--write-passed"):
+    if BEGAN not in session.config.stash:
         return
     stats = session.config.pluginmanager.get_plugin("terminalreporter").stats  # type: ignore[union-attr]
     whole = not any(stats.get(kind) for kind in ("skipped", "deselected", "xfailed"))
     ran = {report.nodeid.partition("::")[0] for report in stats.get("passed", [])}
     if session.exitstatus == pytest.ExitCode.OK and whole and ran >= passed.lab_tests():
-        passed.write("lab", {"kernel": f'"{platform.release()} ({LAB})"', "tests": session.testscollected})
+        facts = {"kernel": f'"{platform.release()} ({LAB})"', "tests": session.testscollected}
+        session.config.stash.setdefault(FIGURES, []).append(passed.write("lab", session.config.stash[BEGAN], facts))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
