@@ -1,6 +1,17 @@
-"""For all tests: how long an example takes says nothing on a shared machine, and the first one compiles."""
+"""For all tests: how long one takes says nothing on a shared machine, and the first one compiles."""
 
-from hypothesis import settings
+import pytest
+from hypothesis import HealthCheck, settings
 
-settings.register_profile("brakebench", deadline=None)
+pytest_plugins = ["drawn", "shared"]
+SLOW_LIMIT_S = 3600.0  # ends what hangs; a busy machine takes ten times as long as an idle one
+
+settings.register_profile("brakebench", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("brakebench")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Give every slow test the same limit."""
+    for item in items:
+        if item.get_closest_marker("slow"):
+            item.add_marker(pytest.mark.timeout(SLOW_LIMIT_S), append=False)

@@ -156,7 +156,8 @@ def everything(method):
         yield name, replay(plan.start, plan.rows, plan.parameters, columns, method=method)[0]
 
 
-@pytest.mark.slow  # compiles the plant a second time
+@pytest.mark.slow
+@pytest.mark.long  # compiles the plant a second time
 @pytest.mark.parametrize("method", [SEMI_IMPLICIT, RUNGE_KUTTA_4])
 def test_neutral_is_bit_identical_to_the_build_without(without, method):
     for name, table in everything(method):

@@ -15,7 +15,7 @@ from hil.validation.reference_car.case import Hidden, make_case
 from hil.validation.reference_car.cases import SEPARABLE, draw
 
 SEED = 7
-pytestmark = [pytest.mark.slow, pytest.mark.long, pytest.mark.timeout(1200)]
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 SINGLES = [kind.name for kind in SEPARABLE]
 
 

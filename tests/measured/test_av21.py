@@ -10,7 +10,7 @@ from hil.diagnosis.data.log import PRESSURE_DEMAND, Log
 from hil.diagnosis.data.read import read_logs
 from hil.diagnosis.explain import explain, shipped
 
-pytestmark = [pytest.mark.slow, pytest.mark.long, pytest.mark.timeout(1800)]
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 
 
 @pytest.fixture(scope="module")
@@ -19,8 +19,8 @@ def log(measured_data) -> Log:
 
 
 @pytest.fixture(scope="module")
-def answer(log, tmp_path_factory):
-    return explain(log, "av21", out=tmp_path_factory.mktemp("av21")).json
+def answer(log, shared):
+    return shared("av21", lambda folder: explain(log, "av21", out=folder).json)
 
 
 def _cause(answer: dict, effect: str, wheel: str) -> dict:

@@ -14,7 +14,7 @@ from hil.diagnosis.data.log import WHEEL_SPEED, Log
 from hil.diagnosis.data.read import read_logs
 from hil.diagnosis.explain import explain, shipped
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 
 
 @pytest.fixture(scope="module")
@@ -25,8 +25,8 @@ def log(measured_data) -> Log:
 
 
 @pytest.fixture(scope="module")
-def answer(log, tmp_path_factory):
-    return explain(log, "toyota_rav4", out=tmp_path_factory.mktemp("rav4")).json
+def answer(log, shared):
+    return shared("rav4", lambda folder: explain(log, "toyota_rav4", out=folder).json)
 
 
 def _again(log: Log, extension: Path) -> dict:

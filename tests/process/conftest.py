@@ -77,4 +77,4 @@ def start(tmp_path):
     for process in started:
         if process.poll() is None:
             process.send_signal(signal.SIGKILL)
-        process.communicate(timeout=30)
+        process.communicate(timeout=RUN_LIMIT_S)

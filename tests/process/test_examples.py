@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from processes import result_of
+from processes import RUN_LIMIT_S, result_of
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
@@ -15,7 +15,7 @@ PYTHON = [sys.executable]
 
 def stopped_within(start, *arguments):
     process = start(*arguments, program=PYTHON)
-    out, err = process.communicate(timeout=150)
+    out, err = process.communicate(timeout=RUN_LIMIT_S)
     assert process.returncode == 0, err
     return float(re.fullmatch(r"stopped within ([\d.]+) m\n", out)[1])
 

@@ -199,6 +199,7 @@ def test_in_real_time(run_pytest):
     output(run_pytest(REAL, "--brakebench-realtime"), 0)
 
 
+@pytest.mark.slow
 def test_against_an_ecu_that_somebody_else_started(run_pytest, start, channel):
     ecu = start("ecu", "--bus", channel)
     output(run_pytest(REAL, "--brakebench-no-ecu", "--brakebench-bus", channel), 0)

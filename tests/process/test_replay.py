@@ -6,7 +6,7 @@ from itertools import takewhile
 
 import numpy as np
 import pytest
-from processes import wait_until
+from processes import RUN_LIMIT_S, wait_until
 
 from dbc.contract import spec_of
 from dbc.frame import BusName, Frame
@@ -86,7 +86,7 @@ def test_the_ecu_alone_brakes_as_recorded(brakebench, start, channel, log, recor
 def test_a_live_plant_is_not_talked_over(brakebench, start, channel, log):
     with open_bus(channel, BusName.VEHICLE) as bus:
         start("plant", "--bus", channel)
-        wait_until(lambda: bus.receive(0.1), "frames of the plant", 150)
+        wait_until(lambda: bus.receive(0.1), "frames of the plant")
         done = brakebench("replay", str(log), "--role", "plant", "--bus", channel, check=2)
         assert "somebody already sends 0x" in done.stderr
         assert "stop that one, or replay another role" in done.stderr
@@ -99,7 +99,7 @@ def test_who_comes_in_during_the_replay_is_left_alone(start, channel, log):
         process = start("replay", str(log), "--role", "plant", "--bus", channel, "--json")
         wait_until(lambda: bus.receive(0.1), "replayed frames")
         bus.send([Frame(BusName.VEHICLE, pedal.can_id, bytes(pedal.length))])
-        out, err = process.communicate(timeout=30)
+        out, err = process.communicate(timeout=RUN_LIMIT_S)
     result = json.loads(out)
     assert process.returncode == 3, err
     assert result["live"] == ["0xA0 (BRAKE_PEDAL of DRIVER) on the vehicle bus"]
@@ -109,10 +109,10 @@ def test_who_comes_in_during_the_replay_is_left_alone(start, channel, log):
 
 def test_ctrl_c_ends_it_with_a_result(start, channel, log):
     with open_bus(channel, BusName.VEHICLE) as bus:
-        process = start("replay", str(log), "--bus", channel, "--json")
+        process = start("replay", str(log), "--speed", "0.1", "--bus", channel, "--json")
         wait_until(lambda: bus.receive(0.1), "replayed frames")
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=30)
+        out, err = process.communicate(timeout=RUN_LIMIT_S)
     result = json.loads(out)
     assert process.returncode == 130, err
     assert result["stopped"]

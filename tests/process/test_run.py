@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from processes import alive, children_of, result_of, wait_until
+from processes import RUN_LIMIT_S, alive, children_of, result_of, wait_until
 
 from dbc.messages import BrakeMode, EhbState
 from hil.bench.result import Signals
@@ -19,6 +19,8 @@ FACTS = {
     "stop_distance_m", "stop_time_s", "mean_decel_mps2", "demanded_decel_mps2", "energy_recuperated_j",
     "frames_sent", "frames_lost", "frames_corrupt", "overruns", "lateness_ms", "bus_load", "bus", "processes", "log",
 }  # fmt: skip
+
+LASTING = "downhill"  # brakes for two minutes: whatever a busy machine delays, the run still goes on
 
 
 def leftovers(channel):
@@ -35,7 +37,7 @@ def driving(process, channel):
         found = children_of(process.pid)
         return found if {"record", "plant", "ecu"} <= set(found) else None
 
-    return wait_until(nodes, "recorder, plant and ECU", 60)
+    return wait_until(nodes, "recorder, plant and ECU")
 
 
 def log_of(folder):
@@ -99,10 +101,10 @@ def test_two_benches_side_by_side(start, short):
     assert all((r["frames_lost"], r["frames_corrupt"], r["processes"]) == (0, 0, 2) for r in results)
 
 
-@pytest.mark.parametrize("after_s", [0.1, *(pytest.param(t, marks=pytest.mark.slow) for t in (1.0, 3.0))])
+@pytest.mark.parametrize("after_s", [0.1, *(pytest.param(t, marks=pytest.mark.slow) for t in (2.0, 4.0))])
 @pytest.mark.parametrize("victim", ["plant", "ecu"])
 def test_a_killed_node_is_survived_and_named(start, channel, tmp_path, victim, after_s):
-    bench = start("run", "--json", "--bus", channel, "--out", "out")
+    bench = start("run", LASTING, "--json", "--bus", channel, "--out", "out")
     nodes = driving(bench, channel)
     await_truth(bench, tmp_path, int(after_s * 100))
     os.kill(nodes[victim], signal.SIGKILL)
@@ -128,7 +130,7 @@ def test_a_killed_node_is_survived_and_named(start, channel, tmp_path, victim, a
 
 
 def test_a_killed_recorder_leaves_a_readable_log(start, channel, tmp_path):
-    bench = start("run", "--json", "--bus", channel, "--out", "out")
+    bench = start("run", LASTING, "--json", "--bus", channel, "--out", "out")
     nodes = driving(bench, channel)
     await_truth(bench, tmp_path, 200)
     size = log_of(tmp_path).stat().st_size
@@ -142,7 +144,7 @@ def test_a_killed_recorder_leaves_a_readable_log(start, channel, tmp_path):
 
 
 def test_interrupting_ends_everything_cleanly(start, channel, tmp_path):
-    bench = start("run", "--json", "--bus", channel, "--out", "out")
+    bench = start("run", LASTING, "--json", "--bus", channel, "--out", "out")
     nodes = driving(bench, channel)
     await_truth(bench, tmp_path, 100)
     bench.send_signal(signal.SIGINT)
@@ -153,21 +155,21 @@ def test_interrupting_ends_everything_cleanly(start, channel, tmp_path):
 
 
 def test_a_killed_bench_leaves_no_orphan(start, channel, tmp_path):
-    bench = start("run", "--json", "--bus", channel, "--out", "out")
+    bench = start("run", LASTING, "--json", "--bus", channel, "--out", "out")
     nodes = driving(bench, channel)
     await_truth(bench, tmp_path, 50)
     bench.kill()
-    wait_until(lambda: not any(alive(pid) for pid in nodes.values()), "orphans to end", 10)
+    wait_until(lambda: not any(alive(pid) for pid in nodes.values()), "orphans to end")
     assert Signals(log_of(tmp_path)).decoded.rejected == 0
 
 
-def test_a_second_bench_on_the_channel_is_refused(start, brakebench, channel, tmp_path, short):
-    first = start("run", short, "--json", "--realtime", "--bus", channel, "--out", "out")
+def test_a_second_bench_on_the_channel_is_refused(start, brakebench, channel, tmp_path):
+    first = start("run", LASTING, "--json", "--realtime", "--bus", channel, "--out", "out")
     await_truth(first, tmp_path, 10)
     refused = brakebench("run", "--bus", channel, check=2)
     assert re.search(rf"{channel}.*in use by another bench, process {first.pid}", refused.stderr)
     first.send_signal(signal.SIGINT)
-    _, words = first.communicate(timeout=60)
+    _, words = first.communicate(timeout=RUN_LIMIT_S)
     assert first.returncode == 130, words
     assert re.search(r"^real time: .*no garbage collection.*: granted", words, re.MULTILINE)
 
@@ -183,10 +185,10 @@ def test_nodes_started_separately_find_each_other(start, channel, tmp_path, shor
         speed = Signals(log).get("TRUTH_MOTION.SPEED")[1]
         return len(speed) and speed[-1] < 0.05
 
-    wait_until(stopped, "the car to stop", 90)
+    wait_until(stopped, "the car to stop")
     for process in (ecu, plant, recorder):
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=20)
+        out, err = process.communicate(timeout=RUN_LIMIT_S)
         assert process.returncode == 0, (out, err)
     signals = Signals(log)
     assert signals.get("BRAKE_STATUS.MODE")[1].max() >= 1
@@ -195,14 +197,15 @@ def test_nodes_started_separately_find_each_other(start, channel, tmp_path, shor
 
 @pytest.mark.slow
 def test_python_can_logger_sees_every_frame(start, channel, tmp_path, short):
-    bench = start("run", short, "--json", "--bus", channel)
     name = channel.removeprefix("loopback:")
     logger_log = tmp_path / "logger.asc"
     program = [sys.executable, "-m", "can.logger"]
     logger = start("-i", "brakebench", "-c", name, "-f", str(logger_log), program=program)
+    wait_until(lambda: leftovers(channel), "the logger to join")
+    bench = start("run", short, "--json", "--bus", channel)
     result = result_of(bench)
     logger.send_signal(signal.SIGINT)
-    logger.communicate(timeout=20)
+    logger.communicate(timeout=RUN_LIMIT_S)
     seen = [line.split() for line in logger_log.read_text().splitlines()]
     seen = [(int(w[2].rstrip("x"), 16), "".join(w[6:14])) for w in seen if len(w) >= 14 and w[3] == "Rx"]
     sent = []
@@ -243,6 +246,7 @@ def test_a_failed_expectation_is_exit_code_1(brakebench, tmp_path, short):
     assert "stop_distance_m: expected -inf to 1" in result["reason"]
 
 
+@pytest.mark.slow
 def test_frames_of_either_node_are_lost_where_the_scenario_says_so(brakebench, channel, tmp_path, short):
     lost = [("WHEEL_SPEED_FRONT", 0.5, 0.55), ("EHB_DEMAND_REAR", 0.7, 0.75)]
     text = "".join(

@@ -5,7 +5,7 @@ import signal
 import time
 from pathlib import Path
 
-RUN_LIMIT_S = 150  # a first start compiles the plant
+RUN_LIMIT_S = 240.0  # a first start compiles the plant; on a busy machine everything takes several times as long
 
 
 def heed_interrupts():
@@ -13,7 +13,7 @@ def heed_interrupts():
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def wait_until(condition, what, limit_s=60.0):
+def wait_until(condition, what, limit_s=RUN_LIMIT_S):
     """Poll until ``condition()`` is true; its value is returned."""
     end = time.monotonic() + limit_s
     while time.monotonic() < end:

@@ -20,6 +20,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
+import passed
 from candump import Candump
 from slcan_device import SlcanDevice
 from started import COMMAND, Started
@@ -32,6 +33,7 @@ LAB = os.environ.get("VCAN_LAB")  # set by .ci/vcan-lab: "kernel" or "uml"
 
 
 FIGURES = pytest.StashKey[list[str]]()
+BEGAN = pytest.StashKey[str]()
 
 
 def pytest_report_header() -> str | None:
@@ -41,6 +43,24 @@ def pytest_report_header() -> str | None:
     modules = [line.split()[0] for line in Path("/proc/modules").read_text().splitlines()]
     found = ", ".join(sorted(name for name in modules if name.startswith(("can", "vcan", "slcan"))))
     return f"SocketCAN: Linux {platform.release()} ({LAB}), modules {found or 'built in'}"
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Note the state of the sources that are tested."""
+    if LAB is not None and session.config.getoption("--write-passed"):
+        session.config.stash[BEGAN] = passed.state("lab")
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Note that the lab's tests pass, where that is asked for and all of them ran."""
+    if BEGAN not in session.config.stash:
+        return
+    stats = session.config.pluginmanager.get_plugin("terminalreporter").stats  # type: ignore[union-attr]
+    whole = not any(stats.get(kind) for kind in ("skipped", "deselected", "xfailed"))
+    ran = {report.nodeid.partition("::")[0] for report in stats.get("passed", [])}
+    if session.exitstatus == pytest.ExitCode.OK and whole and ran >= passed.lab_tests():
+        facts = {"kernel": f'"{platform.release()} ({LAB})"', "tests": session.testscollected}
+        session.config.stash.setdefault(FIGURES, []).append(passed.write("lab", session.config.stash[BEGAN], facts))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:

@@ -22,6 +22,7 @@ def test_seeds_differ_and_repeat(clean):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_joint_region_holds_the_truth(brake):
     """Ten seeds for each of two heating forms and two noises; the bound is passed 999 times in 1000."""
     rows = list(coverage(brake, range(100, 110)))

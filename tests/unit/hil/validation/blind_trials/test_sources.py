@@ -1,22 +1,72 @@
-"""A digest of sources changes with them and with nothing else."""
+"""A digest of sources changes with what they mean and with nothing else."""
 
-from hil.validation.blind_trials.sources import HIDDEN, SOURCES, STUDIED, state
-from plant.compiled import digest
+from pathlib import Path
 
+import pytest
 
-def test_a_changed_source_changes_the_digest(tmp_path, monkeypatch) -> None:
-    package = tmp_path / "shown"
-    package.mkdir()
-    (package / "__init__.py").write_text("")
-    (package / "law.py").write_text("A = 1\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    before = digest(("shown",))
-    (package / "notes.txt").write_text("no source")
-    assert digest(("shown",)) == before
-    (package / "law.py").write_text("A = 2\n")
-    assert digest(("shown",)) != before
+from hil.validation.blind_trials.sources import digest, state
+
+BEFORE = '''"""A document."""
+
+FACTOR = 2.0
+"""What it is."""
 
 
-def test_the_state_is_that_of_study_and_hidden_car() -> None:
-    assert state() == digest(STUDIED + HIDDEN, SOURCES)[:12]
-    assert digest(STUDIED) != digest(HIDDEN)
+def law(speed_mps: float) -> float:
+    """Another."""
+    return FACTOR * speed_mps  # in newtons
+'''
+AFTER = """FACTOR = 2.0
+def law(speed_mps: float) -> float:
+    return (FACTOR
+            * speed_mps)
+"""
+
+
+def _folder(tmp_path: Path) -> Path:
+    folder = tmp_path / "shown"
+    (folder / "inner").mkdir(parents=True)
+    (folder / "law.py").write_text(BEFORE)
+    (folder / "inner" / "car.toml").write_text("mass_kg = 1500.0\n")
+    return folder
+
+
+def test_words_and_layout_change_nothing(tmp_path):
+    folder = _folder(tmp_path)
+    before = digest([folder])
+    (folder / "law.py").write_text(AFTER)
+    (folder / "notes.md").write_text("no source")
+    assert digest([folder]) == before
+
+
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [
+        ("law.py", BEFORE.replace("2.0", "3.0")),
+        ("law.py", BEFORE.replace('"""What it is."""', "law = FACTOR")),
+        ("inner/car.toml", "mass_kg = 1600.0\n"),
+        ("inner/added.py", ""),
+    ],
+)
+def test_a_changed_source_changes_the_digest(tmp_path, file, text):
+    folder = _folder(tmp_path)
+    before = digest([folder])
+    (folder / file).write_text(text)
+    assert digest([folder]) != before
+
+
+def test_a_source_that_moves_changes_the_digest(tmp_path):
+    folder = _folder(tmp_path)
+    before = digest([folder])
+    (folder / "law.py").rename(folder / "inner" / "law.py")
+    assert digest([folder]) != before
+
+
+def test_what_is_not_there_is_refused(tmp_path):
+    with pytest.raises(FileNotFoundError, match="no such file or folder"):
+        digest([tmp_path / "absent"])
+
+
+def test_the_state_has_twelve_digits_and_stays():
+    assert len(state()) == 12
+    assert state() == state()
