@@ -49,7 +49,6 @@ def test_a_car_that_only_rolls_says_too_little() -> None:
 @pytest.mark.slow
 @pytest.mark.long
 def test_of_ten_draws_at_most_one_is_named(shared) -> None:
-    """None was with decision 0082; two were allowed before (decision 0073)."""
     drawn = [_verdict_of_nothing(shared, first_seed) for first_seed in (7, *range(107, 908, 100))]
     assert sum(verdict != "none" for verdict in drawn) <= 1
 

@@ -19,12 +19,14 @@ ROOT = Path(__file__).parents[2]
 FILES = {"drawn": "tests/hidden/drawn.passed", "lab": "tests/vcan/lab.passed"}
 SOURCES = {
     "drawn": (
-        "dbc", "plant", "hil/diagnosis", "hil/validation/reference_car", "hil/validation/blind_trials/run.py", "hil/validation/blind_trials/separable.py",
+        "dbc", "plant", "hil/diagnosis", "hil/validation/reference_car", "hil/validation/blind_trials/run.py",
+        "hil/validation/blind_trials/separable.py",
         "hil/validation/blind_trials/separability.toml", "tests/hidden/test_drawn.py", "tests/support/drawn.py",
     ),
     "lab": (
-        "dbc", "hil/bus", "hil/rt", "hil/rt/process.py", "hil/bench/node_process.py", "hil/bench/real.py", "hil/bench/bench_run.py",
-        "hil/bench/port.py", "hil/bench/recorder.py", "tests/vcan", "tests/contract/test_bus.py", "tests/contract/test_clock.py",
+        "dbc", "hil/bus", "hil/rt", "hil/bench/node_process.py", "hil/bench/real.py", "hil/bench/bench_run.py",
+        "hil/bench/port.py", "hil/bench/recorder.py", "tests/vcan", "tests/contract/test_bus.py",
+        "tests/contract/test_clock.py",
         "tests/support/candump.py", "tests/support/processes.py", "tests/support/slcan_device.py",
         "tests/support/started.py", ".ci/vcan-lab", ".ci/vcan-lab-init",
     ),

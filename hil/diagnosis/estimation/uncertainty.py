@@ -11,9 +11,9 @@ from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.noise.model import Noise
 
 FORM_SD_SHARE = 0.05
-"""Standard deviation of a value by the form of its equation, as a share of the value. Of 44 values estimated from data of
-other equations 77 % lay within the interval by noise alone, 89 % within that of noise and model discrepancy, 93 % with
-this share (docs/decisions/isolability-and-intervals.md)."""
+"""Standard deviation of a value by the form of its equation, as a share of the value. Of 44 values estimated from data
+of other equations 77 % lay within the interval by noise alone, 89 % within that of noise and model discrepancy, 93 %
+with this share (docs/decisions/isolability-and-intervals.md)."""
 _DRAWS, _MIN_SEGMENTS, _MAX_WIDENING = 60, 6, 1.6
 _TWO_SIDED_95 = 1.96
 

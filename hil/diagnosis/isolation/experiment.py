@@ -114,7 +114,7 @@ def separation(scenario: str, effects: Sequence[str]) -> float:
 
 
 def write(recommendations: Sequence[Recommendation], folder: Path) -> list[Path]:
-    """Write the scenarios into ``folder/discriminating_manoeuvres``, for ``brakebench run FILE``; returns their paths."""
+    """Write the scenarios into ``folder/discriminating_manoeuvres`` for ``brakebench run FILE``; their paths."""
     into = Path(folder) / FOLDER
     if recommendations:
         into.mkdir(parents=True, exist_ok=True)

@@ -47,10 +47,12 @@ def build_report(answer: Answer, sources: Sequence[str]) -> Report:
         reason=_headline(content),
         numbers=tuple(_numbers(answer)),
         sections=(
-            _comparison(answer), _missed(answer), *_curves(answer), _candidates(answer), _held_out(answer), _limits(answer),
+            _comparison(answer), _patterns(answer), *_curves(answer), _candidates(answer), _held_out(answer),
+            _limits(answer),
         ),
         provenance={
-            "logs": list(sources), "segments": len(diagnosis.dataset.segments), "replays": diagnosis.fitter.simulator.runs,
+            "logs": list(sources), "segments": len(diagnosis.dataset.segments),
+            "simulations": diagnosis.fitter.simulator.runs,
             "extension": content["extension"] or "not written", "remarks": content["remarks"],
         },
     )  # fmt: skip
@@ -123,7 +125,7 @@ def _comparison(answer: Answer) -> Section:
         panels += comparison_panels(title, unit, t, np.where(shown, known, np.nan), simulated)
     return Section(
         "Measured against simulated", panels=tuple(panels),
-        text="All logs, one after the other, simulated open loop from measured inputs; every segment restarts the speed.",
+        text="All logs, one after the other, simulated open loop from measured inputs; each segment restarts the speed.",
     )  # fmt: skip
 
 
@@ -133,7 +135,7 @@ def _models(answer: Answer) -> list[tuple[str, Model]]:
     return [("nominal", diagnosis.nominal), ("extended" if diagnosis.final.terms else "nuisances fitted", extended)]
 
 
-def _missed(answer: Answer) -> Section:
+def _patterns(answer: Answer) -> Section:
     rows = tuple(
         (
             w.channel,

@@ -21,7 +21,7 @@ def rows_per_step(drive: Recording) -> NDArray[np.int64]:
     """How many steps each row of a drive makes as one.
 
     A motor follows a step of its demand within some 0.1 s, the pressure in 0.2 s; the tyres' limit is stiff, and so is
-    a car that comes to rest (docs/decisions/0089), which a simulated one may do later than the measured one: the plant
+    a car that comes to rest (docs/decisions/simulation-speed.md), which a simulated one may do later than the measured one: the plant
     makes its steps shorter until it stands. The rest follows any step.
     """
 
