@@ -129,8 +129,8 @@ def _lines(family: str, entry: dict[str, Any]) -> list[str]:
             lines.append(f"  {name:<28}     -  no case tells")
             continue
         mark = "" if m["met"] is None else ("  met" if m["met"] else "  MISSED")
-        asked = "" if m["pass_mark"] is None else f"  asked {m['pass_mark']}"
-        lines.append(f"  {name:<28} {m['value']:.3f}  [{m['low']:.3f}, {m['high']:.3f}]{asked}{mark}")
+        passes = "" if m["pass_mark"] is None else f"  mark {m['pass_mark']}"
+        lines.append(f"  {name:<28} {m['value']:.3f}  [{m['low']:.3f}, {m['high']:.3f}]{passes}{mark}")
     limits = entry.get("detection_limits", {})
     by_limit = {limit: [name for name, own in limits.items() if own == limit] for limit in set(limits.values())}
     for limit in sorted(by_limit, key=lambda value: float("inf") if value is None else value):

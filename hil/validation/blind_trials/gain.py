@@ -10,7 +10,7 @@ _LEAST_GAIN = 0.02
 
 
 def gain(records: Sequence[Record]) -> Metrics:
-    """Against the oracle, against the car as handed in, and against the best wrong cause.
+    """Against the oracle, against the nominal vehicle, and against the best wrong cause.
 
     ``never_1_percent_worse`` holds every channel by itself to it, ``all_channels_no_worse`` their mean.
     """
@@ -53,7 +53,7 @@ def _together_no_worse(record: Record) -> bool:
 
 
 def _beats_wrong(record: Record) -> bool:
-    """Over all channels together, each against its own error as handed in."""
+    """Over all channels together, each against its own nominal error."""
     gains = [g for g in record["held_out_error"].values() if g["best_wrong"] is not None and g["before"] > 0.0]
     own = sum((g["after"] / g["before"]) ** 2 for g in gains)
     other = sum((g["best_wrong"] / g["before"]) ** 2 for g in gains)

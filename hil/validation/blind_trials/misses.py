@@ -1,4 +1,4 @@
-"""The cases of a family that were answered wrong, one line each: what was hidden, and what was told."""
+"""The cases of a family that were answered wrong, one line each: what was hidden, and what was named."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -30,17 +30,17 @@ def misses(family: str, records: Sequence[Record]) -> list[str]:
     right = _RIGHT.get(family)
     if right is None:
         return []
-    asked = (r for r in records if r["reached"] and (r["size"] is None or r["size"] >= _SURE))
-    return [_line(record) for record in asked if not right(record)]
+    scored = (r for r in records if r["reached"] and (r["size"] is None or r["size"] >= _SURE))
+    return [_line(record) for record in scored if not right(record)]
 
 
 def _line(record: Record) -> str:
     size = "" if record["size"] is None else f" at {record['size']:g}"
-    line = f"{record['index']}{size}: {_causes(record['hidden'])}; told {_told(record)}"
-    return f"{line}; then {_told(record['follow_up'])}" if "follow_up" in record else line
+    line = f"{record['index']}{size}: {_causes(record['hidden'])}; named {_named(record)}"
+    return f"{line}; then {_named(record['follow_up'])}" if "follow_up" in record else line
 
 
-def _told(record: Record) -> str:
+def _named(record: Record) -> str:
     if not record["causes"]:
         return str(record["verdict"]).replace("_", " ")
     rivals = f", or {', '.join(record['rivals'])}" if record["rivals"] else ""

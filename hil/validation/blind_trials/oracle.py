@@ -21,7 +21,7 @@ Errors = dict[str, float]
 """Root mean square by channel, in the units of the answer's ``gain``."""
 
 
-def told(found: Diagnosis, hidden: Mapping[str, Any]) -> Errors | None:
+def true_model_error(found: Diagnosis, hidden: Mapping[str, Any]) -> Errors | None:
     """Error of the plant given the true effect at its true size, the vehicle's numbers fitted.
 
     Parameters

@@ -41,7 +41,7 @@ def claims(record: Record) -> bool:
     return record["verdict"] in ("named", "unlisted")
 
 
-def right_joint(record: Record) -> bool:
+def right_injection_point(record: Record) -> bool:
     """Whether the first cause acts where the hidden law does."""
     return bool(record["causes"]) and record["causes"][0]["injection_point"] == record["hidden"][0]["injection_point"]
 
@@ -53,8 +53,8 @@ def names_listed_elsewhere(record: Record) -> bool:
 
 
 def right_law(record: Record) -> bool:
-    """Whether a law in no list is told as one, or by what acts where it does."""
-    return record["verdict"] == "unlisted" or right_joint(record)
+    """Whether an unlisted cause is answered as one, or by an effect at its injection point."""
+    return record["verdict"] == "unlisted" or right_injection_point(record)
 
 
 def decided(record: Record) -> bool:

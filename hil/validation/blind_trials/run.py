@@ -76,7 +76,7 @@ def _read(path: Path) -> list[Record]:
 
 
 def run_case(case: Case, seed: int, size: float | None, settings: Settings | None = None) -> Record:
-    """Hide, explain, open; ``seed`` is the trials', ``size`` the signal-to-noise ratio asked for.
+    """Hide, explain, open; ``seed`` is the trials', ``size`` the signal-to-noise ratio of the family.
 
     Where ``oracle`` is given, it is the held-out error of a model that knows what is hidden (`oracle.oracle`).
     A confounded case has ``follow_up``: what is said of the manoeuvres that decide, by themselves.
@@ -91,7 +91,7 @@ def run_case(case: Case, seed: int, size: float | None, settings: Settings | Non
         "hidden": truth["causes"], **said,
     }  # fmt: skip
     if case.family == "single" and size in SURE and answered is not None:
-        record["oracle"] = oracle.told(answered.diagnosis, truth["causes"][0])
+        record["oracle"] = oracle.true_model_error(answered.diagnosis, truth["causes"][0])
     if case.family == "unlisted":
         record["oracle"] = oracle.untouched(case)
     if case.family == "confounded":

@@ -21,7 +21,7 @@ from hil.validation.blind_trials.reading import (
     is_found,
     is_top,
     names_listed_elsewhere,
-    right_joint,
+    right_injection_point,
     right_law,
 )
 from hil.validation.blind_trials.separable import separable
@@ -34,7 +34,7 @@ def table_of(family: str, records: Records) -> dict[str, Any]:
     """``n``, ``sources``, ``metrics`` {name: {value, low, high, pass_mark, met}} and ``missed`` of a family.
 
     ``sources`` are the states of the program that the cases were run with, {digest: number of cases}.
-    ``value`` is None where no case tells; ``met`` None where nothing is asked. ``single`` has ``detection_limits``
+    ``value`` is None where no case counts; ``met`` None without a pass mark. ``single`` has ``detection_limits``
     {effect: signal-to-noise ratio, None where never found} beside.
     """
     states = Counter(record["sources"] for record in records)
@@ -48,7 +48,7 @@ def table_of(family: str, records: Records) -> dict[str, Any]:
 
 
 def _reached(records: Records) -> Records:
-    """Those whose signal-to-noise ratio came out as asked for: no physical bound came first."""
+    """Those that reach the signal-to-noise ratio of their family: no physical bound came first."""
     return [record for record in records if record["reached"]]
 
 
@@ -60,7 +60,7 @@ def _null(records: Records) -> Metrics:
 
 
 def _single(records: Records) -> Metrics:
-    """The first name is asked for where causes can be told apart (`hil.validation.blind_trials.separable`)."""
+    """The first name counts where causes are separable (`hil.validation.blind_trials.separable`)."""
     found: Metrics = {}
     for size in sorted({record["size"] for record in records}):
         of = _reached([record for record in records if record["size"] == size])
@@ -74,14 +74,14 @@ def _single(records: Records) -> Metrics:
 
 
 def _onset(records: Records) -> Metrics:
-    """Nothing is asked of these beyond what is asked of single causes."""
+    """These have the pass marks of single causes, and no others."""
     of = _reached(records)
     right = [record for record in of if is_top(record)]
-    told = [r for r in right if r["causes"][0].get("onset_s") is not None]
+    given = [r for r in right if r["causes"][0].get("onset_s") is not None]
     return {
         "detected": share(of, answers), "top1": share(of, is_top), "in_set": share(of, in_set),
-        "onset_told": share(right, lambda r: r["causes"][0].get("onset_s") is not None),
-        "onset_error_s": median([abs(r["causes"][0]["onset_s"] - r["hidden"][0]["onset_s"]) for r in told]),
+        "onset_given": share(right, lambda r: r["causes"][0].get("onset_s") is not None),
+        "onset_error_s": median([abs(r["causes"][0]["onset_s"] - r["hidden"][0]["onset_s"]) for r in given]),
     }  # fmt: skip
 
 
@@ -104,8 +104,8 @@ def _three(records: Records) -> Metrics:
 def _unlisted(records: Records) -> Metrics:
     of = _reached(records)
     return {
-        "unlisted_or_right_joint": share(of, right_law, 0.85),
-        "right_joint": share(of, right_joint),
+        "unlisted_or_right_point": share(of, right_law, 0.85),
+        "right_injection_point": share(of, right_injection_point),
         "wrong_listed_name": share(of, names_listed_elsewhere, 0.05, at_most=True),
         "gain_of_oracle": gain_of_oracle(of, 0.8),
     }

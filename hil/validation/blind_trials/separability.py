@@ -23,7 +23,7 @@ from plant.effects.effect import Scope
 from plant.injection.theta import THETA
 
 _SIZES = (8.0, 15.0)
-"""Signal-to-noise ratios at which the first name is asked for."""
+"""Signal-to-noise ratios at which the first name counts."""
 _NOTHING = 1e-6
 _ROUNDS, _NEAR = 6, 0.7
 _ALIKE = {"pad_mu_gain": "caliper_asymmetry"}
@@ -135,8 +135,8 @@ def as_toml(found: Mapping[tuple[str, str, str], Mapping[float, Nearest]], seed:
     lines = [f"# made by: brakebench trials --apart FILE --seed {seed}"]
     table: dict[tuple[str, str], list[str]] = {}
     for (effect, place, level), by_size in found.items():
-        told = ", ".join(f'at_{size:g} = [{d:.1f}, "{rival}"]' for size, (d, rival) in by_size.items())
-        table.setdefault((effect, place), []).append(f"{level} = {{ {told} }}")
+        entries = ", ".join(f'at_{size:g} = [{d:.1f}, "{rival}"]' for size, (d, rival) in by_size.items())
+        table.setdefault((effect, place), []).append(f"{level} = {{ {entries} }}")
     for (effect, place), rows in table.items():
         lines += [f"[{effect}.{place}]", *rows]
     return "\n".join(lines) + "\n"

@@ -37,7 +37,7 @@ def digest(roots: Iterable[Path]) -> str:
 
 @cache
 def state() -> str:
-    """Twelve hexadecimal digits that differ when cases or answers may; as first asked for, whatever is edited since."""
+    """Twelve hexadecimal digits that differ when cases or answers may; of the first call, whatever is edited since."""
     return digest(Path(str(resources.files(package))) for package in ANSWERS)[:12]
 
 

@@ -141,9 +141,7 @@ def _section(effect: dict[str, Any]) -> list[str]:
     if effect["confounded_with"]:
         lines.append(f"- looks like: {', '.join(f'`{n}`' for n in effect['confounded_with'])}")
     if effect["twins"]:
-        lines.append(
-            f"- cannot be told from: {', '.join(f'`{n}`' for n in effect['twins'])} (by some of its parameters)"
-        )
+        lines.append(f"- not isolable from: {', '.join(f'`{n}`' for n in effect['twins'])} (by some of its parameters)")
     return lines
 
 

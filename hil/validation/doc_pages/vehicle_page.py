@@ -40,19 +40,19 @@ brake_gain_front_nm_pa = 2.9e-4
 brake_gain_rear_nm_pa = 1.7e-4
 ```
 
-- A number without tolerance is taken to be known to a hundredth, one that is not given to what the tables say.
+- A number without tolerance is taken to be known to a hundredth; one that is not given, to what the tables say.
 - What stands once for each axle takes one number for both, or a list `[front, rear]`; its tolerance is one number.
   Of a number that the car has once, a list gives the mean, and half its spread as tolerance; the remarks say so.
 - The mass is the whole car's, wheels included; the inertia is that of one wheel with all that turns with it; the
   rolling radius is effective, way per angle. A wheel's torque is its brake gain times the pressure above the threshold.
-- Of {sections} a set may say nothing at all: then torques are not compared with their demands, and
-  pressures only where none has been asked for, and left and right where the same is. Where nothing is said of the
-  tyres, each axle may corner otherwise (`vehicle_slip_angle_share`), and forms of tyre and suspension curves go
-  farther. Limits that a set does not state (rates of the pressure; torque, power with top speed, rate, fading and
+- A set may leave out {sections} altogether. Then torques are not compared with their demands, and pressures only
+  where no pressure is demanded, and between left and right where both demands are equal. Without tyre keys each axle
+  has its own cornering stiffness (`vehicle_slip_angle_share`), and the forms of tyre and suspension curves have wider
+  bounds. Limits that a set does not state (rates of the pressure; torque, power with top speed, rate, fading and
   derating of the motors; power of the battery) are not simulated: another car's would be wrong. Motors whose torque is
-  not stated are as strong as they are asked in the logs. Where any of these limits is missing, wheels differ, too (one
-  standard deviation): zeros of the pressures by 7 kPa, their gains by 0.5 %, pads by 1 %, motors by 0.5 % of what is
-  asked of them and of what they tell, radii by 0.12 %; clocks of the nodes by 50 ppm, and the steering wheel may stand
+  not stated are as strong as the largest demand in the logs. Where any of these limits is missing, wheels differ, too
+  (one standard deviation): zeros of the pressures by 7 kPa, their gains by 0.5 %, pads by 1 %, motors by 0.5 % of the
+  demanded and of the measured torque, radii by 0.12 %; clocks of the nodes by 50 ppm, and the steering wheel may stand
   half a degree off where the car goes straight.
 - The frames of a node are taken to be sent within {latency:g} ms of the wheel speeds', or within
   `node_latency_s_tolerance`. Pads may lag behind the sensors of their pressures, as one pole, by {line:g} ms, or by
@@ -62,12 +62,12 @@ brake_gain_rear_nm_pa = 1.7e-4
 - Springs, dampers, bars and links (`suspension_`, `vehicle_pitch_inertia_kg_m2`) that a set states may be off by their
   tolerance, at least by a twentieth, others by much more. Links support the torque of motors
   (`suspension_drive_support_tangent`) as they do the brakes' where a set says nothing else: so it is of motors in the
-  wheels, not of motors on the body. Where a set does not state every number of `suspension_`, more
-  is asked before the height, the lift, the dive or what else goes with the loads is named.
-- Lift of the axles and drag are those a wind tunnel tells: drag acts along the road, and what it does higher up is in
+  wheels, not of motors on the body. Where a set does not state every number of `suspension_`, the
+  detection threshold of the height, the lift, the dive and whatever else follows the loads is higher.
+- Lift of the axles and drag are those of a wind tunnel: drag acts along the road, and what it does higher up is in
   the lift (SAE J1594).
 - Without a `pad_` key the friction of the pads is one constant, which the brake gains contain.
-- Unknown keys are told in the remarks and left out.
+- Unknown keys are named in the remarks and left out.
 """
 Entries = Mapping[str, Mapping[str, Any]]
 
@@ -134,8 +134,8 @@ def _row(name: str, entry: Mapping[str, Any]) -> str:
     if not all(isinstance(value, int | float) for value in values):
         return f"{entry['unit']} | `{entry['value']}` | "
     tolerance = max(float(entry["tolerance"]), WIDE.get(name, 0.0) * max(abs(float(value)) for value in values))
-    told = ", ".join(f"{value:g}" for value in values)
-    return f"{entry['unit']} | {told} | {f'{tolerance:.3g}' if tolerance else 'exact'}"
+    shown = ", ".join(f"{value:g}" for value in values)
+    return f"{entry['unit']} | {shown} | {f'{tolerance:.3g}' if tolerance else 'exact'}"
 
 
 if __name__ == "__main__":

@@ -114,7 +114,7 @@ def _answers(of: Sequence[Path], logs: Path) -> dict[str, tuple[Guess, float]]:
     begin = process_cpu_time_ns()
     answered = explain(list(of), vehicle)
     assert isinstance(answered, Answer)  # the reference car's logs tell forces
-    answers = {OURS: (told(answered.json), _since_s(begin))}
+    answers = {OURS: (guess_of(answered.json), _since_s(begin))}
     begin = process_cpu_time_ns()
     given = problem(of, vehicle)
     made_s = _since_s(begin)
@@ -128,7 +128,7 @@ def _since_s(begin_ns: int) -> float:
     return (process_cpu_time_ns() - begin_ns) * 1e-9
 
 
-def told(answer: dict[str, Any]) -> Guess:
+def guess_of(answer: dict[str, Any]) -> Guess:
     """Our answer as a guess: its first cause; probabilities of causes and rivals, the rest on `NONE`.
 
     Several causes, or a set of tied ones, may add up to more than 1: they share it in proportion.

@@ -46,7 +46,7 @@ def least_squares(given: Problem) -> Guess:
     """All signatures at once; the largest of Student's t names the effect.
 
     The ridge keeps the condition of the normal equations at 1e10 and is none where that is so already; the covariance
-    is the ridge estimate's, s^2 A^-1 G A^-1 with A = G + ridge (Hoerl and Kennard 1970), s^2 from what is left over.
+    is the ridge estimate's, s^2 A^-1 G A^-1 with A = G + ridge (Hoerl and Kennard 1970), s^2 from the residual.
     The sample is large, so t^2 is taken as chi-squared.
     """
     scaled = given.signatures / np.linalg.norm(given.signatures, axis=0)

@@ -1,4 +1,4 @@
-"""What the rivals of `explain` are given: the residual of the car as handed in and one signature an effect."""
+"""What the rivals of `explain` are given: the residual of the nominal car and one signature an effect."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

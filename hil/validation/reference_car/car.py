@@ -1,4 +1,4 @@
-"""The reference car's numbers: what an engineer would be told, and how far off the true ones may be."""
+"""The reference car's numbers: what its maker would state, and how far off the true values may be."""
 
 from typing import NamedTuple
 

@@ -65,7 +65,7 @@ def drive(manoeuvre: Manoeuvre, car: Car, strength: Vector, onset_s: Vector, law
     """Drive to the end of the demands, or until the car has stood for a while.
 
     Pressure control and motors act on what the frames tell them: a manoeuvre's demands in whole quanta. What holds a
-    speed is told as it is: rounded, it would jump by a quantum with every small change of the car.
+    speed is logged as it is: rounded, it would jump by a quantum with every small change of the car.
 
     Parameters
     ----------

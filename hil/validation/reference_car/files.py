@@ -85,7 +85,7 @@ def write(case: Case, folder: Path) -> Path:
 
 
 def vehicle_toml() -> str:
-    """The nominal car as told: flat numbers, SI, each with the half-width of what the true one may be."""
+    """The nominal car as stated: flat numbers, SI, each with the half-width of what the true one may be."""
     lines = [
         "# The car as its maker describes it. SI; <name>_tolerance is the half-width of what the true value may be."
     ]

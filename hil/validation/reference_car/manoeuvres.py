@@ -146,7 +146,7 @@ def _full() -> list[_Drive]:
 
 
 def _stops() -> list[_Drive]:
-    """Straight friction stops alone: mass, pad friction and drag cannot be told apart."""
+    """Straight friction stops alone: mass, pad friction and drag are not isolable."""
     return [
         _stop("stop_72_a", 20.0, 30.0, 8.0),
         _stop("stop_72_b", 20.0, 30.0, 8.0, 380.0, -1),

@@ -1,4 +1,4 @@
-"""How noisy the hidden world is: gusts, sensors, bus. The level's exact size is drawn and told to nobody."""
+"""Noise of the reference car: gusts, sensors, bus. The exact size of a level is drawn and stays secret."""
 
 from dataclasses import dataclass
 from math import exp, sqrt

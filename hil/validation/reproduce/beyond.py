@@ -37,7 +37,10 @@ def battery_refuses() -> Report:
     at = manoeuvres.FAULT_AT_S
     fault = Fault(PhysicalFault.BATTERY_REFUSES_CHARGE, 0, at)
     a, friction, motors = [], [], []
-    for name, plant in (("told 0.3 s ahead", nominal_plant()), ("without notice", without_notice(nominal_plant()))):
+    for name, plant in (
+        ("announced 0.3 s ahead", nominal_plant()),
+        ("without notice", without_notice(nominal_plant())),
+    ):
         run = drive(manoeuvres.stop(NOMINAL.road()), plant, method(), SEED, 0.7, (fault,))
         k = (run.time_s > at - 0.2) & (run.time_s < at + 0.8)
         t = run.time_s[k] - at
@@ -57,10 +60,10 @@ def battery_refuses() -> Report:
 
 
 def work_moved() -> Report:
-    """Weak pads: work moved to the motors, against the blending factor as asked."""
+    """Weak pads: work moved to the motors, against the blending factor as set."""
     manoeuvre = manoeuvres.series(NOMINAL.road())
     heat, disc, pads = [], [], []
-    for name, ecu in (("work moved to the motors", method()), ("alpha as asked", unshifted())):
+    for name, ecu in (("work moved to the motors", method()), ("alpha as set", unshifted())):
         run = drive(manoeuvre, nominal_plant(WEAK), ecu, SEED, SHIFT_ALPHA)
         heat.append(Trace(name, run.time_s, run.friction_heat_j * 1e-6, group=name))
         disc.append(Trace(name, run.time_s, run.disc_temperature_k[:, 0] - 273.15, group=name))

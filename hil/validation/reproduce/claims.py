@@ -62,7 +62,7 @@ def _shift(what: str, key: str) -> Claim:
 
 
 _ALL, _AXLE = "all motors fail", "motors of the front axle fail"
-_TOLD, _AT_ONCE = "battery refuses, told 0.3 s ahead,", "battery refuses without notice"
+_TOLD, _AT_ONCE = "battery refuses, announced 0.3 s ahead,", "battery refuses without notice"
 _BELOW = "time more than {} m/s2 below demand"
 
 CLAIMS: tuple[Claim, ...] = (

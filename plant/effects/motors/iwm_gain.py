@@ -1,4 +1,4 @@
-"""A motor gives more or less than it is told, or than its current tells.
+"""A motor gives more or less torque than demanded, or than its current indicates.
 
 ``gain`` is of the demand and shows in the current; ``unseen`` is of the constant that makes a torque of a current.
 """
@@ -27,7 +27,7 @@ def static(q: Vector, k: int, y: Vector) -> None:
 EFFECT = Effect(
     name="iwm_gain",
     row=47,
-    title="A motor gives more or less than it is told, or than its current tells",
+    title="A motor gives more or less torque than demanded, or than its current indicates",
     equation="T*' = (1+e) T*, T' = (1+e_u) T",
     injection_points=("motor.demand", "motor.torque"),
     acts_when=Excitation.MOTORS,

@@ -1,4 +1,4 @@
-"""Speed over ground told too fast or too slow."""
+"""Speed over ground measured too fast or too slow."""
 
 from plant.effects.effect import GROUND, Effect, Parameter, Scope
 from plant.effects.sensing.kind import Memory, Numbers
@@ -19,7 +19,7 @@ def undo(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Mem
 EFFECT = Effect(
     name="speed_scale",
     row=76,
-    title="Speed over ground told too fast or too slow",
+    title="Speed over ground measured too fast or too slow",
     equation="v' = v (1+e)",
     injection_points=("sensor.ground",),
     acts_when=Excitation.ALWAYS,

@@ -87,7 +87,7 @@ def test_the_text_says_what_was_asked_and_what_was_missed(tmp_path, capsys):
     keep(tmp_path, "single")
     run("--family", "single", "--count", 2, "--out", tmp_path)
     text = capsys.readouterr().out
-    assert "top1_snr15                   1.000  [0.342, 1.000]  asked 0.97  met" in text
+    assert "top1_snr15                   1.000  [0.342, 1.000]  mark 0.97  met" in text
     assert "named from 8                 road_grade" in text
     assert "missed" not in text
     run("--family", "gain", "--count", 2, "--out", tmp_path)

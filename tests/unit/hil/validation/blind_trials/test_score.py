@@ -140,7 +140,7 @@ def test_the_onset_of_a_rightly_named_cause_is_compared() -> None:
         record["hidden"][0]["onset_s"] = 60.0
     values = _values("onset", records)
     assert values["top1"] == pytest.approx(2 / 3)
-    assert values["onset_told"] == 0.5
+    assert values["onset_given"] == 0.5
     assert values["onset_error_s"] == 3.0
 
 
@@ -153,8 +153,8 @@ def test_a_law_in_no_list_is_called_so_or_put_at_the_right_joint() -> None:
         _record(law, []),
     ]
     values = _values("unlisted", records)
-    assert values["unlisted_or_right_joint"] == 0.5
-    assert values["right_joint"] == 0.25
+    assert values["unlisted_or_right_point"] == 0.5
+    assert values["right_injection_point"] == 0.25
     assert values["wrong_listed_name"] == 0.25
     tied = _record(law, ["mass_offset"], verdict="cannot_tell_apart", causes=[_cause("mass_offset", "body.mass")])
     assert _values("unlisted", [tied])["wrong_listed_name"] == 0.0

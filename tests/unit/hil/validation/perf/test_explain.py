@@ -8,7 +8,7 @@ import pytest
 from hil.cli.main import main
 from hil.errors import BrakebenchError
 from hil.validation.perf import explain
-from hil.validation.perf.explain import Outcome, rows_of, told
+from hil.validation.perf.explain import Outcome, guess_of, rows_of
 from hil.validation.perf.rivals import NONE, RIVALS, Guess
 
 GRADE, NOTHING = Guess("road_grade", {"road_grade": 1.0, NONE: 0.0}), Guess(NONE, {NONE: 1.0})
@@ -19,14 +19,16 @@ def _entry(effect: str, probability: float) -> dict[str, object]:
 
 
 def test_our_answer_leaves_the_rest_to_nothing():
-    guess = told({"causes": [_entry("road_grade", 0.7)], "rivals": [_entry("imu_bias", 0.2)]})
+    guess = guess_of({"causes": [_entry("road_grade", 0.7)], "rivals": [_entry("imu_bias", 0.2)]})
     assert guess.named == "road_grade"
     assert guess.probability == pytest.approx({"road_grade": 0.7, "imu_bias": 0.2, NONE: 0.1})
-    assert told({"causes": [], "rivals": []}) == NOTHING
+    assert guess_of({"causes": [], "rivals": []}) == NOTHING
 
 
 def test_a_tied_set_shares_no_more_than_1():
-    guess = told({"causes": [_entry("road_grade", 1.0)], "rivals": [_entry("imu_bias", 0.5), _entry("imu_bias", 0.3)]})
+    guess = guess_of(
+        {"causes": [_entry("road_grade", 1.0)], "rivals": [_entry("imu_bias", 0.5), _entry("imu_bias", 0.3)]}
+    )
     assert guess.probability == pytest.approx({"road_grade": 2 / 3, "imu_bias": 1 / 3, NONE: 0.0})
 
 
