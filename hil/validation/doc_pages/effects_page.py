@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
+from hil.validation.doc_pages.wrap import markdown
 from plant.effects.effect import Effect
 from plant.injection_points import INJECTION_POINTS
 from plant.open_loop_manoeuvres import MANOEUVRES
@@ -123,7 +124,7 @@ def page(effects: Iterable[Effect]) -> str:
     ]
     lines += ["## Manoeuvres", "", "| name | what |", "|---|---|"]
     lines += [f"| `{name}` | {show.what} |" for name, show in MANOEUVRES.items()]
-    return "\n".join(lines) + "\n"
+    return markdown(lines)
 
 
 def _section(effect: dict[str, Any]) -> list[str]:

@@ -6,6 +6,7 @@ from importlib import resources
 from typing import Any
 
 from hil.diagnosis.vehicle.keys import ALIASES, DERIVED, LATENCY_S, LINE_S, SPECIAL, UNLIMITED, WIDE
+from hil.validation.doc_pages.wrap import markdown
 
 _WHAT = {
     "wheelbase_m": "between the axles",
@@ -89,7 +90,7 @@ def page() -> str:
     for section, entries in shipped.items():
         lines += ["", f"## `{section}_`", "", *_table_head()]
         lines += [f"| `{section}_{name}` | {_row(f'{section}_{name}', entry)} |" for name, entry in entries.items()]
-    return "\n".join(lines) + "\n"
+    return markdown(lines)
 
 
 def _short(flat: Entries) -> list[str]:
