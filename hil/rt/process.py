@@ -107,6 +107,7 @@ class Child:
                 )
         finally:
             child_end.close()
+        self._terminated = False
         self._used: list[tuple[int, float]] = []  # time, ns, and processor time, s, at its release and its end
 
     @property
@@ -162,10 +163,11 @@ class Child:
         return f"{self.name} (process {self.pid}) {how}" + (f": {words[-1]}" if words else "")
 
     def ask_to_stop(self) -> None:
-        """Send SIGTERM."""
-        if not self.ended:
+        """Send SIGTERM, once: a process that is shutting down would die of a second one."""
+        if not self.ended and not self._terminated:
             if len(self._used) == 1:
                 self._note_use()
+            self._terminated = True
             self._process.terminate()
 
     def stop(self) -> None:

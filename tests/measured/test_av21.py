@@ -25,7 +25,7 @@ def answer(log, shared):
 
 def _cause(answer: dict, effect: str, wheel: str) -> dict:
     found = [c for c in answer["causes"] if c["effect"] == effect and c["location"] == wheel]
-    assert found, f"{effect} of {wheel} not among {[(c['effect'], c['wheel']) for c in answer['causes']]}"
+    assert found, f"{effect} of {wheel} not among {[(c['effect'], c['location']) for c in answer['causes']]}"
     return found[0]
 
 

@@ -125,7 +125,7 @@ def _comparison(answer: Answer) -> Section:
         panels += comparison_panels(title, unit, t, np.where(shown, known, np.nan), simulated)
     return Section(
         "Measured against simulated", panels=tuple(panels),
-        text="All logs, one after the other, simulated open loop from measured inputs; each segment restarts the speed.",
+        text="All logs, one after the other, simulated open loop from measured inputs; a segment restarts the speed.",
     )  # fmt: skip
 
 
