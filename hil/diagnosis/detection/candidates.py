@@ -9,7 +9,6 @@ import numpy as np
 from hil.diagnosis.data.axle_torques import undriven
 from hil.diagnosis.detection.onset import OnsetTime, onset_penalty, segment_starts
 from hil.diagnosis.detection.onset_scan import scan_onset_by_segment
-from hil.diagnosis.detection.profile_fit import CandidateFits
 from hil.diagnosis.detection.result import Diagnosis
 from hil.diagnosis.detection.score_test import ScoreTest, score, scores, shortlist
 from hil.diagnosis.detection.zero_gradient import has_zero_gradient, line_search
@@ -22,6 +21,7 @@ from hil.diagnosis.estimation.information import (
 )
 from hil.diagnosis.estimation.terms import Candidate, candidates, columns
 from hil.diagnosis.noise.model import Noise, SampleMasks
+from hil.diagnosis.parallel import thread_map
 from hil.diagnosis.simulation.hot_spots import phase_penalty
 from hil.diagnosis.simulation.simulator import Simulator
 
@@ -74,7 +74,7 @@ class CandidateSet:
         found = scores(self.candidates, projected, accepted, now)
         self._rig.cache_baseline(fitter.parameter_set(model.z, model.terms))
         hidden = [item for item in found if has_zero_gradient(item)]
-        shown = CandidateFits.at_once(lambda item: line_search(fitter, model, noise, item), hidden)
+        shown = thread_map(lambda item: line_search(fitter, model, noise, item), hidden)
         met = dict(zip(map(id, hidden), shown, strict=True))
         return [met.get(id(item), item) for item in found]
 

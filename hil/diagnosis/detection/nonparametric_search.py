@@ -22,6 +22,7 @@ from hil.diagnosis.estimation.gauss_newton import Model
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation_nonparametric
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import Noise
+from hil.diagnosis.parallel import thread_map
 
 NONPARAMETRIC_MARGIN = 5.0
 """By how much more than the best listed cause a law in no list must explain, log of the odds."""
@@ -143,7 +144,7 @@ class NonparametricSearch:
         """The best laws, by name, and by one linear step with the noise beside each."""
         leading = best_of_each_term(race.scores(self._numbers.fitter, now.model, now.noise), _BESIDE)
         contest = now.contest
-        beside = contest.at_once(lambda entry: contest.linear_prediction(entry.terms, race.columns(entry)), leading)
+        beside = thread_map(lambda entry: contest.linear_prediction(entry.terms, race.columns(entry)), leading)
         seen = [fitted_hypothesis(entry, *one, contest.reference) for entry, one in zip(leading, beside, strict=True)]
         return {law.term.candidate.name: entry for law, entry in zip(seen, leading, strict=True)}, seen
 

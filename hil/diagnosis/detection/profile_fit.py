@@ -1,26 +1,22 @@
 """Candidates for one more cause of a model, each fitted with the noise that is left beside it."""
 
-from collections.abc import Callable, Collection, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 
-from hil.diagnosis.compiled import WORKERS
 from hil.diagnosis.detection.onset import segment_starts
 from hil.diagnosis.detection.score_test import ScoreTest, log_occam_factor, replayed_score, rescored
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term, Tracks
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.noise.model import Noise
+from hil.diagnosis.parallel import thread_map
 
 _ROUNDS, _SETTLED, _SETTLED_SHARE = 4, 1.0, 0.01
 """Times that a contender and its noise are fitted in turn, and how little less cost ends it: by itself, and as a share
 of all that it explains."""
 _STILL = 2.0
 """How little less cost other noise makes beside a linear step for that not to be made again."""
-Item = TypeVar("Item")
-Of = TypeVar("Of")
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +116,7 @@ def refit_substitutes(
         model = fitter.refit_amplitudes(fitter.at(best.model.z, terms, best.noise), best.noise)
         return refitted(best, fitter.fit(model, best.noise, 3, relinearise), best.noise)
 
-    return CandidateFits.at_once(placed, others)
+    return thread_map(placed, others)
 
 
 def refit_from_best(fitter: Fitter, fitted: Sequence[FittedHypothesis]) -> list[FittedHypothesis]:
@@ -149,12 +145,6 @@ class CandidateFits:
         self.noise = self._no_worse(model, fitter.estimate_noise(model, noise), noise)
         self.reference = fitter.cost(model.residual, model.z, self.noise)
         fitter.nuisance_information(self.noise)  # which all looks need
-
-    @staticmethod
-    def at_once(of: Callable[[Item], Of], items: Sequence[Item]) -> list[Of]:
-        """Looks that do not depend on each other, over threads."""
-        with ThreadPoolExecutor(WORKERS) as pool:
-            return list(pool.map(of, items))
 
     def _no_worse(self, model: Model, new: Noise, old: Noise) -> Noise:
         """The new noise unless the old was likelier: its parts are estimated in turn."""

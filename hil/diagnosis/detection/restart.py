@@ -8,10 +8,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from hil.diagnosis.detection.profile_fit import CandidateFits, FittedHypothesis, criterion
+from hil.diagnosis.detection.profile_fit import FittedHypothesis, criterion
 from hil.diagnosis.estimation.gauss_newton import BIASED_BIRGE_RATIO, Model
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import Noise
+from hil.diagnosis.parallel import thread_map
 
 _ROUNDS = 3
 _RIVAL, _AS_GOOD = 1.0 / 3.0, 0.9
@@ -56,10 +57,10 @@ def refit_from_nominal(
         return min(one, refitted(one, own.fit(model, noise, 2), noise), key=criterion)
 
     order = sorted(range(len(fitted)), key=lambda k: criterion(fitted[k]))
-    found = dict(zip(order, CandidateFits.at_once(lambda k: again(fitted[k], best), order[:_FIRST]), strict=False))
+    found = dict(zip(order, thread_map(lambda k: again(fitted[k], best), order[:_FIRST]), strict=False))
     best = min(best, *map(criterion, found.values()))
     rest = order[_FIRST:]
-    found |= dict(zip(rest, CandidateFits.at_once(lambda k: again(fitted[k], best), rest), strict=True))
+    found |= dict(zip(rest, thread_map(lambda k: again(fitted[k], best), rest), strict=True))
     leading = sorted(order, key=lambda k: criterion(found[k]))[:anew]
     best, bare, around = min(best, criterion(found[leading[0]])), [], beside.z
     for k in leading:

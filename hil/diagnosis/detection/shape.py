@@ -20,6 +20,7 @@ from hil.diagnosis.estimation.model_discrepancy import variance_inflation
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.isolation.intervals import DEVIATION_BY_FORM
 from hil.diagnosis.noise.model import Noise
+from hil.diagnosis.parallel import thread_map
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from plant.effects.effect import Parameter
 from plant.effects.theta import THETA
@@ -100,9 +101,9 @@ def fit_shape_parameters(
         return contest.linear_prediction([Term(offered[k], 0.0)], own)[0]
 
     best: dict[str, tuple[Model, ShapedCandidate]] = {}  # of each effect, as foreseen by one step, which far off errs
-    for model, one in sorted(zip(contest.at_once(foreseen, range(len(offered))), offered, strict=True), key=_cost):
+    for model, one in sorted(zip(thread_map(foreseen, range(len(offered))), offered, strict=True), key=_cost):
         best.setdefault(one.effect.name, (model, one))
-    replayed = contest.at_once(lambda seen: fitter.at(seen[0].z, seen[0].terms, law.noise), list(best.values()))
+    replayed = thread_map(lambda seen: fitter.at(seen[0].z, seen[0].terms, law.noise), list(best.values()))
     return _fitted(fitter, bare, min(zip(replayed, (one for _, one in best.values()), strict=True), key=_cost)[1], law)
 
 
@@ -134,7 +135,7 @@ def _fitted(fitter: Fitter, bare: Model, begun: ShapedCandidate, law: FittedHypo
         best = min((model for _, model in seen), key=lambda model: model.cost, default=None)
         term = Term(replace(begun, at=at), begun.parameter.typical if best is None else best.terms[-1].value)
         starts = [bare.z] if best is None else [bare.z, best.z]
-        found = CandidateFits.at_once(lambda z: found_from(z, term), starts)
+        found = thread_map(lambda z: found_from(z, term), starts)
         seen.append((at, min(found, key=lambda model: model.cost)))
         return seen[-1][1].cost
 

@@ -8,6 +8,7 @@ from hil.diagnosis.detection.profile_fit import CandidateFits, FittedHypothesis,
 from hil.diagnosis.detection.result import Diagnosis, Progress
 from hil.diagnosis.detection.score_test import SHORTLIST_SIZE, ScoreTest, shortlist
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation
+from hil.diagnosis.parallel import thread_map
 
 _TRIED = 10
 """Leaders where the vehicle's numbers go far, places of one effect among them."""
@@ -31,7 +32,7 @@ def fit_shortlist(
     if _most(plausible, left) < _HOPELESS * found.detection_threshold:
         return [], []
     say(f"noise beside {len(plausible)} candidates")
-    seen = contest.at_once(contest.profile_over_noise, plausible)
+    seen = thread_map(contest.profile_over_noise, plausible)
     beside = {id(item): quieter for item, quieter in seen}
     looked = [item for item, _ in seen]
     top = sorted(looked, key=lambda s: -s.log_bayes_factor)[:_TRIED] if bent else shortlist(looked, SHORTLIST_SIZE)
@@ -41,7 +42,7 @@ def fit_shortlist(
 
     def fits(some: Sequence[ScoreTest]) -> list[FittedHypothesis]:
         say(f"fitting {len(some)} leaders")
-        return contest.at_once(lambda item: contest.fit(item, beside[id(item)]), some)
+        return thread_map(lambda item: contest.fit(item, beside[id(item)]), some)
 
     first = [item for item in top if bent or _beyond(item, item.gain, left) >= _POOR * least]
     fitted = fits(first)

@@ -6,11 +6,12 @@ offset of the steering and a radius of that wheel. Beside those the numbers are 
 
 from hil.diagnosis.detection.candidates import CandidateSet
 from hil.diagnosis.detection.onset import OnsetTime, onset_penalty
-from hil.diagnosis.detection.profile_fit import CandidateFits, FittedHypothesis, criterion, refitted
+from hil.diagnosis.detection.profile_fit import FittedHypothesis, criterion, refitted
 from hil.diagnosis.detection.result import Diagnosis
 from hil.diagnosis.detection.score_test import SHORTLIST_SIZE, ScoreTest, shortlist
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
 from hil.diagnosis.noise.model import Noise
+from hil.diagnosis.parallel import thread_map
 
 
 def try_single_cause(
@@ -29,7 +30,7 @@ def try_single_cause(
         begun = FittedHypothesis(single.terms[0], single, single.cost, 0.0, item.information, noise, onset_penalty=paid)
         return refitted(begun, single, noise)
 
-    singles = sorted(CandidateFits.at_once(lambda one: fitted(*one), tried), key=criterion)
+    singles = sorted(thread_map(lambda one: fitted(*one), tried), key=criterion)
     accepted = [listed[0] for listed in found.selections]
     together = model.cost + sum(one.total_penalty - 2.0 * one.log_occam_factor for one in accepted)
     return singles if singles and criterion(singles[0]) < together else []

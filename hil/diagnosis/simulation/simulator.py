@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,11 +9,10 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.signal import savgol_filter
 
-from hil.diagnosis.compiled import WORKERS
 from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Dataset, Recording, Segment
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.data.prepare import averaged
-from hil.diagnosis.parallel import parallel_map
+from hil.diagnosis.parallel import parallel_map, thread_each
 from hil.diagnosis.simulation import excitation as acting
 from hil.diagnosis.simulation.hot_spots import (
     QUARTER_RAD,
@@ -277,8 +275,7 @@ class Simulator:
 
     def run_all(self, worlds: Sequence[ParameterSet]) -> Iterator[Stack]:
         """Of many worlds, in order, over threads."""
-        with ThreadPoolExecutor(WORKERS) as pool:
-            yield from pool.map(self.run, worlds)
+        return thread_each(self.run, worlds)
 
     def residual(self, world: ParameterSet) -> Stack:
         """Measured less simulated, (samples, channels); NaN where nothing is measured."""
