@@ -35,7 +35,7 @@ class CandidateSet:
     """
 
     def __init__(self, rig: Simulator, frame: SampleMasks, untold: Sequence[str], quiet: Sequence[str] = ()) -> None:
-        self._rig, self._frame = rig, frame
+        self._frame, self._starts, self._visibility = frame, segment_starts(rig.dataset), rig.hot_spot_visibility
         self._columns = columns(untold)
         without = undriven(drive.log for drive in rig.dataset.recordings)
         listed = candidates(self._columns, without, rig.vehicle.suspension_stated, quiet)
@@ -46,18 +46,17 @@ class CandidateSet:
         """Of hot spots the data chose the angles."""
         turned = candidate.effect.name == "hot_spot"
         return (
-            replace(candidate, selection_penalty=phase_penalty(self._rig.hot_spot_visibility, candidate.members()))
+            replace(candidate, selection_penalty=phase_penalty(self._visibility, candidate.members()))
             if turned
             else candidate
         )
 
     def linearise_at(self, fitter: Fitter, model: Model) -> None:
-        """Take the sensitivities at a model."""
+        """Take the sensitivities at a model, simulated from the fitter's baseline."""
         world = fitter.parameter_set(model.z, model.terms)
-        self._rig.cache_baseline(world)
         worlds = [column.stepped(world) for column in self._columns]
         steps = [column.step for column in self._columns]
-        self.jacobian = finite_difference_jacobian(self._rig, self._frame, model.channels, worlds, steps)
+        self.jacobian = finite_difference_jacobian(fitter.simulator, self._frame, model.channels, worlds, steps)
 
     def at(self, fitter: Fitter, model: Model) -> "CandidateSet":
         """The same candidates, their sensitivities taken at another model."""
@@ -72,7 +71,6 @@ class CandidateSet:
         in_use = {id(term.candidate): term.value for term in model.terms}
         now = [in_use.get(id(candidate), 0.0) for candidate in self.candidates]
         found = scores(self.candidates, projected, accepted, now)
-        self._rig.cache_baseline(fitter.parameter_set(model.z, model.terms))
         hidden = [item for item in found if has_zero_gradient(item)]
         shown = thread_map(lambda item: line_search(fitter, model, noise, item), hidden)
         met = dict(zip(map(id, hidden), shown, strict=True))
@@ -80,19 +78,21 @@ class CandidateSet:
 
     def scores_and_information(
         self, fitter: Fitter, found: Diagnosis, model: Model, noise: Noise
-    ) -> tuple[list[ScoreTest], InformationBlocks]:
-        """What each explains beside a model by one step, and the products that tell it."""
+    ) -> tuple[list[ScoreTest], InformationBlocks, Fitter]:
+        """What each explains beside a model by one step, and the products that tell it; the fitter with the baseline
+        they are simulated from."""
         if model.terms:
             sums = fitter.information_blocks(model, self.jacobian, noise)
-            return self.scores(fitter, sums, model, noise), sums
+            fitter = fitter.at_baseline(model)
+            return self.scores(fitter, sums, model, noise), sums, fitter
         assert found.information is not None  # screened before any cause is looked for
-        return found.scores, found.information
+        return found.scores, found.information, fitter
 
     def shortlist(
         self, fitter: Fitter, listed: list[ScoreTest], sums: InformationBlocks, model: Model, bent: bool
     ) -> list[ScoreTest]:
         """Those that explain most by one step and are not in the model yet; of all places, where numbers are bent."""
-        held, starts = fitter.at_bounds(model.z), segment_starts(self._rig.dataset)
+        held, starts = fitter.at_bounds(model.z), self._starts
         listed = scan_onset_by_segment(
             listed, sums, len(model.terms), model.z, held, starts, onset_penalty(self._frame)
         )
@@ -116,7 +116,7 @@ class CandidateSet:
         sums, accepted = fitter.information_blocks(model, self.jacobian, noise), len(model.terms)
         columns = [[accepted + k for k in candidate.columns] for candidate in self.candidates]
         b, q = marginalise_from_onset(sums, columns, range(accepted), model.z, fitter.at_bounds(model.z))
-        starts = segment_starts(self._rig.dataset)
+        starts = self._starts
         first = max(k for k, start in enumerate(starts) if start <= moment)
         found = []
         for k, candidate in enumerate(self.candidates):

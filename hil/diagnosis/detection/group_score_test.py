@@ -13,6 +13,7 @@ from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term, Tracks
 from hil.diagnosis.estimation.information import finite_difference_jacobian, marginalise
 from hil.diagnosis.noise.model import Noise
 from hil.diagnosis.simulation.parameter_set import ParameterSet
+from hil.diagnosis.simulation.simulator import Simulator
 from plant.effects.effect import Scope
 
 _BY_WHEEL, _AXLES = ("friction.mu",), ("front", "rear")
@@ -39,22 +40,22 @@ class GroupScore:
 
 
 class GroupScoreTest:
-    """Sensitivities to all laws at one model, simulated once; wheel by wheel for the law that leads."""
+    """Sensitivities to all laws at one model, simulated once from the fitter's baseline; wheel by wheel for the law that
+    leads."""
 
     def __init__(self, fitter: Fitter, world: ParameterSet) -> None:
-        self._rig, self._frame, self._world = fitter.simulator, fitter.masks, world
-        self._rig.cache_baseline(world)
+        self._frame, self._world = fitter.masks, world
         self._parts = {
             curve: [curve.at(place) for place in _parts(curve)] for curve in basis_expansions(fitter.simulator, world)
         }
-        self._columns = self._simulated([part for parts in self._parts.values() for part in parts])
+        self._columns = self._simulated(fitter.simulator, [part for parts in self._parts.values() for part in parts])
 
-    def _simulated(self, parts: Sequence[BasisExpansion]) -> dict[tuple[str, str], Tracks]:
+    def _simulated(self, simulator: Simulator, parts: Sequence[BasisExpansion]) -> dict[tuple[str, str], Tracks]:
         """Columns of each law and place."""
         pieces = [piece for part in parts for piece in part.functions]
         steps = [_SHARE * piece.term.typical for piece in pieces]
         worlds = [piece.applied(self._world, step) for piece, step in zip(pieces, steps, strict=True)]
-        all_of = finite_difference_jacobian(self._rig, self._frame, self._rig.run(self._world), worlds, steps)
+        all_of = finite_difference_jacobian(simulator, self._frame, simulator.run(self._world), worlds, steps)
         return {
             (part.term.name, part.location): {
                 name: values[:, BASIS_SIZE * k : BASIS_SIZE * (k + 1)] for name, values in all_of.items()
@@ -62,16 +63,17 @@ class GroupScoreTest:
             for k, part in enumerate(parts)
         }
 
-    def scores(self, fitter: Fitter, model: Model, noise: Noise) -> list[GroupScore]:
-        """Every law at every place it was simulated for, the best first, by the fitter's sensitivities to numbers."""
+    def scores(self, fitter: Fitter, model: Model, noise: Noise) -> tuple[list[GroupScore], Fitter]:
+        """Every law at every place it was simulated for, the best first, by the fitter's sensitivities to numbers; the
+        fitter with the baseline of the last simulated."""
         found = self._ranked(fitter, model, noise)
         leading = next(curve for curve in self._parts if curve.term is found[0].expansion.term)
         if len(self._parts[leading]) == len(_AXLES):
             self._parts[leading] = [leading.at(wheel) for wheel in Scope.WHEEL.members]
-            self._rig.cache_baseline(self._world)
-            self._columns |= self._simulated(self._parts[leading])
+            fitter = fitter.with_simulator(fitter.simulator.with_baseline(self._world))
+            self._columns |= self._simulated(fitter.simulator, self._parts[leading])
             found = self._ranked(fitter, model, noise)
-        return found
+        return found, fitter
 
     def columns(self, entry: GroupScore) -> Tracks:
         """Sensitivities to the coefficients of a law at a place."""

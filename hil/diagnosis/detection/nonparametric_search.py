@@ -18,7 +18,7 @@ from hil.diagnosis.detection.profile_fit import CandidateFits, FittedHypothesis,
 from hil.diagnosis.detection.restart import RefitHypothesis
 from hil.diagnosis.detection.result import Diagnosis, Progress, Settings
 from hil.diagnosis.detection.shape import fit_shape_parameters
-from hil.diagnosis.estimation.gauss_newton import Model
+from hil.diagnosis.estimation.gauss_newton import Fitter, Model
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation_nonparametric
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import Noise
@@ -52,7 +52,7 @@ class SelectionStep:
     listed: FittedHypothesis | None
     clear: bool
     left: FormErrorAllowance
-    error: Callable[[FittedHypothesis, FittedHypothesis], float]
+    error: Callable[[Fitter, FittedHypothesis, FittedHypothesis], float]
     bent: bool
 
 
@@ -101,9 +101,11 @@ class NonparametricSearch:
         fitter = self._numbers.fitter
         if self._race is None:
             self._say("curves in no list")
+            fitter = fitter.at_baseline(model)
             self._race = GroupScoreTest(fitter, fitter.parameter_set(model.z, model.terms))
         race = self._race
-        entries, seen = self._seen(race, now)
+        entries, seen, fitter = self._seen(race, fitter, now)
+        self._numbers.fitter = fitter
 
         def refitted_law(one: FittedHypothesis, model: Model, noise: Noise) -> FittedHypothesis:
             return fitted_hypothesis(entries[one.term.candidate.name], model, noise, reference)
@@ -116,6 +118,7 @@ class NonparametricSearch:
             tried = [replayed(one) for one in sorted(seen, key=criterion)[:_TRIED]]
             best_listed = np.inf if now.listed is None else criterion(now.listed)
             seen, without = again(model, tried, refitted_law, reference, 1, best_listed)
+            fitter = self._numbers.fitter
             reference = min(reference, without[0].cost)
         law = min(seen, key=criterion)
         best = entries[law.term.candidate.name]
@@ -125,10 +128,11 @@ class NonparametricSearch:
         least = self._asked(found, race, best, now.left)
 
         def stands(law: FittedHypothesis, listed: FittedHypothesis | None, clear: bool) -> bool:
-            return is_preferred(law, listed, clear, reference, least * now.error(law, law))
+            return is_preferred(law, listed, clear, reference, least * now.error(fitter, law, law))
 
         if stands(law, now.listed, now.clear) and self._settings.relinearise and not now.bent:
             (law,), without = again(model, [replayed(law)], refitted_law, reference, 1, np.inf)
+            fitter = self._numbers.fitter
             reference = min(reference, without[0].cost)
         if not stands(law, now.listed, now.clear):
             return None
@@ -137,16 +141,20 @@ class NonparametricSearch:
         if not stands(law, now.listed, now.clear):
             return None
         listed = [item.candidate for item in found.scores]
-        shaped = fit_shape_parameters(now.contest, fitter, listed, law)
+        shaped, fitter = fit_shape_parameters(now.contest, fitter, listed, law)
+        self._numbers.fitter = fitter
         return law if shaped is None or stands(law, shaped, True) else shaped
 
-    def _seen(self, race: GroupScoreTest, now: SelectionStep) -> tuple[dict[str, GroupScore], list[FittedHypothesis]]:
-        """The best laws, by name, and by one linear step with the noise beside each."""
-        leading = best_of_each_term(race.scores(self._numbers.fitter, now.model, now.noise), _BESIDE)
+    def _seen(
+        self, race: GroupScoreTest, fitter: Fitter, now: SelectionStep
+    ) -> tuple[dict[str, GroupScore], list[FittedHypothesis], Fitter]:
+        """The best laws, by name, and by one linear step with the noise beside each; the fitter of `GroupScoreTest`."""
+        entries, fitter = race.scores(fitter, now.model, now.noise)
+        leading = best_of_each_term(entries, _BESIDE)
         contest = now.contest
         beside = thread_map(lambda entry: contest.linear_prediction(entry.terms, race.columns(entry)), leading)
         seen = [fitted_hypothesis(entry, *one, contest.reference) for entry, one in zip(leading, beside, strict=True)]
-        return {law.term.candidate.name: entry for law, entry in zip(seen, leading, strict=True)}, seen
+        return {law.term.candidate.name: entry for law, entry in zip(seen, leading, strict=True)}, seen, fitter
 
     def _asked(self, found: Diagnosis, race: GroupScoreTest, best: GroupScore, left: FormErrorAllowance) -> float:
         """Gain that is asked of a law: beyond noise, the model's own error, and what the causes so far leave."""

@@ -23,35 +23,38 @@ MIN_SNR_BEFORE_ONSET = 3.0
 """Standard deviations that the cause would have shown before it begins, had it been there."""
 
 
-def estimate_onsets(fitter: Fitter, model: Model, noise: Noise) -> Model:
+def estimate_onsets(fitter: Fitter, model: Model, noise: Noise) -> tuple[Model, Fitter]:
     """The model with a beginning for each cause that was clearly absent before, and for no other.
 
     A time that may be chosen is one more way to fit what the model gets wrong, and is asked for more than that.
-    What was taken to begin, where the numbers still stood in for it, may always have been there.
+    What was taken to begin, where the numbers still stood in for it, may always have been there. The fitter comes back
+    with the baseline of the last time tried.
     """
     starts = segment_starts(fitter.simulator.dataset)
     for k, term in enumerate(model.terms):
         if isinstance(term.candidate, BasisFunction):
             continue
         if term.onset is None:
-            later = _later(fitter, model, noise, k)
+            later, fitter = _later(fitter, model, noise, k)
             model = model if later is None else later
         elif term.onset in starts:
             moments = _about(fitter, starts.index(term.onset))
-            begun = min(model, _begun(fitter, model, noise, k, moments, term.value), key=_cost)
+            begun, fitter = _begun(fitter, model, noise, k, moments, term.value)
+            begun = min(model, begun, key=_cost)
             always = fitter.fit(fitter.at(model.z, _since(model, k, term.value, None), noise), noise, 3)
             model = begun if begun.cost + onset_penalty(fitter.masks) < always.cost else always
-    return model
+    return model, fitter
 
 
-def refine_onset(fitter: Fitter, model: Model, noise: Noise) -> Model:
+def refine_onset(fitter: Fitter, model: Model, noise: Noise) -> tuple[Model, Fitter]:
     """The model with the beginning of its last cause where it fits best, near the one it has."""
     term = model.terms[-1]
     assert term.onset is not None
     drive, since_s = term.onset
     about = np.arange(max(since_s - _COARSE_S, 0.0), since_s + _COARSE_S, _FINER[0])
     moments = [(drive, float(t)) for t in about]
-    return min(model, _begun(fitter, model, noise, len(model.terms) - 1, moments, term.value), key=_cost)
+    begun, fitter = _begun(fitter, model, noise, len(model.terms) - 1, moments, term.value)
+    return min(model, begun, key=_cost), fitter
 
 
 def onset_penalty(frame: SampleMasks) -> float:
@@ -70,16 +73,16 @@ def nearest(starts: Sequence[OnsetTime], moment: OnsetTime) -> int:
     return min((abs(start - since_s), number) for number, (of, start) in enumerate(starts) if of == drive)[1]
 
 
-def _later(fitter: Fitter, model: Model, noise: Noise, k: int) -> Model | None:
+def _later(fitter: Fitter, model: Model, noise: Noise, k: int) -> tuple[Model | None, Fitter]:
     b, q = _by_manoeuvre(fitter, model, noise, k)
     block = detect_change_point(b, q)
     if block is None:
-        return None
+        return None, fitter
     value = float(np.clip(b[block:].sum() / q[block:].sum(), *_bounds(model.terms[k])))
     moments = _about(fitter, block)
     least = float(chi2.isf(_ALPHA / (len(b) * len(moments)), 1)) * variance_inflation(model.terms[k].candidate)
-    fitted = _begun(fitter, model, noise, k, moments, value)
-    return fitted if model.cost - fitted.cost > least else None
+    fitted, fitter = _begun(fitter, model, noise, k, moments, value)
+    return (fitted if model.cost - fitted.cost > least else None), fitter
 
 
 def _about(fitter: Fitter, block: int) -> list[OnsetTime]:
@@ -88,9 +91,11 @@ def _about(fitter: Fitter, block: int) -> list[OnsetTime]:
     return moments_of(segments[block - 1], segments[block])
 
 
-def _begun(fitter: Fitter, model: Model, noise: Noise, k: int, moments: list[OnsetTime], value: float) -> Model:
-    """The model with a cause that begins at the best of these times, or near it."""
-    fitter.simulator.cache_baseline(fitter.parameter_set(model.z, _since(model, k, value, moments[0])))
+def _begun(
+    fitter: Fitter, model: Model, noise: Noise, k: int, moments: list[OnsetTime], value: float
+) -> tuple[Model, Fitter]:
+    """The model with a cause that begins at the best of these times, or near it; the fitter with the first as baseline."""
+    fitter = fitter.at_baseline(replace(model, terms=_since(model, k, value, moments[0])))
     seen: list[Model] = []
     for finer in (*_FINER, None):
         tried = ((fitter.at(model.z, _since(model, k, value, moment), noise), moment) for moment in moments)
@@ -99,7 +104,7 @@ def _begun(fitter: Fitter, model: Model, noise: Noise, k: int, moments: list[Ons
         if finer is not None:
             beside = min((abs(t - since_s) for d, t in moments if d == drive and t != since_s), default=finer)
             moments = [(drive, float(t)) for t in np.arange(max(since_s - beside, 0.0), since_s + beside, finer)]
-    return fitter.fit(min(seen, key=_cost), noise, 3)
+    return fitter.fit(min(seen, key=_cost), noise, 3), fitter
 
 
 def _cost(model: Model) -> float:

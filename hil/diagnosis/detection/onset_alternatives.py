@@ -17,23 +17,29 @@ _LIKELY = 4.0 * INDISTINGUISHABLE
 """Twice the log of the odds, within which what begins when the best does is dated by itself."""
 
 
-def estimate_onsets_of_best(fitter: Fitter, fitted: list[FittedHypothesis]) -> list[FittedHypothesis]:
-    """The best with the time they begin at: a law by time would explain more than a cause that was always there."""
+def estimate_onsets_of_best(fitter: Fitter, fitted: list[FittedHypothesis]) -> tuple[list[FittedHypothesis], Fitter]:
+    """The best with the time they begin at: a law by time would explain more than a cause that was always there.
+
+    The fitter comes back with the baseline of `estimate_onsets`.
+    """
     best = sorted(fitted, key=criterion)[:_DATED]
-    dated = {id(one): estimate_onsets(fitter, one.model, one.noise) for one in best}
-    return [_dated(fitter, one, dated.get(id(one), one.model)) for one in fitted]
+    dated: dict[int, Model] = {}
+    for one in best:
+        dated[id(one)], fitter = estimate_onsets(fitter, one.model, one.noise)
+    return [_dated(fitter, one, dated.get(id(one), one.model)) for one in fitted], fitter
 
 
 def add_same_onset_alternatives(
     fitter: Fitter, field: CandidateSet, model: Model, fitted: list[FittedHypothesis]
-) -> list[FittedHypothesis]:
+) -> tuple[list[FittedHypothesis], Fitter]:
     """Beside a best that begins in the middle, others that begin when it does.
 
-    As if always there they explained too little to be looked at. ``model`` has the causes before it.
+    As if always there they explained too little to be looked at. ``model`` has the causes before it. The fitter comes
+    back with the baseline of `refine_onset`.
     """
     best = min(fitted, key=criterion)
     if best.term.onset is None:
-        return fitted
+        return fitted, fitter
     bare = fitter.at(best.model.z, model.terms, best.noise)
     tried = {candidate_key(c.term.candidate) for c in fitted if c.term.onset == best.term.onset}
     tried |= {candidate_key(term.candidate) for term in model.terms}
@@ -41,8 +47,10 @@ def add_same_onset_alternatives(
     top = shortlist([item for item in listed if candidate_key(item.candidate) not in tried], _LIKE)
     found = refit_substitutes(fitter, best, [(item.candidate, item.value) for item in top], True)
     near = [one for one in found if criterion(one) - criterion(best) < _LIKELY]
-    dated = {id(one): refine_onset(fitter, one.model, one.noise) for one in near}
-    return [*fitted, *(_dated(fitter, one, dated.get(id(one), one.model)) for one in found)]
+    dated: dict[int, Model] = {}
+    for one in near:
+        dated[id(one)], fitter = refine_onset(fitter, one.model, one.noise)
+    return [*fitted, *(_dated(fitter, one, dated.get(id(one), one.model)) for one in found)], fitter
 
 
 def _dated(fitter: Fitter, one: FittedHypothesis, model: Model) -> FittedHypothesis:

@@ -61,8 +61,9 @@ class ShapedCandidate(Candidate):
 
 def fit_shape_parameters(
     contest: CandidateFits, fitter: Fitter, listed: Sequence[Candidate], law: FittedHypothesis
-) -> FittedHypothesis | None:
-    """The best listed cause at the joint and the place of a law, of any shape; None where no effect there has one.
+) -> tuple[FittedHypothesis | None, Fitter]:
+    """The best listed cause at the joint and the place of a law, of any shape; None where no effect there has one. The
+    fitter comes back with the model without the law as its baseline.
 
     Parameters
     ----------
@@ -87,11 +88,11 @@ def fit_shape_parameters(
         for at in _values(shape)
     ]
     if not offered:
-        return None
+        return None, fitter
     terms = tuple(term for term in law.model.terms if not isinstance(term.candidate, BasisFunction))
     bare = fitter.at(law.model.z, terms, law.noise)
     world = fitter.parameter_set(bare.z, terms)
-    fitter.simulator.cache_baseline(world)
+    fitter = fitter.at_baseline(bare)
     steps = [_SHARE * one.parameter.typical for one in offered]
     worlds = [one.applied(world, step) for one, step in zip(offered, steps, strict=True)]
     columns = finite_difference_jacobian(fitter.simulator, fitter.masks, bare.channels, worlds, steps)
@@ -104,7 +105,8 @@ def fit_shape_parameters(
     for model, one in sorted(zip(thread_map(foreseen, range(len(offered))), offered, strict=True), key=_cost):
         best.setdefault(one.effect.name, (model, one))
     replayed = thread_map(lambda seen: fitter.at(seen[0].z, seen[0].terms, law.noise), list(best.values()))
-    return _fitted(fitter, bare, min(zip(replayed, (one for _, one in best.values()), strict=True), key=_cost)[1], law)
+    _, first = min(zip(replayed, (one for _, one in best.values()), strict=True), key=_cost)
+    return _fitted(fitter, bare, first, law), fitter
 
 
 def _cost(seen: tuple[Model, ShapedCandidate]) -> float:

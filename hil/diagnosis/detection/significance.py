@@ -108,5 +108,4 @@ def eliminate_backward(found: Diagnosis, bare: Fitter, told: float, say: Progres
     if found.final.terms:
         found.final = resolve_aliases(found.final, fitter.nuisances, fitter.base)
         return
-    found.final, found.noise, found.fitter = found.base, found.first_noise, bare
-    bare.simulator.denoise_inputs(bare.parameter_set(found.base.z, found.base.terms))
+    found.final, found.noise, found.fitter = found.base, found.first_noise, bare.denoised(found.base)

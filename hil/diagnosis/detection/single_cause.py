@@ -16,11 +16,13 @@ from hil.diagnosis.parallel import thread_map
 
 def try_single_cause(
     fitter: Fitter, field: CandidateSet, found: Diagnosis, model: Model, noise: Noise
-) -> list[FittedHypothesis]:
+) -> tuple[list[FittedHypothesis], Fitter]:
     """Single causes fitted from the numbers and the noise of a model of several, best first; empty where all of the
-    model together have the better odds."""
+    model together have the better odds. The fitter comes back with the baseline they are fitted from."""
     bare = fitter.at(model.z, (), noise)
     moments: list[OnsetTime | None] = list(dict.fromkeys(term.onset for term in model.terms))
+    if None in moments:
+        fitter = fitter.at_baseline(bare)
     tried = [(item, moment) for moment in moments for item in _leading(fitter, field, bare, noise, moment)]
 
     def fitted(item: ScoreTest, moment: OnsetTime | None) -> FittedHypothesis:
@@ -33,7 +35,7 @@ def try_single_cause(
     singles = sorted(thread_map(lambda one: fitted(*one), tried), key=criterion)
     accepted = [listed[0] for listed in found.selections]
     together = model.cost + sum(one.total_penalty - 2.0 * one.log_occam_factor for one in accepted)
-    return singles if singles and criterion(singles[0]) < together else []
+    return (singles if singles and criterion(singles[0]) < together else []), fitter
 
 
 def _leading(

@@ -33,6 +33,7 @@ from hil.diagnosis.estimation.aliases import resolve_aliases
 from hil.diagnosis.estimation.gauss_newton import BIASED_BIRGE_RATIO, Fitter, Model
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import Noise, SampleMasks
+from hil.diagnosis.simulation.hot_spots import has_hot_spots
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.spec import Vehicle
@@ -59,17 +60,21 @@ def diagnose(
 class StepwiseSelection:
     def __init__(self, case: Dataset, vehicle: Vehicle, base: ParameterSet, settings: Settings, say: Progress) -> None:
         self.settings, self.say = settings, say
-        self.rig = Simulator(case, vehicle).denoised(base)
-        self.frame = SampleMasks.of(self.rig.dataset)
-        self.numbers = NuisanceFit(self.rig, self.frame, vehicle, base, settings.relinearise)
+        simulator = Simulator(case, vehicle).prepared(base)
+        self.vehicle, self.frame = vehicle, SampleMasks.of(simulator.dataset)
+        self.numbers = NuisanceFit(simulator, self.frame, vehicle, base, settings.relinearise)
         self.unlisted = NonparametricSearch(self.numbers, settings, say)
         self.effective_parameters = float(len(self.numbers.nuisances))
         self.began_again = False
 
     @property
     def fitter(self) -> Fitter:
-        """With the sensitivities to the vehicle's numbers last taken."""
+        """With the sensitivities to the vehicle's numbers last taken, and the simulator of the fits to come."""
         return self.numbers.fitter
+
+    @fitter.setter
+    def fitter(self, fitter: Fitter) -> None:
+        self.numbers.fitter = fitter
 
     def run(self) -> Diagnosis:
         """All of it."""
@@ -79,13 +84,17 @@ class StepwiseSelection:
         nominal, noise = self.fitter.start(self.settings.noise_model)
         self.say("noise, and the vehicle's numbers within their tolerance")
         model, noise = self.numbers.fit(nominal, noise)
-        if self.rig.fit_hot_spot_phase(self.fitter.parameter_set(model.z, ())):
+        parameters = self.fitter.parameter_set(model.z, ())
+        self.fitter = self.fitter.with_simulator(self.fitter.simulator.with_hot_spot_phase(parameters))
+        if self.fitter.simulator.hot_spot_angles and has_hot_spots(parameters):
             model, noise = self.numbers.fit(self.fitter.at(model.z, (), noise), noise)
         quiet = unexcited_sensors(
-            self.fitter.tracks(model.channels or self.rig.run(self.fitter.parameter_set(model.z, ()))), noise
+            self.fitter.tracks(model.channels or self.fitter.simulator.run(self.fitter.parameter_set(model.z, ()))),
+            noise,
         )
-        self.field = CandidateSet(self.rig, self.frame, self.rig.vehicle.undiagnosable_effects, quiet)
-        found = Diagnosis(self.rig.dataset, self.rig.vehicle, self.fitter, noise, noise, nominal, model, model)
+        simulator = self.fitter.simulator
+        self.field = CandidateSet(simulator, self.frame, self.vehicle.undiagnosable_effects, quiet)
+        found = Diagnosis(simulator.dataset, self.vehicle, self.fitter, noise, noise, nominal, model, model)
         self._screened(found)
         around = model.z
         while causes_in(model) < self.settings.most_causes:
@@ -100,14 +109,14 @@ class StepwiseSelection:
             found.hypotheses += [list_of] * (len(model.terms) - before)
             model, noise = self._one_for_all(found, model, noise)
             self.say(f"accepted {model.terms[-1].candidate.name} = {model.terms[-1].value:.4g}; when it begins")
-            model = estimate_onsets(self.fitter, model, noise)
+            model, self.fitter = estimate_onsets(self.fitter, model, noise)
             model = self._quieter(model, noise)
             model, noise, around = self.relinearise_if_stale(model, noise, around)
             bent, model = model, resolve_aliases(model, self.numbers.nuisances, self.fitter.base)
             around = around + model.z - bent.z
+        bare, found.fitter = found.fitter, self.fitter
         if model.terms:
-            bare = found.fitter
-            found.final, found.noise, found.fitter = model, noise, self.fitter
+            found.final, found.noise = model, noise
             eliminate_backward(found, bare, self.effective_parameters, self.say)
         for term in filter(at_bound, found.final.terms):
             told = f"{term.candidate.name} = {term.value:.3g}"
@@ -121,14 +130,13 @@ class StepwiseSelection:
         self.effective_parameters = self.fitter.effective_parameters(found.first_noise)
         found.information = self.fitter.information_blocks(found.base, self.field.jacobian, found.first_noise)
         found.scores = self.field.scores(self.fitter, found.information, found.base, found.first_noise)
-        found.undetectable_effects = sorted(
-            {*undetectable_effects(found.scores), *self.rig.vehicle.undiagnosable_effects}
-        )
+        found.undetectable_effects = sorted({*undetectable_effects(found.scores), *self.vehicle.undiagnosable_effects})
         self.asked = DetectionThreshold(found, self.field, self.settings.alpha)
         self.asked.update_inflation(self.fitter, found.scores, found.information, found.base)
 
     def _shown_at(self, model: Model) -> None:
-        """What candidates, and laws in no list, show is that at this model."""
+        """What candidates, and laws in no list, show is that at this model, which is the baseline from now on."""
+        self.fitter = self.fitter.at_baseline(model)
         self.field.linearise_at(self.fitter, model)
         self.unlisted.invalidate()
 
@@ -156,14 +164,14 @@ class StepwiseSelection:
         """Contenders for a cause of a model fitted from the car as handed in, too; see there."""
         self.say("once more from the car as handed in")
         found, without = refit_from_nominal(self.numbers, fitted, model, with_fit, reference, anew, best)
-        self.rig.denoise_inputs(self.fitter.parameter_set(model.z, model.terms))
+        self.fitter = self.fitter.denoised(model)
         return found, without
 
     def _quieter(self, model: Model, noise: Noise) -> Model:
         """The model where what drives the car is made by it: a cause may move the steps of pressures and torques."""
         if not self.settings.relinearise:
             return model
-        self.rig.denoise_inputs(self.fitter.parameter_set(model.z, model.terms))
+        self.fitter = self.fitter.denoised(model)
         return self.fitter.fit(self.fitter.at(model.z, model.terms, noise), noise, 2)
 
     def relinearise_if_stale(self, model: Model, noise: Noise, around: Floats) -> tuple[Model, Noise, Floats]:
@@ -182,12 +190,12 @@ class StepwiseSelection:
         """The next cause, if one is beyond doubt; no contender where the numbers explain more without a further one."""
         left = FormErrorAllowance(found.explained, self.fitter, model, noise, self.field.jacobian)
         contest, top, fitted = self._leading(found, model, noise, left)
-        error = local_discrepancy_factors(self.fitter, self.field, self.effective_parameters, found)
+        error = local_discrepancy_factors(self.field, self.effective_parameters, found)
         reference, tighter = contest.reference, contest.noise
 
         def gained() -> list[FittedHypothesis]:
             best = min(fitted, key=criterion)
-            return [with_gain(c, reference - left.of(c.term.candidate), error(c, best)) for c in fitted]
+            return [with_gain(c, reference - left.of(c.term.candidate), error(self.fitter, c, best)) for c in fitted]
 
         if fitted and self.settings.relinearise:
             self.asked.update_inflation_at_fit(self.fitter, fitted)
@@ -199,12 +207,11 @@ class StepwiseSelection:
                     self.began_again = True
                     return *without, []
                 reference = min(reference, bare)
-            fitted = add_same_onset_alternatives(
-                self.fitter, self.field, model, estimate_onsets_of_best(self.fitter, fitted)
-            )
+            fitted, self.fitter = estimate_onsets_of_best(self.fitter, fitted)
+            fitted, self.fitter = add_same_onset_alternatives(self.fitter, self.field, model, fitted)
             self.asked.update_inflation_at_fit(self.fitter, fitted)
         elif fitted:
-            fitted = estimate_onsets_of_best(self.fitter, fitted)
+            fitted, self.fitter = estimate_onsets_of_best(self.fitter, fitted)
         listed = min(fitted, key=criterion, default=None)
         if listed is not None:
             tighter = listed.noise
@@ -241,7 +248,7 @@ class StepwiseSelection:
         if not (self.settings.relinearise and listed and causes_in(model) > 1):
             return model, noise
         self.say("one cause instead of all")
-        singles = try_single_cause(self.fitter, self.field, found, model, noise)
+        singles, self.fitter = try_single_cause(self.fitter, self.field, found, model, noise)
         if not singles:
             return model, noise
         found.hypotheses = [singles]
@@ -252,7 +259,7 @@ class StepwiseSelection:
         self, found: Diagnosis, model: Model, noise: Noise, left: FormErrorAllowance
     ) -> tuple[CandidateFits, list[ScoreTest], list[FittedHypothesis]]:
         """The race for the next cause, its leaders and their fits; no leader where none can be beyond doubt."""
-        listed, sums = self.field.scores_and_information(self.fitter, found, model, noise)
+        listed, sums, self.fitter = self.field.scores_and_information(self.fitter, found, model, noise)
         if model.terms:
             self.asked.update_inflation(self.fitter, listed, sums, model)
         bent = self.nuisances_may_be_biased(model)
@@ -271,8 +278,10 @@ class StepwiseSelection:
         Numbers that stand in for a cause leave nothing of it where they stand.
         """
         self.say("sensitivities at the car as handed in")
-        fitter = self.handed_in
+        fitter = self.handed_in.with_simulator(self.fitter.simulator)
         nominal = fitter.at(np.zeros(len(self.numbers.nuisances)), (), noise)
+        fitter = fitter.at_baseline(nominal)
+        self.fitter = self.fitter.with_simulator(fitter.simulator)
         field = self.field.at(fitter, nominal)
         sums = fitter.information_blocks(nominal, field.jacobian, noise)
         listed = field.scores(fitter, sums, nominal, noise)

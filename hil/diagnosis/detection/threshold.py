@@ -46,12 +46,12 @@ class DetectionThreshold:
 
 
 def local_discrepancy_factors(
-    fitter: Fitter, field: CandidateSet, told: float, found: Diagnosis
-) -> Callable[[FittedHypothesis, FittedHypothesis], float]:
+    field: CandidateSet, told: float, found: Diagnosis
+) -> Callable[[Fitter, FittedHypothesis, FittedHypothesis], float]:
     """What the gain of a contender is divided by for what the model gets wrong here, seen beside the best one."""
     known: dict[Model, float] = {}
 
-    def error(one: FittedHypothesis, best: FittedHypothesis) -> float:
+    def error(fitter: Fitter, one: FittedHypothesis, best: FittedHypothesis) -> float:
         strain = nuisance_variance_inflation(fitter, one.model.z, told)
         if not structure_mismatch(strain):
             return strain

@@ -228,8 +228,7 @@ def _ground(name: str, both_ways: bool, to_ground: bool) -> _Linearisation:
     radius = float(car.parameters.wheel.rolling_radius_m)
     logs = [_log(name, driven, disc_k, direction, to_ground) for direction in ((1, -1) if both_ways else (1,))]
     world = nominal(car)
-    rig = Simulator(prepare(logs, radius), car).denoised(world)
-    rig.cache_baseline(world)
+    rig = Simulator(prepare(logs, radius), car).prepared(world).with_baseline(world)
     frame, base = _settled(SampleMasks.of(rig.dataset)), rig.run(world)
     residual = tracks_of(rig.residual(world), frame, radius)
     return _Linearisation(rig, frame, first_guess(residual, frame), world, base)

@@ -4,18 +4,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from hil.diagnosis.compiled import compiled
 from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Recording
-from hil.diagnosis.data.interpolation import cubic, shifted_linear, upsampled
+from hil.diagnosis.data.interpolation import cubic, shifted, shifted_linear, upsampled
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.data.prepare import averaged
-from hil.diagnosis.simulation.latency import delayed
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.sensors import after_sensors
 from plant.effects.sensing.chain import Chain
 from plant.parameters.plant import PlantParameters
-from plant.vectors import INPUT
+from plant.vectors import INPUT, P
 
 _WHEELS = ("fl", "fr", "rl", "rr")
 SOURCE = {
@@ -35,9 +35,14 @@ _LATE = {"ax": (0,), "ay": (0,), "yaw": (0, 5), "pressure": (1,)}
 _MOTOR = 2
 _USUAL_RADIUS_M = 0.3
 _TOOTH_ROWS, _TURNS_RAD_S = 2.0, 0.1
+_FADING_MPS, _LEAST_NM = 0.3, 1.0
+_TURNS_MPS2, _CHARACTERISTIC_MPS = 0.3, (8.0, 200.0)
 _FINER = 4
 """Points a row between which a motor's torque goes straight: as it lags it is bent, and a straight line from row to row
 would come 1.3 ms late."""
+
+_MEASURED = (("pressure_pa", 1), ("motor_torque_nm", 2), ("motor_torque_bend_nm", 2))
+_STEERING = INPUT.slice("steering_wheel_rad")
 
 
 @dataclass(frozen=True)
@@ -147,3 +152,76 @@ def toothed(omega: Floats, window_rows2: float, half_pitch: float, share: float,
         for k in range(omega.shape[1]):
             rows = min(half_pitch / max(abs(omega[t, k]), _TURNS_RAD_S), _TOOTH_ROWS)
             out[t, k] = cubic(mean, k, t - share * rows)
+
+
+def delayed(values: Floats, rows: float, straight: bool = False) -> Floats:
+    """Channels as seen some rows later.
+
+    ``straight`` lines between rows for what has corners, as a motor at its rate limit; else `hil.diagnosis.data.interpolation`.
+    """
+    out = np.empty(values.shape)
+    if straight:
+        shifted_linear(values, 1, rows, out)
+    else:
+        shifted(values, rows, out)
+    return out
+
+
+def _held_later(values: Floats, rows: float) -> Floats:
+    """Held values that change a fraction of a row later (earlier where negative), as the mean over each row."""
+    change = np.diff(values, axis=0)
+    moved = values.copy()
+    if rows >= 0.0:
+        moved[1:] -= min(rows, 1.0) * change
+    else:
+        moved[:-1] += min(-rows, 1.0) * change
+    return moved
+
+
+def without_latency(inputs: Floats, late_s: tuple[float, ...]) -> Floats:
+    """Measured inputs with their nodes' latency taken back, demands when they are acted on."""
+    if not any(late_s[1:5]):
+        return inputs
+    moved = inputs.copy()
+    moved[:, _STEERING] = delayed(inputs[:, _STEERING], late_s[4] / ROW_S)
+    for part in ("pressure_demand_pa", "motor_demand_nm"):
+        where = INPUT.slice(part)
+        moved[:, where] = _held_later(inputs[:, where], late_s[3] / ROW_S)
+    for part, late in _MEASURED:
+        where = INPUT.slice(part)
+        moved[:, where] = delayed(inputs[:, where], -late_s[late] / ROW_S, straight=True)
+    return moved
+
+
+def without_fading_motors(recording: Recording, parameters: ParameterSet) -> Stack:
+    """Measured channels without motors whose braking fades: there it answers errors of speed no sensor resolves.
+
+    Which way a wheel at rest creeps is such an error, too: there any torque may be taken for one that brakes.
+    """
+    if not {"motor", "wheel"} <= set(recording.measured):
+        return recording.measured
+    speed = np.nan_to_num(recording.measured["wheel"]) * float(parameters.p[P.wheel_rolling_radius_m])
+    demand = averaged(recording.inputs[:, INPUT.slice("motor_demand_nm")], recording.stride)
+    brakes = (speed < float(parameters.p[P.motor_fade_start_mps]) + _FADING_MPS) & (demand < -_LEAST_NM)
+    fades = brakes | ((np.abs(speed) < _FADING_MPS) & (np.abs(demand) > _LEAST_NM))
+    return {**recording.measured, "motor": np.where(fades, np.nan, recording.measured["motor"])}
+
+
+def characteristic_speed(one: Stack, other: Stack, parameters: ParameterSet) -> float:
+    """Characteristic speed of `powers`, m/s: how lateral acceleration goes with a small difference of the speed.
+
+    ``one`` and ``other`` are plant columns of the same car at speeds a little apart; infinite where it does not turn.
+    """
+    wheel = one["wheel"].mean(axis=1)
+    v = wheel * float(parameters.p[P.wheel_rolling_radius_m])
+    turning = (np.abs(one["ay"][:, 0]) > _TURNS_MPS2) & (v > SLOW_MPS)
+    ay, v, faster = one["ay"][turning, 0], v[turning], (other["wheel"] - one["wheel"]).mean(axis=1)[turning]
+    if not len(ay):
+        return np.inf
+    share = faster / wheel[turning]
+
+    def misfit(log_speed: float) -> float:
+        predicted = ay * share * powers(v, np.exp(log_speed))[0]
+        return float(np.sum(((other["ay"] - one["ay"])[turning, 0] - predicted) ** 2))
+
+    return float(np.exp(minimize_scalar(misfit, bounds=np.log(_CHARACTERISTIC_MPS), method="bounded").x))
