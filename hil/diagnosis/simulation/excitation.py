@@ -36,8 +36,8 @@ _LEAST_PA, _LEAST_NM, _LEAST_MPS2, _LEAST_MPS = 5e4, 8.0, 0.3, 0.3
 """A segment that stays below has no excitation of brakes (Pa), motors (N m), turning (m/s^2) or motion (m/s): what they
 change there is below noise. A standing car that no motor pulls shows nothing of tyres, wheels, springs and masses."""
 _SECTIONS = {
-    "ehb_": Excitation.BRAKES, "friction_brake_": Excitation.BRAKES, "pad_": Excitation.BRAKES, "motor_": Excitation.MOTORS,
-    "battery_": Excitation.MOTORS,
+    "ehb_": Excitation.BRAKES, "friction_brake_": Excitation.BRAKES, "pad_": Excitation.BRAKES,
+    "motor_": Excitation.MOTORS, "battery_": Excitation.MOTORS,
 }  # fmt: skip
 _LATERAL = (
     "tyre_lky", "tyre_lmuy", "vehicle_steering_ratio", "vehicle_yaw_inertia_kg_m2", "suspension_anti_roll_nm_rad",

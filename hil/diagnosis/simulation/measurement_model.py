@@ -1,4 +1,8 @@
-"""What sensors, frames and the tables of logs tell of a replay: channels as a log has them."""
+"""Measurement model: from plant states to channels as logged, by sensors, latency, toothed wheels and sampling.
+
+Takes columns of the plant, (rows, columns), and a parameter set; gives `Stack`, channels by group. Latencies of
+measured inputs are taken back here too (`without_latency`).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,19 +31,19 @@ SOURCE = {
     "yaw": ["state.imu_yaw_rate_rad_s"],
     "gps": ["state.speed_mps"],
 }
-"""Columns of the plant that each group of channels tells of."""
+"""Columns of the plant that each group of channels measures."""
 Stack = dict[str, Floats]
-"""Channels by group, (samples of all drives, channels)."""
+"""Channels by group, (samples of all recordings, channels)."""
 _LATE = {"ax": (0,), "ay": (0,), "yaw": (0, 5), "pressure": (1,)}
-"""Which latencies of a world each group has."""
+"""Latencies of a parameter set that each group has."""
 _MOTOR = 2
 _USUAL_RADIUS_M = 0.3
 _TOOTH_ROWS, _TURNS_RAD_S = 2.0, 0.1
 _FADING_MPS, _LEAST_NM = 0.3, 1.0
 _TURNS_MPS2, _CHARACTERISTIC_MPS = 0.3, (8.0, 200.0)
 _FINER = 4
-"""Points a row between which a motor's torque goes straight: as it lags it is bent, and a straight line from row to row
-would come 1.3 ms late."""
+"""Points per row between which a motor's torque is linear: its lag bends it, and a straight line from row to row would
+come 1.3 ms late."""
 
 _MEASURED = (("pressure_pa", 1), ("motor_torque_nm", 2), ("motor_torque_bend_nm", 2))
 _STEERING = INPUT.slice("steering_wheel_rad")
@@ -47,7 +51,13 @@ _STEERING = INPUT.slice("steering_wheel_rad")
 
 @dataclass(frozen=True)
 class MeasurementModel:
-    """Channels of a case: which ``groups`` there are, the car's teeth and radius, the speed its turning goes with."""
+    """Channels of a dataset.
+
+    Attributes
+    ----------
+    groups : of channels.  parameters : the nominal vehicle's (teeth, radius).
+    characteristic_mps : of the car's turning (`powers`), m/s.
+    """
 
     groups: Sequence[str]
     parameters: PlantParameters
@@ -63,42 +73,42 @@ class MeasurementModel:
             at += width
         return stack
 
-    def measure(self, drive: Recording, world: ParameterSet, table: Floats) -> Stack:
-        """Channels as sensors, frames and the tables of logs give what was noted."""
-        stack = self.measure_rows(self.split(table), drive, world)
-        found = {group: averaged(values, drive.stride) for group, values in stack.items()}
-        if "wheel" in found:
-            self._at_measured_speed(found, drive)
-        return found
+    def measure(self, recording: Recording, parameters: ParameterSet, table: Floats) -> Stack:
+        """Channels by sample, (samples, channels), from columns of the plant, (rows, columns)."""
+        stack = self.measure_rows(self.split(table), recording, parameters)
+        channels = {group: averaged(values, recording.stride) for group, values in stack.items()}
+        if "wheel" in channels:
+            self._at_measured_speed(channels, recording)
+        return channels
 
-    def measure_rows(self, happened: Stack, drive: Recording, world: ParameterSet) -> Stack:
-        """Channels as sensors and frames give what happened, row by row."""
-        chain = Chain(world.theta_in(drive))
-        others = {group: values for group, values in happened.items() if group != "motor"}
+    def measure_rows(self, true: Stack, recording: Recording, parameters: ParameterSet) -> Stack:
+        """Channels row by row, as sensors and frames give the ``true`` ones."""
+        chain = Chain(parameters.theta_in(recording))
+        others = {group: values for group, values in true.items() if group != "motor"}
         stack = after_sensors(others, chain, ROW_S) if others else {}
         for group, values in stack.items():
-            late = sum(world.latency_s[k] for k in _LATE.get(group, ()))
+            late = sum(parameters.latency_s[k] for k in _LATE.get(group, ()))
             if late:
                 stack[group] = delayed(values, late / ROW_S, straight=group == "pressure")
             elif group == "wheel":
                 half_turned = np.pi / self.parameters.sensor.teeth / ROW_S
                 stack[group] = np.empty_like(values)
-                toothed(values, world.window_rows2, half_turned, world.tooth_share, stack[group])
-        if "motor" in happened:
-            fine = _finer(happened["motor"], drive.inputs[:, INPUT.slice("motor_torque_bend_nm")])
+                toothed(values, parameters.window_rows2, half_turned, parameters.tooth_share, stack[group])
+        if "motor" in true:
+            fine = _finer(true["motor"], recording.inputs[:, INPUT.slice("motor_torque_bend_nm")])
             fine = after_sensors({"motor": fine}, chain, ROW_S / _FINER)["motor"]
-            stack["motor"] = np.empty_like(happened["motor"])
-            shifted_linear(fine, _FINER, _FINER * world.latency_s[_MOTOR] / ROW_S, stack["motor"])
+            stack["motor"] = np.empty_like(true["motor"])
+            shifted_linear(fine, _FINER, _FINER * parameters.latency_s[_MOTOR] / ROW_S, stack["motor"])
         return stack
 
-    def _at_measured_speed(self, found: Stack, drive: Recording) -> None:
-        """The turning of the car as it is at the measured speed."""
-        factors = np.empty((2, len(found["wheel"])))
+    def _at_measured_speed(self, channels: Stack, recording: Recording) -> None:
+        """Turn the car, in place, as at the measured speed."""
+        factors = np.empty((2, len(channels["wheel"])))
         radius_m = self.parameters.wheel.rolling_radius_m
-        faster_turning(drive.measured["wheel"], found["wheel"], radius_m, self.characteristic_mps, factors)
+        faster_turning(recording.measured["wheel"], channels["wheel"], radius_m, self.characteristic_mps, factors)
         for group, factor in zip(("ay", "yaw"), factors, strict=True):
-            if group in found:
-                found[group] *= factor[:, None]
+            if group in channels:
+                channels[group] *= factor[:, None]
 
 
 @compiled
@@ -114,14 +124,14 @@ def powers(speed_mps: Floats, characteristic_mps: float) -> tuple[Floats, Floats
 
 @compiled
 def faster_turning(measured: Floats, omega: Floats, radius_m: float, characteristic_mps: float, out: Floats) -> None:
-    """Factors of lateral acceleration and yaw rate, (2, samples), that take a car to the speed its wheels are measured
-    at, into ``out``; both speeds are (samples, wheels)."""
+    """Factors of lateral acceleration and yaw rate, (2, samples), from the simulated to the measured speed, into
+    ``out``; both speeds are (samples, wheels), rad/s."""
     wheels = omega.shape[1]
     for t in range(omega.shape[0]):
         faster, mean = 0.0, 0.0
         for k in range(wheels):
-            apart = measured[t, k] - omega[t, k]
-            faster += apart / wheels if apart == apart else 0.0
+            difference = measured[t, k] - omega[t, k]
+            faster += difference / wheels if difference == difference else 0.0
             mean += omega[t, k] / wheels
         turning = np.copysign(max(abs(mean), SLOW_MPS / _USUAL_RADIUS_M), mean)
         share = min(max(faster / turning, -0.2), 0.2)
@@ -131,7 +141,7 @@ def faster_turning(measured: Floats, omega: Floats, radius_m: float, characteris
 
 
 def _finer(torque_nm: Floats, bend_nm: Floats) -> Floats:
-    """Torque on rows and between them: a parabola that is off the straight line by ``bend_nm`` in the middle."""
+    """Torque at `_FINER` points per row: parabolas that are off the straight line by ``bend_nm`` in the middle."""
     out = np.empty((len(torque_nm) * _FINER, torque_nm.shape[1]))
     upsampled(torque_nm, bend_nm, out)
     return out
@@ -139,7 +149,7 @@ def _finer(torque_nm: Floats, bend_nm: Floats) -> Floats:
 
 @compiled
 def toothed(omega: Floats, window_rows2: float, half_pitch: float, share: float, out: Floats) -> None:
-    """Speeds (rows, wheels) as toothed wheels tell them, when a tooth has passed, into ``out``.
+    """Speeds (rows, wheels) as toothed wheels measure them, when a tooth has passed, into ``out``.
 
     ``half_pitch`` is half the angle between two teeth, rad rows/s: a speed comes later by a ``share`` of the time that
     takes, two rows at most. It is a mean over a window of squared width ``window_rows2``, by its second derivative.
@@ -155,9 +165,10 @@ def toothed(omega: Floats, window_rows2: float, half_pitch: float, share: float,
 
 
 def delayed(values: Floats, rows: float, straight: bool = False) -> Floats:
-    """Channels as seen some rows later.
+    """Channels some rows later.
 
-    ``straight`` lines between rows for what has corners, as a motor at its rate limit; else `hil.diagnosis.data.interpolation`.
+    ``straight`` lines between rows for what has corners, as a motor at its rate limit; else parabolas
+    (`hil.diagnosis.data.interpolation`).
     """
     out = np.empty(values.shape)
     if straight:
@@ -179,7 +190,7 @@ def _held_later(values: Floats, rows: float) -> Floats:
 
 
 def without_latency(inputs: Floats, late_s: tuple[float, ...]) -> Floats:
-    """Measured inputs with their nodes' latency taken back, demands when they are acted on."""
+    """Measured inputs, (rows, INPUT.size), with their nodes' latency (s) taken back; demands when they are acted on."""
     if not any(late_s[1:5]):
         return inputs
     moved = inputs.copy()

@@ -1,7 +1,6 @@
-"""Open-loop simulation of a dataset: the recordings' inputs drive the plant for any parameter set, segment by segment."""
+"""Open-loop simulation of a dataset: its inputs drive the plant for any parameter set, segment by segment."""
 
-import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -17,12 +16,11 @@ from hil.diagnosis.simulation.hot_spots import (
     QUARTER_RAD,
     fit_phase,
     has_hot_spots,
-    row_chunks,
     wheel_angles,
     with_spots,
     without_spots,
 )
-from hil.diagnosis.simulation.initial_state import initial_state_of, restart_segment, start_speed
+from hil.diagnosis.simulation.initial_state import initial_state_of
 from hil.diagnosis.simulation.measurement_model import (
     SOURCE,
     MeasurementModel,
@@ -32,42 +30,17 @@ from hil.diagnosis.simulation.measurement_model import (
     without_latency,
 )
 from hil.diagnosis.simulation.parameter_set import ParameterSet, excitation_that_separates, same_sensors
+from hil.diagnosis.simulation.replay import Replay, motor_bend, replayed
 from hil.diagnosis.simulation.sensors import before_sensors
-from hil.diagnosis.simulation.substeps import STEPS, rows_per_step
+from hil.diagnosis.simulation.substeps import rows_per_step
 from hil.diagnosis.vehicle.spec import Vehicle
-from plant.effects.plugin import NO_PLUGINS
-from plant.effects.states import EXTRA_STATES
 from plant.effects.theta import THETA
-from plant.integrate import EXPONENTIAL
-from plant.model import column_indices, healthy, simulate
-from plant.road import DRY, road_table
-from plant.vectors import INPUT, OUTPUT, STATE, U
+from plant.model import column_indices
+from plant.vectors import INPUT
 
-_SLOW = np.concatenate(
-    [
-        np.arange(STATE.size)[STATE.slice(name)]
-        for name in (
-            "winding_temperature_k", "pad_friction", "pad_temperature_k", "disc_temperature_k", "state_of_charge",
-            *EXTRA_STATES,
-        )
-    ]
-)  # fmt: skip
-"""States beside the motion that go on from segment to segment."""
-_ANGLES = STATE.slice("wheel_angle_rad")
 _INPUTS = (("pressure", "pressure_pa"), ("motor", "motor_torque_nm"))
 _SMOOTH = 21  # rows of 10 ms
 _GRADE = 0.01
-_ROAD = road_table(DRY)
-
-
-@dataclass(frozen=True, eq=False)
-class _Replay:
-    """One recording simulated: inputs (rows, INPUT.size), columns noted (rows, columns), the states at the start and
-    after each segment."""
-
-    inputs: Floats
-    table: Floats
-    states: tuple[Floats, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +48,7 @@ class _Baseline:
     """Replays and channels of one parameter set, by recording: others are simulated only where they can differ."""
 
     parameters: ParameterSet
-    replays: tuple[_Replay, ...]
+    replays: tuple[Replay, ...]
     channels: tuple[Stack, ...]
 
 
@@ -109,23 +82,12 @@ def _true_inputs(inputs: Floats, recording: Recording, parameters: ParameterSet)
     return without_latency(before_sensors(inputs, parameters.theta_in(recording), ROW_S), parameters.latency_s)
 
 
-def _with_theta(parts: Iterable[slice], thetas: Sequence[tuple[int, Floats]]) -> Iterator[tuple[slice, Floats]]:
-    """Parts of a recording's rows, cut where another theta begins, and theta in each."""
-    ends = [row for row, _ in thetas[1:]] + [sys.maxsize]
-    for part in parts:
-        for (begin, theta), end in zip(thetas, ends, strict=True):
-            first, last = max(part.start, begin), min(part.stop, end)
-            if first < last:
-                yield slice(first, last), theta
-
-
 @dataclass(frozen=True, eq=False)
 class Simulator:
     """Simulates parameter sets over the recordings of a dataset. A value: what changes it returns another one.
 
-    `denoised` and `with_baseline` say at which parameter set inputs are denoised, and from which one others are
-    simulated. Neither changes what a simulator means, but both change its accuracy: without a baseline every segment
-    is simulated.
+    `denoised` takes noise out of the inputs, at one parameter set. `with_baseline` simulates one, and from then on only
+    the segments in which others can differ from it; without a baseline every segment is simulated.
 
     Limits of motors and turning are those at the measured wheel speed: a motor at its limits and a car in a bend answer
     every error of the speed, whatever made it.
@@ -191,7 +153,7 @@ class Simulator:
     def with_baseline(self, at: ParameterSet) -> "Simulator":
         """With this parameter set simulated once: others are simulated only where they can differ from it."""
 
-        def simulated(recording: Recording) -> tuple[_Replay, Stack]:
+        def simulated(recording: Recording) -> tuple[Replay, Stack]:
             replay = self._replay(recording, at, self._columns)
             return replay, self.measurement_model.measure(recording, at, replay.table)
 
@@ -233,7 +195,8 @@ class Simulator:
             window = min(_SMOOTH, (len(difference) - 1) // 2 * 2 + 1)
             inputs[:, where] = simulated[group] + savgol_filter(difference, window, 2, axis=0)
         if "motor" in groups:
-            inputs[:, INPUT.slice("motor_torque_bend_nm")] = self._bend(recording, at)
+            x, mask = initial_state_of(self.vehicle, recording, at, measured), self.dataset.measured_input_mask
+            inputs[:, INPUT.slice("motor_torque_bend_nm")] = motor_bend(x, recording, at, mask)
         again = measured.copy()
         recording = replace(recording, inputs=inputs)
         sensed = self.measurement_model.measure_rows(
@@ -251,22 +214,6 @@ class Simulator:
             return recording.inputs
         sensed, back = self._denoised.inputs[recording.number]
         return np.asarray(recording.inputs + (_true_inputs(sensed, recording, parameters) - back))
-
-    def _bend(self, recording: Recording, at: ParameterSet) -> Floats:
-        """Torque of the simulated motors in the middle of each row, beyond the straight line to the next, (rows, 4)."""
-        inputs = recording.inputs
-        halves = np.repeat(inputs, 2, axis=0)
-        halves[1:-1:2, U.steering_wheel_rad :] += 0.5 * np.diff(inputs[:, U.steering_wheel_rad :], axis=0)
-        columns = column_indices(SOURCE["motor"])
-        table = np.empty((len(halves), len(columns)))
-        simulate(
-            initial_state_of(self.vehicle, recording, at, inputs), halves, self.dataset.measured_input_mask, healthy(),
-            at.p, _ROAD, ROW_S / 2, 1, np.ones(len(halves), np.int64), EXPONENTIAL, columns, table, OUTPUT.zeros(),
-            at.theta_in(recording), at.nonparametric_rows, NO_PLUGINS,
-        )  # fmt: skip
-        torque, middle = table[::2], table[1::2]
-        following = np.concatenate((torque[1:], torque[-1:]))
-        return middle - 0.5 * (torque + following)
 
     def _characteristic(self, at: ParameterSet) -> float:
         """Characteristic speed of the simulated car, m/s (`characteristic_speed`), from two replays: on the road as it
@@ -327,37 +274,13 @@ class Simulator:
 
     def _replay(
         self, recording: Recording, parameters: ParameterSet, columns: NDArray[np.int64],
-        baseline: _Replay | None = None, differs: Sequence[bool] = (), alike: bool = False,
-    ) -> _Replay:  # fmt: skip
-        """One recording, with ``columns`` of the plant noted at every row.
-
-        Segments that do not differ are taken from the ``baseline``; slow states go on from where they were. Inputs are
-        those of the ``baseline`` where sensors and frames are ``alike``.
-        """
-        thetas, setup = parameters.thetas_in(recording), self._setups[recording.number]
+        baseline: Replay | None = None, differs: Sequence[bool] = (), alike: bool = False,
+    ) -> Replay:  # fmt: skip
+        """One recording, with ``columns`` of the plant noted at every row; inputs are those of the ``baseline`` where
+        sensors and frames are ``alike``."""
         inputs = baseline.inputs if baseline is not None and alike else self._inputs(recording, parameters)
-        x = initial_state_of(self.vehicle, recording, parameters, inputs)
-        table = np.empty((len(inputs), len(columns)))
-        mask, switch, y, pace = self.dataset.measured_input_mask, healthy(), OUTPUT.zeros(), setup.rows_per_step
-        states = [x.copy()]
+        pace = self._setups[recording.number].rows_per_step
         angles = self.hot_spot_angles[recording.number] if self.hot_spot_angles and has_hot_spots(parameters) else None
-        for number, segment in enumerate(recording.segments):
-            rows = slice(segment.first, segment.last)
-            if baseline is not None and not differs[number]:
-                table[rows] = baseline.table[rows]
-                ahead = x[_SLOW] - baseline.states[number][_SLOW]
-                x = baseline.states[number + 1].copy()
-                x[_SLOW] += ahead
-                continue
-            if number:
-                restart_segment(x, start_speed(recording, segment, parameters))
-            for part, theta in _with_theta([rows] if angles is None else row_chunks(rows), thetas):
-                if angles is not None:
-                    x[_ANGLES] = angles[part.start]
-                given = inputs[part.start : min(part.stop + 1, rows.stop)]
-                simulate(
-                    x, given, mask, switch, parameters.p, _ROAD, ROW_S / STEPS, STEPS, pace[part], EXPONENTIAL,
-                    columns, table[part], y, theta, parameters.nonparametric_rows, NO_PLUGINS,
-                )  # fmt: skip
-            states.append(x.copy())
-        return _Replay(inputs, table, tuple(states))
+        x = initial_state_of(self.vehicle, recording, parameters, inputs)
+        mask = self.dataset.measured_input_mask
+        return replayed(x, recording, parameters, inputs, mask, pace, columns, angles, baseline, differs)

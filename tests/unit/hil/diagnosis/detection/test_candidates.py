@@ -21,7 +21,7 @@ def _alike(log, one: str, other: str) -> float:
     """Cosine of two signatures in the acceleration, where that is compared."""
     vehicle = load_vehicle(VEHICLE)
     case = prepare([log], 0.318)
-    rig, frame, base = Simulator(case, vehicle).denoised(nominal(vehicle)), SampleMasks.of(case), nominal(vehicle)
+    rig, frame, base = Simulator(case, vehicle).prepared(nominal(vehicle)), SampleMasks.of(case), nominal(vehicle)
     listed = {candidate.name: candidate for candidate in CandidateSet(rig, frame, ()).candidates}
     shown = []
     for name in (one, other):

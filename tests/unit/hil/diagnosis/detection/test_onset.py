@@ -103,6 +103,6 @@ def test_what_was_taken_to_begin_and_was_always_there_has_no_beginning(always):
     fresh = fitter()
     noise = fresh.alternate_noise_and_fit(fresh.at(as_handed_in, (there,), fresh.start()[1]), fresh.start()[1], 2)[1]
     taken = fresh.at(as_handed_in, (Term(pads, -0.2, onset=second),), noise)
-    (term,) = estimate_onsets(fresh, taken, noise).terms
+    (term,) = estimate_onsets(fresh, taken, noise)[0].terms
     assert (term.onset is None) is always
     assert term.value == pytest.approx(-0.2, abs=0.02)

@@ -81,13 +81,13 @@ def test_what_acts_alike_needs_no_fit_once_its_value_is_found(driven):
 def _singles(driven: _Driven, names: Sequence[str], values: Sequence[float]) -> list[FittedHypothesis]:
     """Single causes that would take the place of these."""
     model = driven.fitted(names, values, 8)
-    driven.field.linearise_at(driven.fitter, driven.bare)
+    driven.field.linearise_at(driven.fitter.at_baseline(driven.bare), driven.bare)
     accepted = [[driven.contender(replace(model, terms=model.terms[:k]), driven.noise)] for k in (1, 2)]
     found = Diagnosis(
         driven.case, driven.vehicle, driven.fitter, driven.noise, driven.noise, driven.bare, driven.bare, model,
         hypotheses=accepted,
     )  # fmt: skip
-    return try_single_cause(driven.fitter, driven.field, found, model, driven.noise)
+    return try_single_cause(driven.fitter, driven.field, found, model, driven.noise)[0]
 
 
 @pytest.mark.slow

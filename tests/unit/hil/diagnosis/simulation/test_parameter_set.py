@@ -27,7 +27,7 @@ def test_every_number_of_the_vehicle_moves_without_a_corner(vehicle):
     base = nominal(vehicle)
     for nuisance in vehicle.nuisances:
         for at, step in zip(nuisance.at, nuisance.step, strict=True):
-            worlds = [base.with_nuisances([nuisance], np.array([z])) for z in nuisance.farthest * STEPS]
+            worlds = [base.with_nuisances([nuisance], np.array([z])) for z in nuisance.bound * STEPS]
             told = nuisance.kind in ("sensor", "scatter", "line")
             values = np.array([(world.theta if told else world.p)[at] for world in worlds])
             moved = np.diff(values) * np.sign(step)
