@@ -1,6 +1,10 @@
-"""Independent work items over the free threads."""
+"""Threads of the diagnosis: independent work items. No other module of it starts threads.
 
-from collections.abc import Callable, Iterable, Sequence
+`parallel_map` shares one pool and never nests; `thread_map` and `thread_each` open a pool of their own for long work,
+and may hold a `parallel_map` within.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from threading import Semaphore
@@ -34,5 +38,10 @@ def parallel_map(function: Callable[[Item], Result], items: Sequence[Item]) -> l
 
 def thread_map(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
     """``function`` of each item, in order, on one thread a processor."""
+    return list(thread_each(function, items))
+
+
+def thread_each(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+    """As `thread_map`, one result after the other: those already taken need no memory."""
     with ThreadPoolExecutor(WORKERS) as pool:
-        return list(pool.map(function, items))
+        yield from pool.map(function, items)

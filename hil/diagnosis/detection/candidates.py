@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 
 from hil.diagnosis.data.axle_torques import undriven
-from hil.diagnosis.detection.profile_fit import CandidateFits
 from hil.diagnosis.detection.score_test import (
     OnsetTime,
     ScoreTest,
@@ -35,6 +34,7 @@ from hil.diagnosis.estimation.information import (
 )
 from hil.diagnosis.estimation.terms import Candidate, candidates, columns
 from hil.diagnosis.noise.model import Noise, SampleMasks
+from hil.diagnosis.parallel import thread_map
 from hil.diagnosis.simulation.hot_spots import phase_penalty
 from hil.diagnosis.simulation.simulator import Simulator
 
@@ -51,27 +51,19 @@ class CandidateSet:
     def __init__(
         self, simulator: Simulator, masks: SampleMasks, undiagnosable: Sequence[str], unexcited: Sequence[str] = ()
     ) -> None:
-        self._simulator, self._masks = simulator, masks
+        self._masks, self._starts = masks, segment_starts(simulator.dataset)
         self._columns = columns(undiagnosable)
         without = undriven(recording.log for recording in simulator.dataset.recordings)
         listed = candidates(self._columns, without, simulator.vehicle.suspension_stated, unexcited)
-        self.candidates = [self._with_penalty(one) for one in listed]
+        self.candidates = [_with_penalty(one, simulator) for one in listed]
         self.jacobian: Tracks = {}
 
-    def _with_penalty(self, candidate: Candidate) -> Candidate:
-        """The data chose the phase angles of hot spots."""
-        if candidate.effect.name != "hot_spot":
-            return candidate
-        penalty = phase_penalty(self._simulator.hot_spot_visibility, candidate.members())
-        return replace(candidate, selection_penalty=penalty)
-
     def linearise_at(self, fitter: Fitter, model: Model) -> None:
-        """Renew the Jacobian at a model."""
+        """Renew the Jacobian at a model, from the fitter's baseline."""
         base = fitter.parameter_set(model.z, model.terms)
-        self._simulator.cache_baseline(base)
         stepped = [column.stepped(base) for column in self._columns]
         steps = [column.step for column in self._columns]
-        self.jacobian = finite_difference_jacobian(self._simulator, self._masks, model.channels, stepped, steps)
+        self.jacobian = finite_difference_jacobian(fitter.simulator, self._masks, model.channels, stepped, steps)
 
     def at(self, fitter: Fitter, model: Model) -> "CandidateSet":
         """The same candidates with the Jacobian at another model."""
@@ -87,9 +79,8 @@ class CandidateSet:
         tests = scores(
             self.candidates, marginal, accepted, [values.get(id(candidate), 0.0) for candidate in self.candidates]
         )
-        self._simulator.cache_baseline(fitter.parameter_set(model.z, model.terms))
         behind_limits = [item for item in tests if has_zero_gradient(item)]
-        searched = CandidateFits.at_once(lambda item: line_search(fitter, model, noise, item), behind_limits)
+        searched = thread_map(lambda item: line_search(fitter, model, noise, item), behind_limits)
         by_search = dict(zip(map(id, behind_limits), searched, strict=True))
         return [by_search.get(id(item), item) for item in tests]
 
@@ -100,7 +91,7 @@ class CandidateSet:
 
         Where the nuisance parameters may be ``biased``, so is the order of locations, and all locations take part.
         """
-        fixed, starts = fitter.at_bounds(model.z), segment_starts(self._simulator.dataset)
+        fixed, starts = fitter.at_bounds(model.z), self._starts
         tests = scan_onset_by_segment(
             tests, blocks, len(model.terms), model.z, fixed, starts, onset_penalty(self._masks)
         )
@@ -125,7 +116,7 @@ class CandidateSet:
         blocks, accepted = fitter.information_blocks(model, self.jacobian, noise), len(model.terms)
         columns = [[accepted + k for k in candidate.columns] for candidate in self.candidates]
         b, q = marginalise_from_onset(blocks, columns, range(accepted), model.z, fitter.at_bounds(model.z))
-        starts = segment_starts(self._simulator.dataset)
+        starts = self._starts
         first = max(k for k, start in enumerate(starts) if start <= onset)
         tests = []
         for k, candidate in enumerate(self.candidates):
@@ -133,6 +124,13 @@ class CandidateSet:
             both = [score(candidate, float(b[segment, k]), float(q[segment, k])) for segment in segments]
             tests.append(max(both, key=lambda item: item.log_bayes_factor))
         return tests
+
+
+def _with_penalty(candidate: Candidate, simulator: Simulator) -> Candidate:
+    """The data chose the phase angles of hot spots."""
+    if candidate.effect.name != "hot_spot":
+        return candidate
+    return replace(candidate, selection_penalty=phase_penalty(simulator.hot_spot_visibility, candidate.members()))
 
 
 def unexcited_sensors(channels: Tracks, noise: Noise) -> list[str]:

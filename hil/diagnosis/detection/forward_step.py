@@ -133,8 +133,16 @@ class ForwardStep:
     ) -> None:
         self._state, self._nuisance_fit, self._nominal_fitter = state, nuisance_fit, nominal_fitter
         self._settings, self._progress = settings, progress
-        self._fitter = nuisance_fit.fitter
         self._biased = self._nuisances_may_be_biased()
+
+    @property
+    def _fitter(self) -> Fitter:
+        """With the last Jacobian of the nuisance parameters, and the simulator of the fits to come."""
+        return self._nuisance_fit.fitter
+
+    @_fitter.setter
+    def _fitter(self, fitter: Fitter) -> None:
+        self._nuisance_fit.fitter = fitter
 
     def _nuisances_may_be_biased(self) -> bool:
         """Whether a cause may have biased the nuisance parameters of a model without any."""
@@ -147,7 +155,7 @@ class ForwardStep:
         step = self._fit_candidates()
         if isinstance(step, Restarted):
             return step
-        best = self._state.nonparametric.best(self._fitter, step, self._refit_from_nominal)
+        best, self._fitter = self._state.nonparametric.best(self._fitter, step, self._refit_from_nominal)
         if best is not None:
             model, noise = self._fitter.alternate_noise_and_fit(best.model, best.noise, 1)
             return _added(step, best, model, noise, step.significant)
@@ -167,14 +175,15 @@ class ForwardStep:
         model, effective_parameters = state.model, state.screening.effective_parameters
         allowance = FormErrorAllowance(state.explained, self._fitter, model, state.noise, state.candidates.jacobian)
         fits, tests, fitted, threshold = self._fit_shortlist(allowance)
-        discrepancy = LocalDiscrepancy(self._fitter, state.candidates, effective_parameters)
+        discrepancy = LocalDiscrepancy(state.candidates, effective_parameters)
         reference, noise = fits.reference, fits.noise
 
         def with_gains() -> list[FittedHypothesis]:
-            best = min(fitted, key=criterion)
+            best, fitter = min(fitted, key=criterion), self._fitter
+            factors = [discrepancy.factor(fitter, c, best, threshold) for c in fitted]
             return [
-                with_gain(c, reference - allowance.of(c.term.candidate), discrepancy.factor(c, best, threshold))
-                for c in fitted
+                with_gain(c, reference - allowance.of(c.term.candidate), factor)
+                for c, factor in zip(fitted, factors, strict=True)
             ]
 
         if fitted and self._settings.relinearise:
@@ -185,11 +194,11 @@ class ForwardStep:
                 if not state.restarted and improvement > max(threshold.gain, RESTART_SHARE * best_gain):
                     return Restarted(bare, bare_noise, threshold)
                 reference = min(reference, bare.cost)
-            fitted = estimate_onsets_of_best(self._fitter, fitted)
-            fitted = add_same_onset_alternatives(self._fitter, state.candidates, model, fitted)
+            fitted, self._fitter = estimate_onsets_of_best(self._fitter, fitted)
+            fitted, self._fitter = add_same_onset_alternatives(self._fitter, state.candidates, model, fitted)
             threshold = self._lowered_at_fit(threshold, state.candidates, fitted)
         elif fitted:
-            fitted = estimate_onsets_of_best(self._fitter, fitted)
+            fitted, self._fitter = estimate_onsets_of_best(self._fitter, fitted)
         if fitted:
             noise = min(fitted, key=criterion).noise
             reference = min(reference, self._fitter.fit(model, noise, 3).cost)
@@ -209,6 +218,7 @@ class ForwardStep:
         tests, blocks = screening.scores, screening.information
         if model.terms:
             blocks = self._fitter.information_blocks(model, candidates.jacobian, noise)
+            self._fitter = self._fitter.at_baseline(model)
             tests = candidates.scores(self._fitter, blocks, model, noise)
             threshold = threshold.lowered(inflation_given_best(tests, blocks, self._fitter, model))
         tests = candidates.shortlist(self._fitter, tests, blocks, model, self._biased)
@@ -223,8 +233,10 @@ class ForwardStep:
     ) -> Fitted:
         """The shortlist at the nominal vehicle, where no nuisance parameter has absorbed a cause."""
         self._progress("Jacobian at the nominal vehicle")
-        fitter = self._nominal_fitter
+        fitter = self._nominal_fitter.with_simulator(self._fitter.simulator)
         nominal = fitter.at(np.zeros(len(self._nuisance_fit.nuisances)), (), noise)
+        fitter = fitter.at_baseline(nominal)
+        self._fitter = self._fitter.with_simulator(fitter.simulator)
         candidates = candidates.at(fitter, nominal)
         blocks = fitter.information_blocks(nominal, candidates.jacobian, noise)
         tests = candidates.scores(fitter, blocks, nominal, noise)
@@ -248,19 +260,21 @@ class ForwardStep:
         explained = [max(item.raw_gain, reference - c.cost) for c, item in zip(fitted, tests, strict=True)]
         least = 0.0 if self._biased else NEAR_SHARE * max(explained)
         near = [c for c, gain in zip(fitted, explained, strict=True) if gain >= least]
-        refits, without = self._refit_from_nominal(model, near, refitted, reference, RELINEARISED_RIVALS)
+        (refits, without), self._fitter = self._refit_from_nominal(
+            self._fitter, model, near, refitted, reference, RELINEARISED_RIVALS
+        )
         better = dict(zip(map(id, near), refit_from_best(self._fitter, refits), strict=True))
         return [better.get(id(c), c) for c in fitted], without
 
     def _refit_from_nominal(
-        self, model: Model, fitted: Sequence[FittedHypothesis], refit: RefitHypothesis, reference: float,
-        relinearised: int, rival_criterion: float = np.inf,
-    ) -> Refits:  # fmt: skip
-        """See `hil.diagnosis.detection.restart`; the inputs are denoised by ``model`` again afterwards."""
+        self, fitter: Fitter, model: Model, fitted: Sequence[FittedHypothesis], refit: RefitHypothesis,
+        reference: float, relinearised: int, rival_criterion: float = np.inf,
+    ) -> tuple[Refits, Fitter]:  # fmt: skip
+        """See `hil.diagnosis.detection.restart`; the fitter comes back with inputs denoised by ``model``."""
+        self._fitter = fitter
         self._progress("fitting again from the nominal vehicle")
         refits = refit_from_nominal(self._nuisance_fit, fitted, model, refit, reference, relinearised, rival_criterion)
-        self._fitter.simulator.denoise_inputs(self._fitter.parameter_set(model.z, model.terms))
-        return refits
+        return refits, self._fitter.denoised(model)
 
     def _best_significant(self, step: SelectionStep) -> FittedHypothesis | None:
         """The best significant hypothesis, also given a better one that is not significant."""

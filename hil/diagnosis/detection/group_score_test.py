@@ -15,6 +15,7 @@ from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term, Tracks
 from hil.diagnosis.estimation.information import finite_difference_jacobian, marginalise
 from hil.diagnosis.noise.model import Noise
 from hil.diagnosis.simulation.parameter_set import ParameterSet
+from hil.diagnosis.simulation.simulator import Simulator
 from plant.effects.effect import Scope
 
 _BY_WHEEL, _AXLES = ("friction.mu",), ("front", "rear")
@@ -40,25 +41,24 @@ class GroupScore:
 
 
 class GroupScoreTest:
-    """Group score test of all nonparametric terms at one parameter set; wheel by wheel for the best term."""
+    """Group score test of all nonparametric terms at one parameter set, the fitter's baseline; wheel by wheel for the
+    best term."""
 
     def __init__(self, fitter: Fitter, base: ParameterSet) -> None:
-        self._simulator, self._masks, self._base = fitter.simulator, fitter.masks, base
-        self._simulator.cache_baseline(base)
+        self._masks, self._base = fitter.masks, base
         self._parts = {
             expansion: [expansion.at(location) for location in _parts(expansion)]
             for expansion in basis_expansions(fitter.simulator, base)
         }
-        self._jacobians = self._linearised([part for parts in self._parts.values() for part in parts])
+        parts = [part for parts in self._parts.values() for part in parts]
+        self._jacobians = self._linearised(fitter.simulator, parts)
 
-    def _linearised(self, parts: Sequence[BasisExpansion]) -> dict[tuple[str, str], Tracks]:
+    def _linearised(self, simulator: Simulator, parts: Sequence[BasisExpansion]) -> dict[tuple[str, str], Tracks]:
         """Jacobian of the coefficients of each term and location."""
         functions = [function for part in parts for function in part.functions]
         steps = [_STEP_SHARE * function.term.typical for function in functions]
         stepped = [function.applied(self._base, step) for function, step in zip(functions, steps, strict=True)]
-        whole = finite_difference_jacobian(
-            self._simulator, self._masks, self._simulator.run(self._base), stepped, steps
-        )
+        whole = finite_difference_jacobian(simulator, self._masks, simulator.run(self._base), stepped, steps)
         return {
             (part.term.name, part.location): {
                 name: values[:, BASIS_SIZE * k : BASIS_SIZE * (k + 1)] for name, values in whole.items()
@@ -66,16 +66,17 @@ class GroupScoreTest:
             for k, part in enumerate(parts)
         }
 
-    def scores(self, fitter: Fitter, model: Model, noise: Noise) -> list[GroupScore]:
-        """Every term at every location that the simulated parts add up to, by log Bayes factor, best first."""
+    def scores(self, fitter: Fitter, model: Model, noise: Noise) -> tuple[list[GroupScore], Fitter]:
+        """Every term at every location that the simulated parts add up to, by log Bayes factor, best first; the fitter
+        with the last baseline."""
         ranked = self._ranked(fitter, model, noise)
         leading = next(expansion for expansion in self._parts if expansion.term is ranked[0].expansion.term)
         if len(self._parts[leading]) == len(_AXLES):
             self._parts[leading] = [leading.at(wheel) for wheel in Scope.WHEEL.members]
-            self._simulator.cache_baseline(self._base)
-            self._jacobians |= self._linearised(self._parts[leading])
+            fitter = fitter.with_simulator(fitter.simulator.with_baseline(self._base))
+            self._jacobians |= self._linearised(fitter.simulator, self._parts[leading])
             ranked = self._ranked(fitter, model, noise)
-        return ranked
+        return ranked, fitter
 
     def jacobian(self, entry: GroupScore) -> Tracks:
         """Jacobian of the coefficients of a term at a location, tracks of (samples, BASIS_SIZE)."""

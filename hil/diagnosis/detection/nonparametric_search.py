@@ -28,9 +28,12 @@ from hil.diagnosis.estimation.gauss_newton import Fitter, Model
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation_nonparametric
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.noise.model import Noise
+from hil.diagnosis.parallel import thread_map
 
-RefitFromNominal = Callable[[Model, Sequence[FittedHypothesis], RefitHypothesis, float, int, float], Refits]
-"""`hil.diagnosis.detection.restart.refit_from_nominal` without its first argument, the first two others swapped."""
+RefitFromNominal = Callable[
+    [Fitter, Model, Sequence[FittedHypothesis], RefitHypothesis, float, int, float], tuple[Refits, Fitter]
+]
+"""See `hil.diagnosis.detection.restart`; the fitter comes back with inputs denoised by the model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,17 +97,18 @@ class NonparametricSearch:
 
     def best(
         self, fitter: Fitter, step: SelectionStep, refit_from_nominal: RefitFromNominal
-    ) -> FittedHypothesis | None:
-        """The best term, if it is preferred to the best listed cause and significant.
+    ) -> tuple[FittedHypothesis | None, Fitter]:
+        """The best term, if it is preferred to the best listed cause and significant; the fitter of the last fits.
 
         A listed cause with another value of its shape parameter (`hil.diagnosis.detection.shape`) takes its place where
         the term is not preferred to that.
         """
         model = step.model
         if not self._settings.dictionary or any(isinstance(term.candidate, BasisFunction) for term in model.terms):
-            return None
+            return None, fitter
         if self._test is None:
             self._progress("simulating nonparametric terms")
+            fitter = fitter.at_baseline(model)
             self._test = GroupScoreTest(fitter, fitter.parameter_set(model.z, model.terms))
         attempt = _Attempt(fitter, step, self._test, refit_from_nominal)
         one = attempt.best()
@@ -113,28 +117,34 @@ class NonparametricSearch:
         if attempt.is_preferred(one, least) and self._settings.relinearise and not step.biased:
             (one,) = attempt.refit([attempt.simulated(one)])
         if not attempt.is_preferred(one, least):
-            return None
+            return None, attempt.fitter
+        fitter = attempt.fitter
         fitted = fitter.fit(fitter.at(one.model.z, one.model.terms, one.noise), one.noise, 3)
         one = attempt.hypothesis(one, fitted, one.noise)
         if not attempt.is_preferred(one, least):
-            return None
-        shaped = fit_shape_parameters(step.fits, fitter, self._candidates, one)
+            return None, attempt.fitter
+        shaped, fitter = fit_shape_parameters(step.fits, fitter, self._candidates, one)
+        attempt.fitter = fitter
         if shaped is None or attempt.is_preferred_to(one, shaped, True, least):
-            return one
-        return shaped
+            return one, fitter
+        return shaped, fitter
 
 
 class _Attempt:
-    """Fits of nonparametric terms at one step; ``reference`` is the lowest cost seen without them."""
+    """Fits of nonparametric terms at one step.
+
+    ``reference`` is the lowest cost seen without them, ``fitter`` has the baseline of the last fits.
+    """
 
     def __init__(
         self, fitter: Fitter, step: SelectionStep, test: GroupScoreTest, refit_from_nominal: RefitFromNominal
     ) -> None:
-        self._fitter, self._step, self._test, self._refit_from_nominal = fitter, step, test, refit_from_nominal
+        self._step, self._test, self._refit_from_nominal = step, test, refit_from_nominal
         self.reference = step.reference
-        tops = best_of_each_term(test.scores(fitter, step.model, step.noise), NONPARAMETRIC_WITH_OWN_NOISE)
+        scores, self.fitter = test.scores(fitter, step.model, step.noise)
+        tops = best_of_each_term(scores, NONPARAMETRIC_WITH_OWN_NOISE)
         fits = step.fits
-        models = fits.at_once(lambda entry: fits.linear_prediction(entry.terms, test.jacobian(entry)), tops)
+        models = thread_map(lambda entry: fits.linear_prediction(entry.terms, test.jacobian(entry)), tops)
         self._predicted = [
             fitted_hypothesis(entry, *one, fits.reference) for entry, one in zip(tops, models, strict=True)
         ]
@@ -158,13 +168,13 @@ class _Attempt:
 
     def simulated(self, one: FittedHypothesis) -> FittedHypothesis:
         """A linear prediction, simulated."""
-        model = self._fitter.at(one.model.z, one.model.terms, one.noise)
+        model = self.fitter.at(one.model.z, one.model.terms, one.noise)
         return self.hypothesis(one, replace(model, covariance=one.model.covariance), one.noise)
 
     def refit(self, some: Sequence[FittedHypothesis], rival_criterion: float = np.inf) -> list[FittedHypothesis]:
         """From the nominal vehicle, too; that may lower the reference."""
-        refits, without = self._refit_from_nominal(
-            self._step.model, some, self.hypothesis, self.reference, 1, rival_criterion
+        (refits, without), self.fitter = self._refit_from_nominal(
+            self.fitter, self._step.model, some, self.hypothesis, self.reference, 1, rival_criterion
         )
         self.reference = min(self.reference, without[0].cost)
         return refits
@@ -177,7 +187,7 @@ class _Attempt:
         self, one: FittedHypothesis, listed: FittedHypothesis | None, significant: bool, least: float
     ) -> bool:
         """See `is_preferred`; ``least`` is divided over the local discrepancy."""
-        factor = self._step.discrepancy.factor(one, one, self._step.threshold)
+        factor = self._step.discrepancy.factor(self.fitter, one, one, self._step.threshold)
         return is_preferred(one, listed, significant, self.reference, least * factor)
 
     def least(self, one: FittedHypothesis, alpha: float) -> float:

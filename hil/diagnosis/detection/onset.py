@@ -34,35 +34,38 @@ _FINER_S, _MOST_TIMES = (0.05, 0.01), 80
 fits. Largest number of times in the first round."""
 
 
-def estimate_onsets(fitter: Fitter, model: Model, noise: Noise) -> Model:
+def estimate_onsets(fitter: Fitter, model: Model, noise: Noise) -> tuple[Model, Fitter]:
     """The model with an onset for each term that was clearly absent before, and for no other.
 
     A time that may be chosen is one more way to fit what the model gets wrong, so it has to gain more. A term with an
-    onset from `scan_onset_by_segment` may always have been there: nuisance parameters may have absorbed it before.
+    onset from `scan_onset_by_segment` may always have been there: nuisance parameters may have absorbed it before. The
+    fitter comes back with the baseline of the last times tried.
     """
     starts = segment_starts(fitter.simulator.dataset)
     for k, term in enumerate(model.terms):
         if isinstance(term.candidate, BasisFunction):
             continue
         if term.onset is None:
-            later = _with_onset(fitter, model, noise, k)
+            later, fitter = _with_onset(fitter, model, noise, k)
             model = model if later is None else later
         elif term.onset in starts:
             times = _times_around(fitter, starts.index(term.onset))
-            later = min(model, _best_onset(fitter, model, noise, k, times, term.value), key=_cost)
+            dated, fitter = _best_onset(fitter, model, noise, k, times, term.value)
+            later = min(model, dated, key=_cost)
             always = fitter.fit(fitter.at(model.z, _with_term(model, k, term.value, None), noise), noise, 3)
             model = later if later.cost + onset_penalty(fitter.masks) < always.cost else always
-    return model
+    return model, fitter
 
 
-def refine_onset(fitter: Fitter, model: Model, noise: Noise) -> Model:
-    """The model with the onset of its last term where it fits best, near the one it has."""
+def refine_onset(fitter: Fitter, model: Model, noise: Noise) -> tuple[Model, Fitter]:
+    """The model with the onset of its last term where it fits best, near the one it has; the fitter likewise."""
     term = model.terms[-1]
     assert term.onset is not None
     recording, onset_s = term.onset
     near = np.arange(max(onset_s - ONSET_STEP_S, 0.0), onset_s + ONSET_STEP_S, _FINER_S[0])
     times = [(recording, float(t)) for t in near]
-    return min(model, _best_onset(fitter, model, noise, len(model.terms) - 1, times, term.value), key=_cost)
+    dated, fitter = _best_onset(fitter, model, noise, len(model.terms) - 1, times, term.value)
+    return min(model, dated, key=_cost), fitter
 
 
 def nearest(starts: Sequence[OnsetTime], onset: OnsetTime) -> int:
@@ -71,17 +74,17 @@ def nearest(starts: Sequence[OnsetTime], onset: OnsetTime) -> int:
     return min((abs(start - onset_s), index) for index, (of, start) in enumerate(starts) if of == recording)[1]
 
 
-def _with_onset(fitter: Fitter, model: Model, noise: Noise, k: int) -> Model | None:
+def _with_onset(fitter: Fitter, model: Model, noise: Noise, k: int) -> tuple[Model | None, Fitter]:
     b, q = _products_by_segment(fitter, model, noise, k)
     segment = detect_change_point(b, q)
     if segment is None:
-        return None
+        return None, fitter
     parameter = model.terms[k].candidate.parameter
     value = float(np.clip(b[segment:].sum() / q[segment:].sum(), parameter.low, parameter.high))
     times = _times_around(fitter, segment)
     least = chi2_quantile(len(b) * len(times), ONSET_ALPHA) * variance_inflation(model.terms[k].candidate)
-    fitted = _best_onset(fitter, model, noise, k, times, value)
-    return fitted if model.cost - fitted.cost > least else None
+    fitted, fitter = _best_onset(fitter, model, noise, k, times, value)
+    return (fitted if model.cost - fitted.cost > least else None), fitter
 
 
 def _times_around(fitter: Fitter, segment: int) -> list[OnsetTime]:
@@ -90,9 +93,11 @@ def _times_around(fitter: Fitter, segment: int) -> list[OnsetTime]:
     return times_between(segments[segment - 1], segments[segment])
 
 
-def _best_onset(fitter: Fitter, model: Model, noise: Noise, k: int, times: list[OnsetTime], value: float) -> Model:
-    """The model with the onset of a term at the best of these times, or near it."""
-    fitter.simulator.cache_baseline(fitter.parameter_set(model.z, _with_term(model, k, value, times[0])))
+def _best_onset(
+    fitter: Fitter, model: Model, noise: Noise, k: int, times: list[OnsetTime], value: float
+) -> tuple[Model, Fitter]:
+    """The model with the onset of a term at the best of these times, or near it; the fitter, the first its baseline."""
+    fitter = fitter.at_baseline(replace(model, terms=_with_term(model, k, value, times[0])))
     best_of_each: list[Model] = []
     for finer_s in (*_FINER_S, None):
         tried = ((fitter.at(model.z, _with_term(model, k, value, time), noise), time) for time in times)
@@ -101,7 +106,7 @@ def _best_onset(fitter: Fitter, model: Model, noise: Noise, k: int, times: list[
         if finer_s is not None:
             step = min((abs(t - onset_s) for r, t in times if r == recording and t != onset_s), default=finer_s)
             times = [(recording, float(t)) for t in np.arange(max(onset_s - step, 0.0), onset_s + step, finer_s)]
-    return fitter.fit(min(best_of_each, key=_cost), noise, 3)
+    return fitter.fit(min(best_of_each, key=_cost), noise, 3), fitter
 
 
 def _cost(model: Model) -> float:
@@ -163,23 +168,29 @@ def detect_change_point(b: Floats, q: Floats) -> int | None:
 # --- hypotheses with an onset
 
 
-def estimate_onsets_of_best(fitter: Fitter, fitted: list[FittedHypothesis]) -> list[FittedHypothesis]:
-    """The hypotheses, the best with an onset: without one a nonparametric term by time would explain more than they."""
+def estimate_onsets_of_best(fitter: Fitter, fitted: list[FittedHypothesis]) -> tuple[list[FittedHypothesis], Fitter]:
+    """The hypotheses, the best with an onset: without one a nonparametric term by time would explain more than they.
+
+    The fitter comes back with the baseline of `estimate_onsets`.
+    """
     best = sorted(fitted, key=criterion)[:ONSETS_OF_BEST]
-    models = {id(one): estimate_onsets(fitter, one.model, one.noise) for one in best}
-    return [_with_model(fitter, one, models.get(id(one), one.model)) for one in fitted]
+    models: dict[int, Model] = {}
+    for one in best:
+        models[id(one)], fitter = estimate_onsets(fitter, one.model, one.noise)
+    return [_with_model(fitter, one, models.get(id(one), one.model)) for one in fitted], fitter
 
 
 def add_same_onset_alternatives(
     fitter: Fitter, candidates: CandidateSet, model: Model, fitted: list[FittedHypothesis]
-) -> list[FittedHypothesis]:
+) -> tuple[list[FittedHypothesis], Fitter]:
     """Where the best has an onset, the hypotheses and others with that onset.
 
-    As ever-present ones these gain too little to be shortlisted. ``model`` has the causes accepted before.
+    As ever-present ones these gain too little to be shortlisted. ``model`` has the causes accepted before. The fitter
+    comes back with the baseline of `refine_onset`.
     """
     best = min(fitted, key=criterion)
     if best.term.onset is None:
-        return fitted
+        return fitted, fitter
     bare = fitter.at(best.model.z, model.terms, best.noise)
     tried = {candidate_key(c.term.candidate) for c in fitted if c.term.onset == best.term.onset}
     tried |= {candidate_key(term.candidate) for term in model.terms}
@@ -187,8 +198,10 @@ def add_same_onset_alternatives(
     top = shortlist([item for item in tests if candidate_key(item.candidate) not in tried], SAME_ONSET_ALTERNATIVES)
     added = refit_substitutes(fitter, best, [(item.candidate, item.value) for item in top], True)
     near = [one for one in added if criterion(one) - criterion(best) < SAME_ONSET_CRITERION]
-    models = {id(one): refine_onset(fitter, one.model, one.noise) for one in near}
-    return [*fitted, *(_with_model(fitter, one, models.get(id(one), one.model)) for one in added)]
+    models: dict[int, Model] = {}
+    for one in near:
+        models[id(one)], fitter = refine_onset(fitter, one.model, one.noise)
+    return [*fitted, *(_with_model(fitter, one, models.get(id(one), one.model)) for one in added)], fitter
 
 
 def _with_model(fitter: Fitter, one: FittedHypothesis, model: Model) -> FittedHypothesis:

@@ -5,13 +5,10 @@ worth a fit (`fit_shortlist`), and what compares hypotheses.
 """
 
 from collections.abc import Callable, Collection, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 
-from hil.diagnosis.compiled import WORKERS
 from hil.diagnosis.detection.score_test import (
     ScoreTest,
     candidate_key,
@@ -32,14 +29,13 @@ from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term, Tracks
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.noise.model import Noise
+from hil.diagnosis.parallel import thread_map
 
 _ROUNDS, _SETTLED, _SETTLED_SHARE = 4, 1.0, 0.01
 """Times that a hypothesis and its noise are fitted in turn, and the decrease of the cost that ends it: by itself, and
 as a share of all that it gains."""
 _NOISE_SETTLED = 2.0
 """Decrease of the cost by new noise below which the linear step is not repeated with it."""
-Item = TypeVar("Item")
-Of = TypeVar("Of")
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +135,7 @@ def refit_substitutes(
         model = fitter.refit_amplitudes(fitter.at(best.model.z, terms, best.noise), best.noise)
         return refitted(best, fitter.fit(model, best.noise, 3, relinearise), best.noise)
 
-    return CandidateFits.at_once(substituted, others)
+    return thread_map(substituted, others)
 
 
 def refit_from_best(fitter: Fitter, fitted: Sequence[FittedHypothesis]) -> list[FittedHypothesis]:
@@ -175,12 +171,6 @@ class CandidateFits:
         self.noise = self._likelier(model, fitter.estimate_noise(model, noise), noise)
         self.reference = fitter.cost(model.residual, model.z, self.noise)
         fitter.nuisance_information(self.noise)  # which all threads need
-
-    @staticmethod
-    def at_once(of: Callable[[Item], Of], items: Sequence[Item]) -> list[Of]:
-        """Looks that do not depend on each other, over threads."""
-        with ThreadPoolExecutor(WORKERS) as pool:
-            return list(pool.map(of, items))
 
     def _likelier(self, model: Model, new: Noise, old: Noise) -> Noise:
         """The new noise unless the old was likelier: its parts are estimated in turn."""
@@ -282,7 +272,7 @@ def fit_shortlist(
     if best(tests) < HOPELESS_SHARE * threshold.gain:
         return [], []
     progress(f"noise given each of {len(tests)} candidates")
-    profiled = fits.at_once(fits.profile_over_noise, tests)
+    profiled = thread_map(fits.profile_over_noise, tests)
     noise_given = {id(item): noise for item, noise in profiled}
     tests = [item for item, _ in profiled]
     if biased:
@@ -295,7 +285,7 @@ def fit_shortlist(
 
     def fit_each(some: Sequence[ScoreTest]) -> list[FittedHypothesis]:
         progress(f"fitting {len(some)} candidates")
-        return fits.at_once(lambda item: fits.fit(item, noise_given[id(item)]), some)
+        return thread_map(lambda item: fits.fit(item, noise_given[id(item)]), some)
 
     first = [item for item in top if biased or beyond(item, item.gain) >= POOR_SHARE * least]
     fitted = fit_each(first)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.detection.profile_fit import CandidateFits, FittedHypothesis, criterion
+from hil.diagnosis.detection.profile_fit import FittedHypothesis, criterion
 from hil.diagnosis.detection.threshold import (
     AS_GOOD_SHARE,
     FIRST_REFITTED,
@@ -19,6 +19,7 @@ from hil.diagnosis.detection.threshold import (
 from hil.diagnosis.estimation.gauss_newton import BIASED_BIRGE_RATIO, Model
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import Noise
+from hil.diagnosis.parallel import thread_map
 
 _ROUNDS = 3
 RefitHypothesis = Callable[[FittedHypothesis, Model, Noise], FittedHypothesis]
@@ -70,7 +71,7 @@ class _NominalFits:
 
     def from_nominal(self, fitted: Sequence[FittedHypothesis], best: float) -> list[FittedHypothesis]:
         """Each hypothesis from the nominal vehicle, where that is better; ``best`` is the best criterion so far."""
-        return CandidateFits.at_once(lambda one: self._from_nominal(one, best), fitted)
+        return thread_map(lambda one: self._from_nominal(one, best), fitted)
 
     def _from_nominal(self, one: FittedHypothesis, best: float) -> FittedHypothesis:
         own, noise = self._fitter.copy(), one.noise

@@ -22,6 +22,7 @@ from hil.diagnosis.estimation.model_discrepancy import variance_inflation
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.estimation.uncertainty import FORM_SD_SHARE
 from hil.diagnosis.noise.model import Noise
+from hil.diagnosis.parallel import thread_map
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from plant.effects.effect import Parameter
 from plant.injection.theta import THETA
@@ -59,8 +60,9 @@ class ShapedCandidate(Candidate):
 
 def fit_shape_parameters(
     fits: CandidateFits, fitter: Fitter, listed: Sequence[Candidate], nonparametric: FittedHypothesis
-) -> FittedHypothesis | None:
-    """The best listed effect where a nonparametric term acts, of any shape; None where no effect there has a shape.
+) -> tuple[FittedHypothesis | None, Fitter]:
+    """The best listed effect where a nonparametric term acts, of any shape; None where no effect there has a shape. The
+    fitter comes back with the model without the term as its baseline.
 
     Parameters
     ----------
@@ -88,12 +90,12 @@ def fit_shape_parameters(
         for at in _grid(shape)
     ]
     if not offered:
-        return None
+        return None, fitter
     noise = nonparametric.noise
     terms = tuple(term for term in nonparametric.model.terms if not isinstance(term.candidate, BasisFunction))
     bare = fitter.at(nonparametric.model.z, terms, noise)
     base = fitter.parameter_set(bare.z, terms)
-    fitter.simulator.cache_baseline(base)
+    fitter = fitter.at_baseline(bare)
     steps = [_STEP_SHARE * one.parameter.typical for one in offered]
     stepped = [one.applied(base, step) for one, step in zip(offered, steps, strict=True)]
     jacobian = finite_difference_jacobian(fitter.simulator, fitter.masks, bare.channels, stepped, steps)
@@ -103,11 +105,11 @@ def fit_shape_parameters(
         return fits.linear_prediction([Term(offered[k], 0.0)], own)[0]
 
     best: dict[str, tuple[Model, ShapedCandidate]] = {}  # of each effect, by one step, which errs far from the start
-    for model, one in sorted(zip(fits.at_once(predicted, range(len(offered))), offered, strict=True), key=_cost):
+    for model, one in sorted(zip(thread_map(predicted, range(len(offered))), offered, strict=True), key=_cost):
         best.setdefault(one.effect.name, (model, one))
-    simulated = fits.at_once(lambda pair: fitter.at(pair[0].z, pair[0].terms, noise), list(best.values()))
+    simulated = thread_map(lambda pair: fitter.at(pair[0].z, pair[0].terms, noise), list(best.values()))
     start = min(zip(simulated, (one for _, one in best.values()), strict=True), key=_cost)[1]
-    return _fitted(fitter, bare, start, nonparametric)
+    return _fitted(fitter, bare, start, nonparametric), fitter
 
 
 def _cost(pair: tuple[Model, ShapedCandidate]) -> float:
@@ -141,7 +143,7 @@ def _fitted(
         best = min((model for _, model in tried), key=lambda model: model.cost, default=None)
         term = Term(replace(start, at=at), start.parameter.typical if best is None else best.terms[-1].value)
         starts = [bare.z] if best is None else [bare.z, best.z]
-        models = CandidateFits.at_once(lambda z: fitted_from(z, term), starts)
+        models = thread_map(lambda z: fitted_from(z, term), starts)
         tried.append((at, min(models, key=lambda model: model.cost)))
         return tried[-1][1].cost
 

@@ -57,18 +57,20 @@ def local_inflation(largest_other_gain: float, threshold: DetectionThreshold) ->
 class LocalDiscrepancy:
     """Divisors of the gains at one step of the selection; what other candidates gain is remembered by model."""
 
-    def __init__(self, fitter: Fitter, candidates: CandidateSet, effective_parameters: float) -> None:
-        self._fitter, self._candidates, self._effective_parameters = fitter, candidates, effective_parameters
+    def __init__(self, candidates: CandidateSet, effective_parameters: float) -> None:
+        self._candidates, self._effective_parameters = candidates, effective_parameters
         self._known: dict[Model, float] = {}
 
-    def factor(self, one: FittedHypothesis, best: FittedHypothesis, threshold: DetectionThreshold) -> float:
+    def factor(
+        self, fitter: Fitter, one: FittedHypothesis, best: FittedHypothesis, threshold: DetectionThreshold
+    ) -> float:
         """By the nuisance parameters of ``one``; where these say that the structure differs, at most what other
         candidates gain given the ``best``."""
-        inflation = nuisance_variance_inflation(self._fitter, one.model.z, self._effective_parameters)
+        inflation = nuisance_variance_inflation(fitter, one.model.z, self._effective_parameters)
         if not structure_mismatch(inflation):
             return inflation
         if best.model not in self._known:
-            others = self._candidates.scores_given(self._fitter, best.model, best.noise)
+            others = self._candidates.scores_given(fitter, best.model, best.noise)
             largest = max((item.gain for item in others), default=0.0)
             self._known[best.model] = local_inflation(largest, threshold)
         return min(inflation, self._known[best.model])

@@ -17,7 +17,6 @@ from hil.diagnosis.detection.nonparametric import BasisFunction
 from hil.diagnosis.detection.nonparametric_search import NonparametricSearch
 from hil.diagnosis.detection.onset import estimate_onsets
 from hil.diagnosis.detection.profile_fit import (
-    CandidateFits,
     FittedHypothesis,
     at_bound,
     criterion,
@@ -40,6 +39,8 @@ from hil.diagnosis.estimation.aliases import resolve_aliases
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import Noise, SampleMasks
+from hil.diagnosis.parallel import thread_map
+from hil.diagnosis.simulation.hot_spots import has_hot_spots
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.spec import Vehicle
@@ -57,15 +58,20 @@ def diagnose(
 
 
 class StepwiseSelection:
-    """The selection for one dataset; `run` reads as the whole of it."""
+    """The selection for one dataset; `run` reads as the whole of it.
+
+    ``dataset`` has the inputs denoised at the first fit without causes, from `fit_nuisances` on.
+    """
+
+    dataset: Dataset
 
     def __init__(
         self, dataset: Dataset, vehicle: Vehicle, base: ParameterSet, settings: Settings, progress: Progress
     ) -> None:
         self.settings, self.progress = settings, progress
-        self.simulator = Simulator(dataset, vehicle).denoised(base)
-        self.masks = SampleMasks.of(self.simulator.dataset)
-        self.nuisance_fit = NuisanceFit(self.simulator, self.masks, vehicle, base, settings.relinearise)
+        simulator = Simulator(dataset, vehicle).prepared(base)
+        self.vehicle, self.masks = vehicle, SampleMasks.of(simulator.dataset)
+        self.nuisance_fit = NuisanceFit(simulator, self.masks, vehicle, base, settings.relinearise)
         progress("simulating the nominal vehicle")
         self.nuisance_fit.relinearise(np.zeros(len(self.nuisance_fit.nuisances)))
         self.nominal_fitter = self.fitter
@@ -73,8 +79,12 @@ class StepwiseSelection:
 
     @property
     def fitter(self) -> Fitter:
-        """With the last Jacobian of the nuisance parameters."""
+        """With the last Jacobian of the nuisance parameters, and the simulator of the fits to come."""
         return self.nuisance_fit.fitter
+
+    @fitter.setter
+    def fitter(self, fitter: Fitter) -> None:
+        self.nuisance_fit.fitter = fitter
 
     def run(self) -> Diagnosis:
         """Fit the nuisances, select causes forward, eliminate backward."""
@@ -101,12 +111,16 @@ class StepwiseSelection:
         """Fit noise and nuisance parameters; then `screen`."""
         self.progress("noise and nuisance parameters")
         model, noise = self.nuisance_fit.fit(self.nominal, self.first_noise)
-        if self.simulator.fit_hot_spot_phase(self.fitter.parameter_set(model.z, ())):
+        parameters = self.fitter.parameter_set(model.z, ())
+        self.fitter = self.fitter.with_simulator(self.fitter.simulator.with_hot_spot_phase(parameters))
+        if self.fitter.simulator.hot_spot_angles and has_hot_spots(parameters):
             model, noise = self.nuisance_fit.fit(self.fitter.at(model.z, (), noise), noise)
-        channels = model.channels or self.simulator.run(self.fitter.parameter_set(model.z, ()))
+        simulator = self.fitter.simulator
+        self.dataset = simulator.dataset
+        channels = model.channels or simulator.run(self.fitter.parameter_set(model.z, ()))
         unexcited = unexcited_sensors(self.fitter.tracks(channels), noise)
-        undiagnosable = self.simulator.vehicle.undiagnosable_effects
-        return self.screen(CandidateSet(self.simulator, self.masks, undiagnosable, unexcited), model, noise)
+        candidates = CandidateSet(simulator, self.masks, self.vehicle.undiagnosable_effects, unexcited)
+        return self.screen(candidates, model, noise)
 
     def screen(self, candidates: CandidateSet, model: Model, noise: Noise, restarted: bool = False) -> State:
         """Test each candidate at a model without causes; that sets the threshold."""
@@ -120,8 +134,9 @@ class StepwiseSelection:
         return State(screening, candidates, nonparametric, threshold, model, noise, model.z, restarted=restarted)
 
     def _linearised(self, candidates: CandidateSet, model: Model) -> tuple[CandidateSet, NonparametricSearch]:
-        """Candidates and nonparametric terms with their Jacobian at a model."""
+        """Candidates and nonparametric terms with their Jacobian at a model, which is the baseline from now on."""
         self.progress(f"Jacobian of {len(candidates.candidates)} candidates")
+        self.fitter = self.fitter.at_baseline(model)
         search = NonparametricSearch(candidates.candidates, self.settings, self.progress)
         return candidates.at(self.fitter, model), search
 
@@ -138,7 +153,7 @@ class StepwiseSelection:
             return state
         self.progress("one cause in place of all")
         accepted = [hypotheses[0] for hypotheses in selections(state.hypotheses)]
-        singles = try_single_cause(self.fitter, state.candidates, accepted, state.model, state.noise)
+        singles, self.fitter = try_single_cause(self.fitter, state.candidates, accepted, state.model, state.noise)
         if not singles:
             return state
         explained = state.explained + (state.model.cost - singles[0].cost)
@@ -149,9 +164,9 @@ class StepwiseSelection:
         """With an onset for causes that have one, and the inputs denoised by the car with them."""
         term = state.model.terms[-1]
         self.progress(f"accepted {term.candidate.name} = {term.value:.4g}; estimating its onset")
-        model = estimate_onsets(self.fitter, state.model, state.noise)
+        model, self.fitter = estimate_onsets(self.fitter, state.model, state.noise)
         if self.settings.relinearise:  # a cause may move the steps of pressures and torques
-            self.simulator.denoise_inputs(self.fitter.parameter_set(model.z, model.terms))
+            self.fitter = self.fitter.denoised(model)
             model = self.fitter.fit(self.fitter.at(model.z, model.terms, state.noise), state.noise, 2)
         return replace(state, model=model)
 
@@ -200,15 +215,14 @@ class StepwiseSelection:
                 fitter, model, noise, state.hypotheses, state.threshold, first.effective_parameters, self.progress
             )
             if not left.model.terms:
-                fitter.simulator.denoise_inputs(first.fitter.parameter_set(first.model.z, first.model.terms))
+                fitter = first.fitter.denoised(first.model)
         final = left.model
         if not final.terms:
-            final, noise, fitter = first.model, first.noise, first.fitter
+            final, noise = first.model, first.noise
         bounded = [f"{term.candidate.name} = {term.value:.3g}" for term in final.terms if at_bound(term)]
-        vehicle = self.simulator.vehicle
         return Diagnosis(
-            dataset=self.simulator.dataset,
-            vehicle=vehicle,
+            dataset=self.dataset,
+            vehicle=self.vehicle,
             fitter=fitter,
             noise=noise,
             first_noise=first.noise,
@@ -217,7 +231,7 @@ class StepwiseSelection:
             final=final,
             hypotheses=left.hypotheses,
             scores=first.scores,
-            undetectable_effects=sorted({*undetectable_effects(first.scores), *vehicle.undiagnosable_effects}),
+            undetectable_effects=sorted({*undetectable_effects(first.scores), *self.vehicle.undiagnosable_effects}),
             information=first.information,
             detection_threshold=state.threshold.gain,
             remarks=(*left.remarks, *(f"{text} is at its bound: the true value may lie beyond" for text in bounded)),
@@ -226,9 +240,9 @@ class StepwiseSelection:
 
 def try_single_cause(
     fitter: Fitter, candidates: CandidateSet, accepted: Sequence[FittedHypothesis], model: Model, noise: Noise
-) -> list[FittedHypothesis]:
+) -> tuple[list[FittedHypothesis], Fitter]:
     """Single causes fitted from the nuisance parameters of a model of several, best first; empty where all of the model
-    together, the ``accepted``, have the better criterion.
+    together, the ``accepted``, have the better criterion. The fitter comes back with the baseline they are fitted from.
 
     A cause selected given biased nuisance parameters may be made of others: a drag of one wheel, which they had
     absorbed, was named as a steering offset and a radius of that wheel. Given those the nuisance parameters are right
@@ -236,6 +250,8 @@ def try_single_cause(
     """
     bare = fitter.at(model.z, (), noise)
     onsets: list[OnsetTime | None] = list(dict.fromkeys(term.onset for term in model.terms))
+    if None in onsets:
+        fitter = fitter.at_baseline(bare)
     tried = [(item, onset) for onset in onsets for item in _shortlist(fitter, candidates, bare, noise, onset)]
 
     def fitted(item: ScoreTest, onset: OnsetTime | None) -> FittedHypothesis:
@@ -244,9 +260,9 @@ def try_single_cause(
         penalty = 0.0 if onset is None else onset_penalty(fitter.masks)
         return refitted(unscored(single, noise, item.information, penalty), single, noise)
 
-    singles = sorted(CandidateFits.at_once(lambda one: fitted(*one), tried), key=criterion)
+    singles = sorted(thread_map(lambda one: fitted(*one), tried), key=criterion)
     together = model.cost + sum(one.total_penalty - 2.0 * one.log_occam_factor for one in accepted)
-    return singles if singles and criterion(singles[0]) < together else []
+    return (singles if singles and criterion(singles[0]) < together else []), fitter
 
 
 def _shortlist(

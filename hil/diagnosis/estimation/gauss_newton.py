@@ -1,6 +1,7 @@
 """Non-linear fits: bounded Gauss-Newton steps on nuisances and effects, each step a free replay."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -101,6 +102,15 @@ def birge_ratio(z: Floats, farthest: Floats | float = np.inf, told: float | None
     return max(1.0, float(squares.sum()) / max(len(z) if told is None else told, 1.0))
 
 
+@dataclass(eq=False)
+class _Whitened:
+    """Sensitivities to the nuisances whitened for one noise, (samples, nuisances), and their products."""
+
+    noise: Noise | None = None
+    columns: Floats = field(default_factory=lambda: np.empty((0, 0), np.float32))
+    products: Floats = field(default_factory=lambda: np.empty((0, 0)))
+
+
 class Fitter:
     """Fits models of one case; ``nuisance_columns`` are sensitivities to the nuisances in standard deviations."""
 
@@ -121,14 +131,26 @@ class Fitter:
         self._limits = [k for k, nuisance in enumerate(self.nuisances) if nuisance.name in _LIMITS]
         self.radius = float(rig.vehicle.parameters.wheel.rolling_radius_m)
         self._measured = rig.measured()
-        self._white_for: Noise | None = None
-        self._white: Floats = np.empty((0, 0), np.float32)
-        self._products: Floats = np.empty((0, 0))
+        self._whitened = _Whitened()
 
     def copy(self) -> "Fitter":
         """One whose sensitivities may follow the steps of another fit."""
         columns = {name: values.copy() for name, values in self.nuisance_jacobian.items()}
         return Fitter(self.simulator, self.masks, self.base, self.nuisances, columns)
+
+    def with_simulator(self, simulator: Simulator) -> "Fitter":
+        """This fitter on another simulator of the same dataset; both share the sensitivities to the nuisances."""
+        other = copy(self)
+        other.simulator = simulator
+        return other
+
+    def at_baseline(self, model: Model) -> "Fitter":
+        """This fitter with the model simulated as the baseline of all others."""
+        return self.with_simulator(self.simulator.with_baseline(self.parameter_set(model.z, model.terms)))
+
+    def denoised(self, model: Model) -> "Fitter":
+        """This fitter with inputs denoised at the model, without a baseline."""
+        return self.with_simulator(self.simulator.denoised(self.parameter_set(model.z, model.terms)))
 
     def parameter_set(self, z: Floats, terms: Sequence[Term]) -> ParameterSet:
         """The world of a model."""
@@ -286,8 +308,9 @@ class Fitter:
                 moved -= own[name].astype(np.float32) @ np.array(stepped, np.float32)
             unforetold[name] = (moved - columns @ change.astype(np.float32))[:, None]
             columns += unforetold[name] * share
-        self._white += whitened(unforetold, self.masks, noise) * share
-        self._products = np.asarray(self._white.T @ self._white, np.float64)
+        white = self._whitened
+        white.columns += whitened(unforetold, self.masks, noise) * share
+        white.products = np.asarray(white.columns.T @ white.columns, np.float64)
 
     def at_bounds(self, z: Floats) -> list[int]:
         """Nuisances as far off as they may be: they explain nothing more."""
@@ -295,10 +318,10 @@ class Fitter:
 
     def nuisance_information(self, noise: Noise) -> Floats:
         """Information of the nuisances, (nuisances, nuisances); remembered for this noise."""
-        if self._white_for is not noise:
-            self._white, self._products = self._of_nuisances(noise)
-            self._white_for = noise
-        return self._products
+        if self._whitened.noise is not noise:
+            self._whitened.columns, self._whitened.products = self._of_nuisances(noise)
+            self._whitened.noise = noise
+        return self._whitened.products
 
     def effective_parameters(self, noise: Noise) -> float:
         """How many numbers the data tell: what squares of right ones, fitted, add up to (MacKay 1992, eq. 4.9).
@@ -320,8 +343,8 @@ class Fitter:
 
     def _of_nuisances(self, noise: Noise) -> tuple[Floats, Floats]:
         """Whitened sensitivities of the nuisances, and their products."""
-        if self._white_for is noise:
-            return self._white, self._products
+        if self._whitened.noise is noise:
+            return self._whitened.columns, self._whitened.products
         white = whitened(self.nuisance_jacobian, self.masks, noise)
         return white, np.asarray(white.T @ white, np.float64)
 

@@ -27,24 +27,24 @@ the best of several causes to serve again when it is accepted. A fit of the numb
 class NuisanceFit:
     """What may be off in the car as handed in (``base``), within its tolerance.
 
-    ``fitter`` has the sensitivities last taken; ``relinearise`` False keeps the first.
+    ``fitter`` has the sensitivities last taken and the simulator of the fits to come; ``relinearise`` False keeps the
+    first sensitivities.
     """
-
-    fitter: Fitter
 
     def __init__(
         self, rig: Simulator, frame: SampleMasks, vehicle: Vehicle, base: ParameterSet, relinearise: bool
     ) -> None:
-        self._rig, self._frame, self._base, self._relinearise = rig, frame, base, relinearise
+        self._frame, self._base, self._relinearise = frame, base, relinearise
         told = all(drive.log.disc_temperature_k is not None for drive in rig.dataset.recordings)
         self.nuisances = (*vehicle.nuisances, *recording_nuisances(told, vehicle.node_latency_s))
         self._steps: Floats = np.full(len(self.nuisances), _COARSE)
+        self.fitter = Fitter(rig, frame, base, self.nuisances, {})
         self._taken: deque[tuple[Floats, tuple[Term, ...], Fitter]] = deque(maxlen=_REMEMBERED)
 
     def relinearise(self, z: Floats, terms: Sequence[Term] = ()) -> None:
         """Take the sensitivities where the numbers are ``z`` standard deviations off, beside these effects.
 
-        What drives the car is made by that car too (`Simulator.quieten`).
+        Inputs are denoised at that car, too (`Simulator.denoised`), and it is the baseline of the fits to come.
         """
 
         def world(of: Floats) -> ParameterSet:
@@ -53,29 +53,28 @@ class NuisanceFit:
                 found = with_term(found, term)
             return found
 
-        self._rig.denoise_inputs(world(z))
-        self._rig.cache_baseline(world(z))
+        simulator = self.fitter.simulator.denoised(world(z)).with_baseline(world(z))
         highest = np.array([nuisance.upper for nuisance in self.nuisances])
         steps = np.where(z + self._steps > highest, -self._steps, self._steps)
-        base, own = self._rig.run(world(z)), np.diag(steps)
+        base, own = simulator.run(world(z)), np.diag(steps)
         tracks = finite_difference_jacobian(
-            self._rig, self._frame, base, [world(z + step) for step in own], steps.tolist()
+            simulator, self._frame, base, [world(z + step) for step in own], steps.tolist()
         )
         for k, nuisance in enumerate(self.nuisances):
             if nuisance.name in _KINKED:  # the mean of both sides
                 other = finite_difference_jacobian(
-                    self._rig, self._frame, base, [world(z - own[k])], [-float(steps[k])]
+                    simulator, self._frame, base, [world(z - own[k])], [-float(steps[k])]
                 )
                 for name, columns in tracks.items():
                     columns[:, k] = 0.5 * (columns[:, k] + other[name][:, 0])
-        self.fitter = Fitter(self._rig, self._frame, self._base, self.nuisances, tracks)
+        self.fitter = Fitter(simulator, self._frame, self._base, self.nuisances, tracks)
         self._taken.append((z, tuple(terms), self.fitter))
 
     def relinearise_cached(self, z: Floats, terms: Sequence[Term]) -> None:
         """As `anew`, or those taken lately where a car with these effects was alike."""
         for around, taken, fitter in self._taken:
             if float(np.abs(z - around).max()) <= _STILL and same_terms(taken, terms):
-                self.fitter = fitter
+                self.fitter = fitter.with_simulator(self.fitter.simulator)
                 return
         self.relinearise(z, terms)
 

@@ -234,8 +234,7 @@ def _linearise(name: str, both_ways: bool, to_ground: bool) -> _Linearisation:
     radius = float(car.parameters.wheel.rolling_radius_m)
     logs = [_log(name, driven, disc_k, direction, to_ground) for direction in ((1, -1) if both_ways else (1,))]
     at = nominal(car)
-    simulator = Simulator(prepare(logs, radius), car).denoised(at)
-    simulator.cache_baseline(at)
+    simulator = Simulator(prepare(logs, radius), car).prepared(at).with_baseline(at)
     masks, channels = _settled(SampleMasks.of(simulator.dataset)), simulator.run(at)
     residual = tracks_of(simulator.residual(at), masks, radius)
     return _Linearisation(simulator, masks, first_guess(residual, masks), at, channels)

@@ -1,4 +1,7 @@
-"""Where the wheels' hot spots stand: angles as measured, from where no log tells."""
+"""Phase of the wheels' hot spots, which no log states.
+
+Takes wheel speeds, measured and simulated with weak spots at two angles; gives the angle of each wheel in each segment.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -14,79 +17,87 @@ from plant.vectors import INPUT
 
 _SPEEDS = INPUT.slice("wheel_speed_rad_s")
 _HOT = THETA.slice("hot_spot", "amplitude")
-_SHOWN = 0.01
-"""Amplitude of the replays that show where the spots stand: some 0.1 rad/s at the wheels, where all is linear."""
+_AMPLITUDE = 0.01
+"""Amplitude of the simulated spots: some 0.1 rad/s at the wheels, where all is linear."""
 QUARTER_RAD = 0.5 * np.pi / ORDER
-"""A quarter of the way from spot to spot."""
+"""A quarter of the angle from spot to spot."""
 _ROWS = 5
 _ONE_ANGLE, _ANGLE = 1.0, 3.0
+"""Penalty of `phase_penalty`: in all, and per effective number of angles."""
 
 
-def has_hot_spots(world: ParameterSet) -> bool:
-    """Whether angles of the wheels matter beyond a turn or two."""
-    return bool(np.any(world.theta[_HOT]))
+def has_hot_spots(parameters: ParameterSet) -> bool:
+    """True where the wheels' angles matter: a disc has hot spots."""
+    return bool(np.any(parameters.theta[_HOT]))
 
 
-def without_spots(world: ParameterSet) -> ParameterSet:
-    """The world with even discs."""
-    theta = world.theta.copy()
+def without_spots(parameters: ParameterSet) -> ParameterSet:
+    """The parameter set with even discs."""
+    theta = parameters.theta.copy()
     theta[_HOT] = 0.0
-    return replace(world, theta=theta)
+    return replace(parameters, theta=theta)
 
 
-def with_spots(world: ParameterSet) -> ParameterSet:
-    """The world with weak spots on all discs, of the sign of its own."""
-    theta = world.theta.copy()
-    theta[_HOT] = np.where(theta[_HOT] < 0.0, -_SHOWN, _SHOWN)
-    return replace(world, theta=theta)
+def with_spots(parameters: ParameterSet) -> ParameterSet:
+    """The parameter set with weak spots on all discs, of the sign of its own."""
+    theta = parameters.theta.copy()
+    theta[_HOT] = np.where(theta[_HOT] < 0.0, -_AMPLITUDE, _AMPLITUDE)
+    return replace(parameters, theta=theta)
 
 
-def wheel_angles(drive: Recording) -> Floats:
+def wheel_angles(recording: Recording) -> Floats:
     """Angles by which the wheels have turned since the log began, (rows, 4), rad, from their measured speeds.
 
-    A free replay drifts by radii and slips: a thousandth in 100 m is three radians of the tenth order.
+    Simulated ones drift by radii and slips: a thousandth in 100 m is three radians of the tenth order.
     """
-    turned = np.cumsum(drive.inputs[:, _SPEEDS] * ROW_S, axis=0)
+    turned = np.cumsum(recording.inputs[:, _SPEEDS] * ROW_S, axis=0)
     return np.concatenate([np.zeros((1, 4)), turned])[:-1]
 
 
 def row_chunks(rows: slice) -> Iterator[slice]:
-    """Rows in parts short enough for a simulated wheel to turn as the measured one."""
+    """Rows in chunks short enough for a simulated wheel to turn as the measured one."""
     for first in range(rows.start, rows.stop, _ROWS):
         yield slice(first, min(first + _ROWS, rows.stop))
 
 
-def fit_phase(drive: Recording, left: Floats, shown: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Angle between spots and the begin of each segment, (rows, 4), rad: where they explain the wheels' speeds best;
-    and how much they would show there, (segments, 4).
+def fit_phase(recording: Recording, residual: Floats, signatures: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Phase of the spots by least squares on the wheels' speeds, and how much they would show.
 
-    ``left`` (samples, 4) is what a replay without spots leaves, ``shown`` what spots at no angle and at a quarter do.
-    Samples differ from one to the next: what is slow says nothing of the tenth order.
+    Differences from sample to sample are fitted: what is slow says nothing of the tenth order.
+
+    Parameters
+    ----------
+    residual : (samples, 4), measured less simulated without spots, rad/s.
+    signatures : two of (samples, 4), what weak spots add at angle 0 and at `QUARTER_RAD`.
+
+    Returns
+    -------
+    Angles, (rows, 4), rad, constant in each segment; norms of the signatures, (segments, 4).
     """
-    found, much = np.zeros((len(drive.inputs), 4)), np.zeros((len(drive.segments), 4))
-    for number, segment in enumerate(drive.segments):
-        within = slice(segment.first // drive.stride, segment.last // drive.stride)
-        known = (drive.moving[within][1:] > 0.5) & (drive.moving[within][:-1] > 0.5)
+    angles, visibility = np.zeros((len(recording.inputs), 4)), np.zeros((len(recording.segments), 4))
+    for number, segment in enumerate(recording.segments):
+        within = slice(segment.first // recording.stride, segment.last // recording.stride)
+        moving = (recording.moving[within][1:] > 0.5) & (recording.moving[within][:-1] > 0.5)
         for k in range(4):
-            steps = [np.diff(values[within, k]) for values in (left, *shown)]
-            good = known & np.isfinite(steps[0])
-            of = np.column_stack([values[good] for values in steps[1:]])
-            if not of.any():
+            steps = [np.diff(values[within, k]) for values in (residual, *signatures)]
+            known = moving & np.isfinite(steps[0])
+            columns = np.column_stack([values[known] for values in steps[1:]])
+            if not columns.any():
                 continue
-            much[number, k] = np.linalg.norm(of)
-            sine, cosine = np.linalg.lstsq(of, steps[0][good], rcond=None)[0]
-            found[segment.first : segment.last, k] = np.arctan2(cosine, sine) / ORDER
-    return found, much
+            visibility[number, k] = np.linalg.norm(columns)
+            sine, cosine = np.linalg.lstsq(columns, steps[0][known], rcond=None)[0]
+            angles[segment.first : segment.last, k] = np.arctan2(cosine, sine) / ORDER
+    return angles, visibility
 
 
-def phase_penalty(much: Floats, wheels: Sequence[int]) -> float:
-    """What angles chosen by the data take off the gain of spots on these wheels, (segments, 4) as of `fit_phase`.
+def phase_penalty(visibility: Floats, wheels: Sequence[int]) -> float:
+    """Penalty on the gain of spots on these wheels for angles chosen by the data; ``visibility`` as of `fit_phase`.
 
-    Spots show in N segments and wheels alike much, and noise turns each to where it looks like spots: (sum of N
+    Spots that show alike in N segments and wheels: noise turns each to where it looks like spots, and (sum of N
     Rayleigh variables)^2 / N exceeds this and 20 as seldom as chi-squared with one degree of freedom exceeds 20 (by
-    convolution: 3.5, 13.9, 25.5 and 36.0 for N of 1, 4, 8 and 12). Where they show unlike much N is that of Kish (1965,
-    Survey Sampling), weighed by the root of the sum of squares they show: so the variables are, in the sum.
+    convolution: 3.5, 13.9, 25.5 and 36.0 for N of 1, 4, 8 and 12). Where they show unlike, N is that of Kish (1965,
+    Survey Sampling), with the visibilities as weights.
     """
-    of = much[:, list(wheels)]
-    squares = float(np.sum(of**2))
-    return _ONE_ANGLE + _ANGLE * float(of.sum()) ** 2 / squares if squares else 0.0
+    weights = visibility[:, list(wheels)]
+    squares = float(np.sum(weights**2))
+    return _ONE_ANGLE + _ANGLE * float(weights.sum()) ** 2 / squares if squares else 0.0

@@ -1,4 +1,7 @@
-"""The state a free replay starts with: at the beginning of a drive, and of each segment after the first."""
+"""Initial states of the plant: at the start of a recording, and of each segment after the first.
+
+Takes the vehicle, a recording and a parameter set; gives states, (STATE.size,), and speeds, m/s.
+"""
 
 import numpy as np
 
@@ -15,50 +18,50 @@ from plant.vectors import DELAY_SLOTS, INPUT, STATE, P, X
 DISC_K = 350.0
 _BACKWARD_MPS = 0.5
 _STEADY = int(0.1 / ROW_S)
-"""Rows that tell what a pressure was at the first one."""
+"""Rows at the start whose pressures are averaged for the first one."""
 
 
-def initial_state_of(vehicle: Vehicle, drive: Recording, world: ParameterSet, given: Floats) -> Floats:
-    """State at the first row of the inputs ``given``, (rows, INPUT.size), what the sensors add taken off.
+def initial_state_of(vehicle: Vehicle, recording: Recording, parameters: ParameterSet, inputs: Floats) -> Floats:
+    """State at the first row of the inputs, (rows, INPUT.size), which are without what sensors add.
 
-    What is asked at first has been asked before: a log may begin on the brakes.
+    The first demand holds since before the log: a log may begin on the brakes.
     """
-    disc = (drive.log.disc_temperature_k or DISC_K) + world.disc_offset_k
-    pad_k = disc if vehicle.pad_temperature_matters else float(world.p[P.friction_brake_ambient_k])
-    pad = (float(world.p[at]) for at in (P.pad_a_1_ks, P.pad_b_1_j, P.pad_epsilon_w))
-    x = initial_state(vehicle.parameters, 0.0, disc, drive.state_of_charge, mu_equilibrium(0.0, pad_k, *pad))
+    disc = (recording.log.disc_temperature_k or DISC_K) + parameters.disc_offset_k
+    pad_k = disc if vehicle.pad_temperature_matters else float(parameters.p[P.friction_brake_ambient_k])
+    pad = (float(parameters.p[at]) for at in (P.pad_a_1_ks, P.pad_b_1_j, P.pad_epsilon_w))
+    x = initial_state(vehicle.parameters, 0.0, disc, recording.state_of_charge, mu_equilibrium(0.0, pad_k, *pad))
     x[STATE.slice("pad_temperature_k")] = pad_k
-    speed = start_speed(drive, drive.segments[0], world)
+    speed = start_speed(recording, recording.segments[0], parameters)
     x[X.speed_mps] = speed
-    x[STATE.slice("wheel_speed_rad_s")] = speed / _radius_m(world)
-    x[STATE.slice("pressure_pa")] = np.clip(_first_pressures(given), 0.0, None)
-    x[STATE.slice("motor_torque_nm")] = given[0, INPUT.slice("motor_torque_nm")]
-    x[STATE.slice("delayed_demand_pa")] = np.repeat(given[0, INPUT.slice("pressure_demand_pa")], DELAY_SLOTS)
+    x[STATE.slice("wheel_speed_rad_s")] = speed / _radius_m(parameters)
+    x[STATE.slice("pressure_pa")] = np.clip(_first_pressures(inputs), 0.0, None)
+    x[STATE.slice("motor_torque_nm")] = inputs[0, INPUT.slice("motor_torque_nm")]
+    x[STATE.slice("delayed_demand_pa")] = np.repeat(inputs[0, INPUT.slice("pressure_demand_pa")], DELAY_SLOTS)
     return x
 
 
-def _first_pressures(given: Floats) -> Floats:
-    """Measured pressures at the first row, Pa, (4,): a straight line through those before others are asked for."""
-    told, asked = (given[:_STEADY, INPUT.slice(name)] for name in ("pressure_pa", "pressure_demand_pa"))
-    others = np.flatnonzero((asked != asked[0]).any(axis=1))
-    told = told[: others[0] if len(others) else len(told)]
-    if len(told) < 3:
-        return np.asarray(told[0])
-    rows = np.arange(len(told)) - 0.5 * (len(told) - 1)
-    return np.asarray(told.mean(axis=0) + rows[0] * (rows @ told) / float(rows @ rows))
+def _first_pressures(inputs: Floats) -> Floats:
+    """Measured pressures at the first row, Pa, (4,): a straight line through those before the demand changes."""
+    measured, demand = (inputs[:_STEADY, INPUT.slice(name)] for name in ("pressure_pa", "pressure_demand_pa"))
+    changed = np.flatnonzero((demand != demand[0]).any(axis=1))
+    measured = measured[: changed[0] if len(changed) else len(measured)]
+    if len(measured) < 3:
+        return np.asarray(measured[0])
+    rows = np.arange(len(measured)) - 0.5 * (len(measured) - 1)
+    return np.asarray(measured.mean(axis=0) + rows[0] * (rows @ measured) / float(rows @ rows))
 
 
-def start_speed(drive: Recording, segment: Segment, world: ParameterSet) -> float:
-    """Speed a segment starts with: what the sensors told, less what the world's sensors add."""
+def start_speed(recording: Recording, segment: Segment, parameters: ParameterSet) -> float:
+    """Speed a segment starts with, m/s: the measured one without what the parameter set's sensors add."""
     if segment.start_speed_mps is not None:
-        return _moving(ground_speed_before(segment.start_speed_mps, world.theta_in(drive)))
-    told = wheel_speed_before(segment.start_wheel_rad_s, world.theta_in(drive))
-    radii = sorted(_radius_m(world).tolist())
-    return _moving(told * 0.5 * (radii[1] + radii[2]))
+        return _moving(ground_speed_before(segment.start_speed_mps, parameters.theta_in(recording)))
+    middle_rad_s = wheel_speed_before(segment.start_wheel_rad_s, parameters.theta_in(recording))
+    radii = sorted(_radius_m(parameters).tolist())
+    return _moving(middle_rad_s * 0.5 * (radii[1] + radii[2]))
 
 
 def restart_segment(x: Floats, speed_mps: float) -> None:
-    """The measured speed with the slips as they are; temperatures, friction, energy and pitch go on."""
+    """Set a state, in place, to a measured speed with the slips as they are; all but the lateral motion goes on."""
     now = x[X.speed_mps]
     wheels = STATE.slice("wheel_speed_rad_s")
     if not np.isfinite(x).all():
@@ -75,11 +78,11 @@ def restart_segment(x: Floats, speed_mps: float) -> None:
         x[STATE.slice(name)] *= ratio if rolls else 0.0
 
 
-def _radius_m(world: ParameterSet) -> Floats:
+def _radius_m(parameters: ParameterSet) -> Floats:
     """Rolling radius of each wheel, (4,), effects that change it included: no slip at the start that nobody drove."""
-    worn = 1.0 + world.theta[THETA.slice("tyre_radius", "gain")]
-    flat = 1.0 - 0.01 * world.theta[THETA.slice("tyre_pressure_loss", "share")]
-    return np.asarray(float(world.p[P.wheel_rolling_radius_m]) * worn * flat)
+    worn = 1.0 + parameters.theta[THETA.slice("tyre_radius", "gain")]
+    flat = 1.0 - 0.01 * parameters.theta[THETA.slice("tyre_pressure_loss", "share")]
+    return np.asarray(float(parameters.p[P.wheel_rolling_radius_m]) * worn * flat)
 
 
 def _moving(speed_mps: float) -> float:

@@ -1,20 +1,24 @@
-"""What sensors, frames and the tables of logs tell of a replay: channels as a log has them."""
+"""Measurement model: from plant states to channels as logged, by sensors, latency, toothed wheels and sampling.
+
+Takes columns of the plant, (rows, columns), and a parameter set; gives `Stack`, channels by group. Latencies of
+measured inputs are taken back here too (`without_latency`).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from hil.diagnosis.compiled import compiled
 from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Recording
-from hil.diagnosis.data.grid import averaged, cubic, shifted_linear, upsampled
+from hil.diagnosis.data.grid import averaged, cubic, shifted, shifted_linear, upsampled
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.simulation.latency import delayed
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.sensors import after_sensors
 from plant.injection.sensing_chain import Chain
 from plant.parameters.plant import PlantParameters
-from plant.vectors import INPUT
+from plant.vectors import INPUT, P
 
 _WHEELS = ("fl", "fr", "rl", "rr")
 SOURCE = {
@@ -26,22 +30,33 @@ SOURCE = {
     "yaw": ["state.imu_yaw_rate_rad_s"],
     "gps": ["state.speed_mps"],
 }
-"""Columns of the plant that each group of channels tells of."""
+"""Columns of the plant that each group of channels measures."""
 Stack = dict[str, Floats]
-"""Channels by group, (samples of all drives, channels)."""
+"""Channels by group, (samples of all recordings, channels)."""
 _LATE = {"ax": (0,), "ay": (0,), "yaw": (0, 5), "pressure": (1,)}
-"""Which latencies of a world each group has."""
+"""Latencies of a parameter set that each group has."""
 _MOTOR = 2
 _USUAL_RADIUS_M = 0.3
 _TOOTH_ROWS, _TURNS_RAD_S = 2.0, 0.1
+_FADING_MPS, _LEAST_NM = 0.3, 1.0
+_TURNS_MPS2, _CHARACTERISTIC_MPS = 0.3, (8.0, 200.0)
 _FINER = 4
-"""Points a row between which a motor's torque goes straight: as it lags it is bent, and a straight line from row to row
-would come 1.3 ms late."""
+"""Points per row between which a motor's torque is linear: its lag bends it, and a straight line from row to row would
+come 1.3 ms late."""
+
+_MEASURED = (("pressure_pa", 1), ("motor_torque_nm", 2), ("motor_torque_bend_nm", 2))
+_STEERING = INPUT.slice("steering_wheel_rad")
 
 
 @dataclass(frozen=True)
 class MeasurementModel:
-    """Channels of a case: which ``groups`` there are, the car's teeth and radius, the speed its turning goes with."""
+    """Channels of a dataset.
+
+    Attributes
+    ----------
+    groups : of channels.  parameters : the nominal vehicle's (teeth, radius).
+    characteristic_mps : of the car's turning (`powers`), m/s.
+    """
 
     groups: Sequence[str]
     parameters: PlantParameters
@@ -57,42 +72,42 @@ class MeasurementModel:
             at += width
         return stack
 
-    def measure(self, drive: Recording, world: ParameterSet, table: Floats) -> Stack:
-        """Channels as sensors, frames and the tables of logs give what was noted."""
-        stack = self.measure_rows(self.split(table), drive, world)
-        found = {group: averaged(values, drive.stride) for group, values in stack.items()}
-        if "wheel" in found:
-            self._at_measured_speed(found, drive)
-        return found
+    def measure(self, recording: Recording, parameters: ParameterSet, table: Floats) -> Stack:
+        """Channels by sample, (samples, channels), from columns of the plant, (rows, columns)."""
+        stack = self.measure_rows(self.split(table), recording, parameters)
+        channels = {group: averaged(values, recording.stride) for group, values in stack.items()}
+        if "wheel" in channels:
+            self._at_measured_speed(channels, recording)
+        return channels
 
-    def measure_rows(self, happened: Stack, drive: Recording, world: ParameterSet) -> Stack:
-        """Channels as sensors and frames give what happened, row by row."""
-        chain = Chain(world.theta_in(drive))
-        others = {group: values for group, values in happened.items() if group != "motor"}
+    def measure_rows(self, true: Stack, recording: Recording, parameters: ParameterSet) -> Stack:
+        """Channels row by row, as sensors and frames give the ``true`` ones."""
+        chain = Chain(parameters.theta_in(recording))
+        others = {group: values for group, values in true.items() if group != "motor"}
         stack = after_sensors(others, chain, ROW_S) if others else {}
         for group, values in stack.items():
-            late = sum(world.latency_s[k] for k in _LATE.get(group, ()))
+            late = sum(parameters.latency_s[k] for k in _LATE.get(group, ()))
             if late:
                 stack[group] = delayed(values, late / ROW_S, straight=group == "pressure")
             elif group == "wheel":
                 half_turned = np.pi / self.parameters.sensor.teeth / ROW_S
                 stack[group] = np.empty_like(values)
-                toothed(values, world.window_rows2, half_turned, world.tooth_share, stack[group])
-        if "motor" in happened:
-            fine = _finer(happened["motor"], drive.inputs[:, INPUT.slice("motor_torque_bend_nm")])
+                toothed(values, parameters.window_rows2, half_turned, parameters.tooth_share, stack[group])
+        if "motor" in true:
+            fine = _finer(true["motor"], recording.inputs[:, INPUT.slice("motor_torque_bend_nm")])
             fine = after_sensors({"motor": fine}, chain, ROW_S / _FINER)["motor"]
-            stack["motor"] = np.empty_like(happened["motor"])
-            shifted_linear(fine, _FINER, _FINER * world.latency_s[_MOTOR] / ROW_S, stack["motor"])
+            stack["motor"] = np.empty_like(true["motor"])
+            shifted_linear(fine, _FINER, _FINER * parameters.latency_s[_MOTOR] / ROW_S, stack["motor"])
         return stack
 
-    def _at_measured_speed(self, found: Stack, drive: Recording) -> None:
-        """The turning of the car as it is at the measured speed."""
-        factors = np.empty((2, len(found["wheel"])))
+    def _at_measured_speed(self, channels: Stack, recording: Recording) -> None:
+        """Turn the car, in place, as at the measured speed."""
+        factors = np.empty((2, len(channels["wheel"])))
         radius_m = self.parameters.wheel.rolling_radius_m
-        faster_turning(drive.measured["wheel"], found["wheel"], radius_m, self.characteristic_mps, factors)
+        faster_turning(recording.measured["wheel"], channels["wheel"], radius_m, self.characteristic_mps, factors)
         for group, factor in zip(("ay", "yaw"), factors, strict=True):
-            if group in found:
-                found[group] *= factor[:, None]
+            if group in channels:
+                channels[group] *= factor[:, None]
 
 
 @compiled
@@ -108,14 +123,14 @@ def powers(speed_mps: Floats, characteristic_mps: float) -> tuple[Floats, Floats
 
 @compiled
 def faster_turning(measured: Floats, omega: Floats, radius_m: float, characteristic_mps: float, out: Floats) -> None:
-    """Factors of lateral acceleration and yaw rate, (2, samples), that take a car to the speed its wheels are measured
-    at, into ``out``; both speeds are (samples, wheels)."""
+    """Factors of lateral acceleration and yaw rate, (2, samples), from the simulated to the measured speed, into
+    ``out``; both speeds are (samples, wheels), rad/s."""
     wheels = omega.shape[1]
     for t in range(omega.shape[0]):
         faster, mean = 0.0, 0.0
         for k in range(wheels):
-            apart = measured[t, k] - omega[t, k]
-            faster += apart / wheels if apart == apart else 0.0
+            difference = measured[t, k] - omega[t, k]
+            faster += difference / wheels if difference == difference else 0.0
             mean += omega[t, k] / wheels
         turning = np.copysign(max(abs(mean), SLOW_MPS / _USUAL_RADIUS_M), mean)
         share = min(max(faster / turning, -0.2), 0.2)
@@ -125,7 +140,7 @@ def faster_turning(measured: Floats, omega: Floats, radius_m: float, characteris
 
 
 def _finer(torque_nm: Floats, bend_nm: Floats) -> Floats:
-    """Torque on rows and between them: a parabola that is off the straight line by ``bend_nm`` in the middle."""
+    """Torque at `_FINER` points per row: parabolas that are off the straight line by ``bend_nm`` in the middle."""
     out = np.empty((len(torque_nm) * _FINER, torque_nm.shape[1]))
     upsampled(torque_nm, bend_nm, out)
     return out
@@ -133,7 +148,7 @@ def _finer(torque_nm: Floats, bend_nm: Floats) -> Floats:
 
 @compiled
 def toothed(omega: Floats, window_rows2: float, half_pitch: float, share: float, out: Floats) -> None:
-    """Speeds (rows, wheels) as toothed wheels tell them, when a tooth has passed, into ``out``.
+    """Speeds (rows, wheels) as toothed wheels measure them, when a tooth has passed, into ``out``.
 
     ``half_pitch`` is half the angle between two teeth, rad rows/s: a speed comes later by a ``share`` of the time that
     takes, two rows at most. It is a mean over a window of squared width ``window_rows2``, by its second derivative.
@@ -146,3 +161,77 @@ def toothed(omega: Floats, window_rows2: float, half_pitch: float, share: float,
         for k in range(omega.shape[1]):
             rows = min(half_pitch / max(abs(omega[t, k]), _TURNS_RAD_S), _TOOTH_ROWS)
             out[t, k] = cubic(mean, k, t - share * rows)
+
+
+def delayed(values: Floats, rows: float, straight: bool = False) -> Floats:
+    """Channels some rows later.
+
+    ``straight`` lines between rows for what has corners, as a motor at its rate limit; else parabolas
+    (`hil.diagnosis.data.grid`).
+    """
+    out = np.empty(values.shape)
+    if straight:
+        shifted_linear(values, 1, rows, out)
+    else:
+        shifted(values, rows, out)
+    return out
+
+
+def _held_later(values: Floats, rows: float) -> Floats:
+    """Held values that change a fraction of a row later (earlier where negative), as the mean over each row."""
+    change = np.diff(values, axis=0)
+    moved = values.copy()
+    if rows >= 0.0:
+        moved[1:] -= min(rows, 1.0) * change
+    else:
+        moved[:-1] += min(-rows, 1.0) * change
+    return moved
+
+
+def without_latency(inputs: Floats, late_s: tuple[float, ...]) -> Floats:
+    """Measured inputs, (rows, INPUT.size), with their nodes' latency (s) taken back; demands when they are acted on."""
+    if not any(late_s[1:5]):
+        return inputs
+    moved = inputs.copy()
+    moved[:, _STEERING] = delayed(inputs[:, _STEERING], late_s[4] / ROW_S)
+    for part in ("pressure_demand_pa", "motor_demand_nm"):
+        where = INPUT.slice(part)
+        moved[:, where] = _held_later(inputs[:, where], late_s[3] / ROW_S)
+    for part, late in _MEASURED:
+        where = INPUT.slice(part)
+        moved[:, where] = delayed(inputs[:, where], -late_s[late] / ROW_S, straight=True)
+    return moved
+
+
+def without_fading_motors(recording: Recording, parameters: ParameterSet) -> Stack:
+    """Measured channels without motors whose braking fades: there it answers errors of speed no sensor resolves.
+
+    Which way a wheel at rest creeps is such an error, too: there any torque may be taken for one that brakes.
+    """
+    if not {"motor", "wheel"} <= set(recording.measured):
+        return recording.measured
+    speed = np.nan_to_num(recording.measured["wheel"]) * float(parameters.p[P.wheel_rolling_radius_m])
+    demand = averaged(recording.inputs[:, INPUT.slice("motor_demand_nm")], recording.stride)
+    brakes = (speed < float(parameters.p[P.motor_fade_start_mps]) + _FADING_MPS) & (demand < -_LEAST_NM)
+    fades = brakes | ((np.abs(speed) < _FADING_MPS) & (np.abs(demand) > _LEAST_NM))
+    return {**recording.measured, "motor": np.where(fades, np.nan, recording.measured["motor"])}
+
+
+def characteristic_speed(one: Stack, other: Stack, parameters: ParameterSet) -> float:
+    """Characteristic speed of `powers`, m/s: how lateral acceleration goes with a small difference of the speed.
+
+    ``one`` and ``other`` are plant columns of the same car at speeds a little apart; infinite where it does not turn.
+    """
+    wheel = one["wheel"].mean(axis=1)
+    v = wheel * float(parameters.p[P.wheel_rolling_radius_m])
+    turning = (np.abs(one["ay"][:, 0]) > _TURNS_MPS2) & (v > SLOW_MPS)
+    ay, v, faster = one["ay"][turning, 0], v[turning], (other["wheel"] - one["wheel"]).mean(axis=1)[turning]
+    if not len(ay):
+        return np.inf
+    share = faster / wheel[turning]
+
+    def misfit(log_speed: float) -> float:
+        predicted = ay * share * powers(v, np.exp(log_speed))[0]
+        return float(np.sum(((other["ay"] - one["ay"])[turning, 0] - predicted) ** 2))
+
+    return float(np.exp(minimize_scalar(misfit, bounds=np.log(_CHARACTERISTIC_MPS), method="bounded").x))

@@ -1,4 +1,7 @@
-"""One car of the study: its numbers, effects and latencies; how numbers of the vehicle move it."""
+"""One simulated car: parameters of the vehicle, effects, latencies, onsets; how nuisance parameters move it.
+
+Takes the nominal vehicle and standard deviations of its nuisances; gives what the simulator runs.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -7,7 +10,7 @@ import numpy as np
 
 from hil.diagnosis.data.dataset import ROW_S, Recording
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.simulation import excitation as acting
+from hil.diagnosis.simulation import excitation
 from hil.diagnosis.simulation.excitation import Excitation
 from hil.diagnosis.simulation.sensors import SENSORS
 from hil.diagnosis.vehicle.extension_file import Extension
@@ -22,7 +25,7 @@ _SIGN_ALONG_ROAD = (("road_grade", "grade"), ("headwind", "wind_mps"))
 
 @dataclass(frozen=True)
 class Onset:
-    """An effect that begins in the middle: ``number`` of the drive, and s in it.
+    """Time from which an effect acts: ``recording`` by its number, and s in it.
 
     ``before`` are its strengths until then: what single wheels are off was there before a cause of the same kind.
     """
@@ -35,11 +38,16 @@ class Onset:
 
 @dataclass(frozen=True, eq=False)
 class ParameterSet:
-    """One car: flat parameters, theta, basis terms (rows as in `plant.injection.bank`), discs at the start, latencies.
+    """One simulated car.
 
-    ``onsets`` are effects that begin in the middle.
-    ``tooth_share`` multiplies the lag of a toothed wheel, half the time between two teeth: the speed is told when a
-    tooth has passed; ``window_rows2`` is the square of the time over which it is a mean, in rows.
+    Attributes
+    ----------
+    p : (PARAMETER.size,) parameters of the vehicle.  theta : (THETA.size,) parameters of the effects.
+    nonparametric_rows : (rows, columns) of nonparametric terms, as in `plant.injection.bank`.
+    disc_offset_k : of the discs at the start of a log.  latency_s : of each of `LATENCY_NODES`.
+    tooth_share : multiplies the lag of a toothed wheel, half the time between two teeth: it measures when a tooth has
+        passed.  window_rows2 : square of the time over which that speed is a mean, in rows.
+    onsets : of effects that act from a time on.
     """
 
     p: Floats
@@ -51,33 +59,33 @@ class ParameterSet:
     window_rows2: float = 0.0
     onsets: tuple[Onset, ...] = ()
 
-    def theta_in(self, drive: Recording) -> Floats:
-        """Theta of one drive: direction along the road, and what begins later or within it."""
-        return self.thetas_in(drive)[-1][1]
+    def theta_in(self, recording: Recording) -> Floats:
+        """Theta of one recording at its end: direction along the road, onsets in it or later."""
+        return self.thetas_in(recording)[-1][1]
 
-    def thetas_in(self, drive: Recording) -> list[tuple[int, Floats]]:
-        """Theta of one drive from a row on, the first from 0: until an effect begins within it, it is as it was."""
+    def thetas_in(self, recording: Recording) -> list[tuple[int, Floats]]:
+        """Thetas of one recording with their first rows, the first from 0: an onset within it cuts it in two."""
         theta = self.theta.copy() if self.onsets else self.theta
-        within = sorted((one for one in self.onsets if one.recording == drive.number), key=lambda one: one.since_s)
-        for begun in self.onsets:
-            if drive.number < begun.recording:
-                theta[_strengths(begun.effect)] = begun.before
-        for begun in within:
-            theta[THETA.slice(begun.effect, "onset_s")] = begun.since_s
-        found = [(0, theta)]
-        for begun in reversed(within):
-            earlier, own = found[0][1].copy(), THETA.slice(begun.effect, "onset_s")
-            earlier[_strengths(begun.effect)], earlier[own] = begun.before, THETA.neutral()[own]
-            found = [(0, earlier), (int(begun.since_s / ROW_S), found[0][1]), *found[1:]]
-        return [(row, _along(one, drive.log.direction)) for row, one in found]
+        within = sorted((one for one in self.onsets if one.recording == recording.number), key=lambda one: one.since_s)
+        for onset in self.onsets:
+            if recording.number < onset.recording:
+                theta[_strengths(onset.effect)] = onset.before
+        for onset in within:
+            theta[THETA.slice(onset.effect, "onset_s")] = onset.since_s
+        thetas = [(0, theta)]
+        for onset in reversed(within):
+            earlier, own = thetas[0][1].copy(), THETA.slice(onset.effect, "onset_s")
+            earlier[_strengths(onset.effect)], earlier[own] = onset.before, THETA.neutral()[own]
+            thetas = [(0, earlier), (int(onset.since_s / ROW_S), thetas[0][1]), *thetas[1:]]
+        return [(row, _along(one, recording.log.direction)) for row, one in thetas]
 
     def with_onset(self, effect: str, number: int, since_s: float, before: "ParameterSet") -> "ParameterSet":
-        """With an effect that begins in the middle, and was as in a world ``before``."""
+        """With an effect that acts from a time on in recording ``number``; until then, with strengths of ``before``."""
         strengths = tuple(before.theta[_strengths(effect)].tolist())
         return replace(self, onsets=(*self.onsets, Onset(effect, number, since_s, strengths)))
 
     def with_nuisances(self, nuisances: Sequence[Nuisance], z: Floats) -> "ParameterSet":
-        """With nuisances ``z`` standard deviations off."""
+        """With nuisances ``z`` prior standard deviations off, (nuisances,)."""
         p, disc, late, tooth = self.p.copy(), self.disc_offset_k, list(self.latency_s), self.tooth_share
         theta, window = self.theta.copy(), self.window_rows2
         for nuisance, amount in zip(nuisances, z, strict=True):
@@ -119,24 +127,24 @@ class ParameterSet:
 
 
 def _positive(now: float, z: float, step: float) -> float:
-    """A positive number ``z`` standard deviations off: it never goes through zero."""
+    """A positive parameter ``z`` standard deviations off: it never goes through zero."""
     factor = factor_of(now, step)
     return float(now * factor ** (z * np.sign(step))) if factor > 1.0 else now + z * step
 
 
 def nominal(vehicle: Vehicle) -> ParameterSet:
-    """The car as handed in."""
+    """Parameter set of the nominal vehicle."""
     return ParameterSet(vehicle.p, THETA.neutral())
 
 
 def _strengths(effect: str) -> list[int]:
-    """Where the strengths of an effect lie in theta."""
+    """Indices in theta of the strengths of an effect."""
     slices = (THETA.slice(effect, parameter.name) for parameter in THETA.effect(effect).strengths)
     return [at for own in slices for at in range(own.start, own.stop)]
 
 
 def _along(theta: Floats, direction: int) -> Floats:
-    """Theta as met when driving along the road (+1) or back (-1)."""
+    """Theta when driving along the road (+1) or back (-1)."""
     if direction > 0:
         return theta
     turned = theta.copy()
@@ -145,22 +153,24 @@ def _along(theta: Floats, direction: int) -> Floats:
     return turned
 
 
-def excitation_that_separates(one: ParameterSet, other: ParameterSet, drive: Recording) -> Excitation:
-    """What must be going on in a drive for two worlds to move differently in it."""
-    thetas = (one.theta_in(drive), other.theta_in(drive)) if one.onsets or other.onsets else (one.theta, other.theta)
-    found = acting.of_effects(*thetas) | acting.of_terms(one.nonparametric_rows, other.nonparametric_rows)
+def excitation_that_separates(one: ParameterSet, other: ParameterSet, recording: Recording) -> Excitation:
+    """Excitation a segment of the recording needs for two parameter sets to move differently in it."""
+    thetas = one.theta, other.theta
+    if one.onsets or other.onsets:
+        thetas = one.theta_in(recording), other.theta_in(recording)
+    needed = excitation.of_effects(*thetas) | excitation.of_terms(one.nonparametric_rows, other.nonparametric_rows)
     if one.p is not other.p:
-        found |= acting.of_parameters(one.p, other.p)
+        needed |= excitation.of_parameters(one.p, other.p)
     if one.disc_offset_k != other.disc_offset_k:
-        found |= Excitation.BRAKES
-    for late, also, of in zip(one.latency_s, other.latency_s, acting.OF_LATENCY, strict=True):
+        needed |= Excitation.BRAKES
+    for late, also, of in zip(one.latency_s, other.latency_s, excitation.OF_LATENCY, strict=True):
         if late != also:
-            found |= of
-    return found
+            needed |= of
+    return needed
 
 
 def same_sensors(one: ParameterSet, other: ParameterSet) -> bool:
-    """Whether sensors, clocks and frames of two worlds are alike: the same motion is told in the same way."""
+    """True where sensors, clocks and frames are alike: the same motion gives the same channels."""
     same = one.latency_s == other.latency_s and one.onsets == other.onsets
     same = same and (one.tooth_share, one.window_rows2) == (other.tooth_share, other.window_rows2)
     return same and bool((one.theta[SENSORS] == other.theta[SENSORS]).all())

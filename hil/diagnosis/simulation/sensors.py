@@ -1,4 +1,7 @@
-"""Sensor and clock effects on the study's arrays: on simulated channels, and taken back from measured inputs."""
+"""Sensor and clock effects on arrays: applied to simulated channels, and taken back from measured inputs and speeds.
+
+Takes channels by group or inputs, (rows, columns), and theta; gives the same shapes.
+"""
 
 from collections.abc import Mapping
 
@@ -23,7 +26,7 @@ OUTPUT_SENSORS = np.concatenate(
         for parameter in effect.parameters
     ]
 )
-"""Places in theta of sensing effects that leave the replay's inputs alone."""
+"""Indices in theta of sensing effects that leave the plant's inputs alone."""
 SENSORS = np.concatenate(
     [
         np.arange(THETA.size)[THETA.slice(effect.name, name)]
@@ -31,13 +34,13 @@ SENSORS = np.concatenate(
         for name in (*(parameter.name for parameter in effect.parameters), "onset_s", "until_s")
     ]
 )
-"""Places in theta of all that says what sensors and clocks do."""
+"""Indices in theta of all parameters of sensors and clocks."""
 _GROUND_SCALE = THETA.slice("speed_scale", "gain").start
 _WHEEL_SCALE = THETA.slice("wrong_scale", "factor").start + NODES.index("wheel")
 
 
 def before_sensors(inputs: Floats, theta: Floats, row_s: float) -> Floats:
-    """Inputs as they were before the sensors; what loses information (a filter, a step) is left as it is."""
+    """Inputs before the sensors, (rows, INPUT.size); what loses information (a filter, a step) is left as it is."""
     chain = Chain(theta)
     if not any(chain.touches(node) for node in _INPUT):
         return inputs
@@ -55,23 +58,23 @@ def before_sensors(inputs: Floats, theta: Floats, row_s: float) -> Floats:
 
 def after_sensors(stack: Stack, chain: Chain, row_s: float) -> dict[str, Floats]:
     """Channels as the sensors give them."""
-    found = dict(stack)
+    sensed = dict(stack)
     time_s: Floats = np.arange(len(next(iter(stack.values())))) * row_s
     for group, node in _NODE.items():
-        if group in found and chain.touches(node):
-            found[group] = chain.sense(node, time_s, found[group])
-    if chain.touches("imu") and any(name in found for name in _IMU):
+        if group in sensed and chain.touches(node):
+            sensed[group] = chain.sense(node, time_s, sensed[group])
+    if chain.touches("imu") and any(name in sensed for name in _IMU):
         rest = np.zeros((len(time_s), 1))
-        body = chain.sense("imu", time_s, np.hstack([found.get(name, rest) for name in _IMU]))
-        found |= {name: body[:, k : k + 1] for k, name in enumerate(_IMU) if name in found}
-    return found
+        body = chain.sense("imu", time_s, np.hstack([sensed.get(name, rest) for name in _IMU]))
+        sensed |= {name: body[:, k : k + 1] for k, name in enumerate(_IMU) if name in sensed}
+    return sensed
 
 
-def wheel_speed_before(told_rad_s: float, theta: Floats) -> float:
-    """Middle wheel speed before a wrong scale of the wheel node; other wheel effects move no start."""
-    return told_rad_s / (1.0 + float(theta[_WHEEL_SCALE]))
+def wheel_speed_before(measured_rad_s: float, theta: Floats) -> float:
+    """Middle wheel speed before a wrong scale of the wheel node; other wheel effects change no start speed."""
+    return measured_rad_s / (1.0 + float(theta[_WHEEL_SCALE]))
 
 
-def ground_speed_before(told_mps: float, theta: Floats) -> float:
-    """Speed over ground before a wrong scale of what tells it."""
-    return told_mps / (1.0 + float(theta[_GROUND_SCALE]))
+def ground_speed_before(measured_mps: float, theta: Floats) -> float:
+    """Speed over ground before a wrong scale of its sensor."""
+    return measured_mps / (1.0 + float(theta[_GROUND_SCALE]))

@@ -69,8 +69,10 @@ def _of_numbers(screened: Iterable[ScoreTest]) -> Iterator[tuple[Key, float]]:
 
 def _of_laws(found: Diagnosis) -> Iterator[tuple[Key, float]]:
     """Gains of the laws in no list, by coefficient."""
-    fitter, model = found.fitter, found.base
-    for entry in GroupScoreTest(fitter, fitter.parameter_set(model.z, ())).scores(fitter, model, found.first_noise):
+    model = found.base
+    fitter = found.fitter.at_baseline(model)
+    entries, _ = GroupScoreTest(fitter, fitter.parameter_set(model.z, ())).scores(fitter, model, found.first_noise)
+    for entry in entries:
         yield (UNLISTED, entry.expansion.term.name, location_kind(entry.expansion.location)), entry.gain / BASIS_SIZE
 
 

@@ -50,9 +50,12 @@ def problem(logs: Sequence[Path], vehicle: Path) -> Problem:
     base = nominal(car)
     radius_m = float(car.parameters.wheel.rolling_radius_m)
     torque_constant = float(car.parameters.motor.torque_constant_nm_a)
-    rig = Simulator(prepare(read_logs(logs, None, None, None, torque_constant), radius_m), car).denoised(base)
+    rig = (
+        Simulator(prepare(read_logs(logs, None, None, None, torque_constant), radius_m), car)
+        .prepared(base)
+        .with_baseline(base)
+    )
     frame = SampleMasks.of(rig.dataset)
-    rig.cache_baseline(base)
     simulated = rig.run(base)
     apart = {group: values - simulated[group] for group, values in rig.measured().items()}
     residual = tracks_of(apart, frame, radius_m)

@@ -22,7 +22,7 @@ def _cosine(log, one: str, other: str) -> float:
     vehicle = load_vehicle(VEHICLE)
     dataset = prepare([log], 0.318)
     base, masks = nominal(vehicle), SampleMasks.of(dataset)
-    simulator = Simulator(dataset, vehicle).denoised(base)
+    simulator = Simulator(dataset, vehicle).prepared(base)
     listed = {candidate.name: candidate for candidate in CandidateSet(simulator, masks, ()).candidates}
     signatures = []
     for name in (one, other):

@@ -97,6 +97,6 @@ def test_a_scanned_onset_of_what_was_always_there_goes(always):
     fresh = fitter()
     noise = fresh.alternate_noise_and_fit(fresh.at(nominal_z, (there,), fresh.start()[1]), fresh.start()[1], 2)[1]
     taken = fresh.at(nominal_z, (Term(pads, -0.2, onset=second),), noise)
-    (term,) = estimate_onsets(fresh, taken, noise).terms
+    (term,) = estimate_onsets(fresh, taken, noise)[0].terms
     assert (term.onset is None) is always
     assert term.value == pytest.approx(-0.2, abs=0.02)

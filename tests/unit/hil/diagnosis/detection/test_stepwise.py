@@ -79,9 +79,9 @@ def test_what_acts_alike_needs_no_fit_once_its_value_is_found(driven):
 def _singles(driven: _Driven, names: Sequence[str], values: Sequence[float]) -> list[FittedHypothesis]:
     """Single causes that would take the place of these."""
     model = driven.fitted(names, values, 8)
-    driven.candidates.linearise_at(driven.fitter, driven.bare)
+    driven.candidates.linearise_at(driven.fitter.at_baseline(driven.bare), driven.bare)
     accepted = [driven.hypothesis(replace(model, terms=model.terms[:k])) for k in (1, 2)]
-    return try_single_cause(driven.fitter, driven.candidates, accepted, model, driven.noise)
+    return try_single_cause(driven.fitter, driven.candidates, accepted, model, driven.noise)[0]
 
 
 @pytest.mark.slow

@@ -31,12 +31,18 @@ RADIUS_M, BRAKES_S = 0.308, 2.0
 
 
 def _stop(wheels: np.ndarray) -> Simulator:
-    """A rig of a stop from 20 m/s with these wheel speeds, rad/s, every 10 ms, on hot discs."""
+    """A simulator of a stop from 20 m/s with these wheel speeds, rad/s, every 10 ms, on hot discs."""
     t = np.arange(len(wheels)) * 0.01
     channels = {f"wheel_speed_{w}_rad_s": wheels[:, k] for k, w in enumerate(WHEELS)}
     channels |= {f"pressure_{w}_pa": np.where(t > BRAKES_S, 35e5, 0.0) for w in WHEELS}
     log = replace(make_log("hot", t, channels), disc_temperature_k=650.0)
     return Simulator(prepare([log], RADIUS_M), paper_car())
+
+
+def _turned(simulator: Simulator, by_rad: float = 0.0) -> Simulator:
+    """With hot spots at these angles from where each log began."""
+    angles = tuple(wheel_angles(recording) + by_rad for recording in simulator.dataset.recordings)
+    return replace(simulator, hot_spot_angles=angles)
 
 
 def _spotted(world: ParameterSet, amplitude: float) -> ParameterSet:
@@ -50,32 +56,31 @@ def rolled() -> np.ndarray:
     """Wheel speeds of the car without spots, as it simulates them: a log that it explains."""
     t = np.arange(650) * 0.01
     speed = np.clip(20.0 - 5.4 * np.clip(t - BRAKES_S, 0.0, None), 0.0, None) / RADIUS_M
-    rig = _stop(np.column_stack([speed] * 4))
-    return rig.states(nominal(rig.vehicle), SOURCE["wheel"])
+    simulator = _stop(np.column_stack([speed] * 4))
+    return simulator.states(nominal(simulator.vehicle), SOURCE["wheel"])
 
 
 def test_spots_are_turned_to_where_the_wheels_show_them(rolled: np.ndarray) -> None:
     """Of a car whose spots stand elsewhere the amplitude is seen once they are turned, and was not before."""
     made = _stop(rolled)
     world = nominal(made.vehicle)
-    made._turned = [wheel_angles(drive) + QUARTER_RAD for drive in made.dataset.recordings]
+    made = _turned(made, QUARTER_RAD)
     spots = made.states(_spotted(world, AMPLITUDE), SOURCE["wheel"]) - made.states(world, SOURCE["wheel"])
     seen = rolled[: len(spots)] + spots
 
-    def told(rig: Simulator) -> float:
+    def told(simulator: Simulator) -> float:
         """The amplitude that explains most, by one linear step, of the samples that are compared."""
-        compared = rig.dataset.recordings[0].moving > 0.5
-        bare = rig.run(world)["wheel"]
-        left = np.diff((rig.measured()["wheel"] - bare)[compared], axis=0).ravel()
-        shown = np.diff((rig.run(_spotted(world, 0.01))["wheel"] - bare)[compared], axis=0).ravel() / 0.01
+        compared = simulator.dataset.recordings[0].moving > 0.5
+        bare = simulator.run(world)["wheel"]
+        left = np.diff((simulator.measured()["wheel"] - bare)[compared], axis=0).ravel()
+        shown = np.diff((simulator.run(_spotted(world, 0.01))["wheel"] - bare)[compared], axis=0).ravel() / 0.01
         return float(left @ shown / (shown @ shown))
 
-    rig = _stop(seen)
-    rig._turned = [wheel_angles(drive) for drive in rig.dataset.recordings]
-    before = told(rig)
-    assert not rig.fit_hot_spot_phase(world)
+    simulator = _stop(seen)
+    before = told(_turned(simulator))
+    simulator = simulator.with_hot_spot_phase(world)
     assert before != pytest.approx(AMPLITUDE, rel=0.2)
-    assert told(rig) == pytest.approx(AMPLITUDE, rel=0.2)
+    assert told(simulator) == pytest.approx(AMPLITUDE, rel=0.2)
 
 
 @pytest.mark.parametrize("stand", [-0.3, -0.05, 0.0, 0.2, 0.31])
@@ -122,15 +127,16 @@ def test_parts_have_all_rows_once() -> None:
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_spots_are_turned_for_the_sign_they_have(rolled: np.ndarray, sign: float) -> None:
     """Of a car handed in with spots: less than none is the same spots half the way to the next."""
-    made = _stop(rolled)
-    made._turned = [wheel_angles(drive) for drive in made.dataset.recordings]
+    made = _turned(_stop(rolled))
     world = _spotted(nominal(made.vehicle), AMPLITUDE)
     seen = made.states(world, SOURCE["wheel"])
-    rig = _stop(seen)
+    simulator = _stop(seen)
     told = _spotted(world, sign * AMPLITUDE)
-    assert rig.fit_hot_spot_phase(told)
-    compared = rig.dataset.recordings[0].moving > 0.5
-    left, bare = (rig.measured()["wheel"] - rig.run(one)["wheel"] for one in (told, nominal(rig.vehicle)))
+    simulator = simulator.with_hot_spot_phase(told)
+    compared = simulator.dataset.recordings[0].moving > 0.5
+    left, bare = (
+        simulator.measured()["wheel"] - simulator.run(one)["wheel"] for one in (told, nominal(simulator.vehicle))
+    )
     assert np.diff(left[compared], axis=0).std() < 0.4 * np.diff(bare[compared], axis=0).std()
 
 

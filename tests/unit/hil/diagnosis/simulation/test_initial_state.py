@@ -17,7 +17,7 @@ HELD_PA, NOISE_PA = 10e5, 3e4
 
 
 @pytest.fixture(scope="module")
-def rig() -> Simulator:
+def simulator() -> Simulator:
     """A car that stands on its brakes from before the log on, and drives off at 6 s."""
     t, rng = np.arange(1500) * 0.01, np.random.default_rng(5)
     held, speed = t < 6.0, np.clip(1.5 * (t - 6.5), 0.0, None)
@@ -28,17 +28,17 @@ def rig() -> Simulator:
     return Simulator(prepare([make_log("log", t, channels)], 0.308), paper_car())
 
 
-def test_what_is_asked_at_first_was_asked_before_the_log(rig):
+def test_what_is_asked_at_first_was_asked_before_the_log(simulator):
     """Pressures fell for a dead time, as if nobody had braked before, and a shorter one seemed to be true."""
-    begun = rig.run(nominal(rig.vehicle))["pressure"][:25]
+    begun = simulator.run(nominal(simulator.vehicle))["pressure"][:25]
     assert np.abs(begun - HELD_PA).max() < 2.0 * NOISE_PA
     assert np.abs(begun[10:] - HELD_PA).max() < 0.2 * NOISE_PA
 
 
 @pytest.mark.parametrize("share", [0.2, 3.0])
-def test_a_dead_time_changes_nothing_where_nothing_changes(rig, share):
-    car = nominal(rig.vehicle)
+def test_a_dead_time_changes_nothing_where_nothing_changes(simulator, share):
+    car = nominal(simulator.vehicle)
     p = car.p.copy()
     p[P.ehb_dead_time_s] *= share
-    other = rig.run(replace(car, p=p))["pressure"][:250]
-    assert np.abs(other - rig.run(car)["pressure"][:250]).max() < 1.0
+    other = simulator.run(replace(car, p=p))["pressure"][:250]
+    assert np.abs(other - simulator.run(car)["pressure"][:250]).max() < 1.0

@@ -38,7 +38,7 @@ def _log() -> Log:
 
 
 @pytest.fixture(scope="module")
-def rig() -> Simulator:
+def simulator() -> Simulator:
     return Simulator(prepare([_log()], 0.308), paper_car())
 
 
@@ -53,10 +53,10 @@ def _with(world: ParameterSet, effect: str, number: str, value: float | np.ndarr
     return replace(world, theta=theta)
 
 
-def test_a_motor_at_its_limit_does_not_answer_an_error_of_the_speed(rig):
+def test_a_motor_at_its_limit_does_not_answer_an_error_of_the_speed(simulator):
     """A limit that followed the simulated speed told more of mass, drag and grade than the motion of the car did."""
-    level = nominal(rig.vehicle)
-    flat, steep = (rig.run(world) for world in (level, _with(level, "road_grade", "grade", 0.03)))
+    level = nominal(simulator.vehicle)
+    flat, steep = (simulator.run(world) for world in (level, _with(level, "road_grade", "grade", 0.03)))
     assert np.abs(steep["wheel"] - flat["wheel"]).max() > 1.0
     assert np.abs(flat["motor"]).max() > 100.0
     assert np.array_equal(steep["motor"], flat["motor"])
@@ -73,7 +73,7 @@ def test_a_motor_that_pulls_away_is_not_compared_before_the_wheels_turn():
     pressed = {f"pressure_{w}_pa": 5e5 * ~pulls for w in WHEELS}
     case = prepare([make_log("log", t, turning | asked | told | pressed)], 0.308)
     car = paper_car()
-    (drive,) = Simulator(case, car).denoised(nominal(car)).dataset.recordings
+    (drive,) = Simulator(case, car).prepared(nominal(car)).dataset.recordings
     at = np.arange(len(drive.measured["motor"])) * 0.01 * drive.stride
     rests = (at > 5.1) & (at < 5.4)
     assert rests.any()
@@ -98,15 +98,15 @@ def test_motors_of_which_nobody_says_how_hot_they_get_are_not_derated():
     ("pad_mu_gain", "gain", 0.1), ("iwm_gain", "gain", 0.1), ("ehb_dead_time", "time_s", 0.01),
     ("road_grade", "grade", 0.01), ("imu_bias", "ax_mps2", 0.1), ("pressure_offset", "offset_pa", 1e4),
 ])  # fmt: skip
-def test_a_kept_world_changes_no_result(rig, effect, number, value):
-    level = nominal(rig.vehicle)
+def test_a_kept_world_changes_no_result(simulator, effect, number, value):
+    level = nominal(simulator.vehicle)
     changed = _with(level, effect, number, value)
-    fresh = Simulator(rig.case, rig.vehicle).run(changed)
-    rig.keep(level)
-    kept = rig.run(changed)
+    fresh = Simulator(simulator.dataset, simulator.vehicle).run(changed)
+    simulator = simulator.with_baseline(level)
+    kept = simulator.run(changed)
     for group, values in fresh.items():
         apart = np.abs(kept[group] - values).max()
-        assert apart <= 2e-3 * max(np.abs(values - rig.run(level)[group]).max(), 1e-9), group
+        assert apart <= 2e-3 * max(np.abs(values - simulator.run(level)[group]).max(), 1e-9), group
 
 
 @pytest.mark.parametrize(("effect", "number", "value", "acts"), [
@@ -123,8 +123,7 @@ def test_a_standing_car_is_replayed_for_what_acts_on_it(effect, number, value, a
     stands = Simulator(prepare([make_log("stands", t, channels), _log()], 0.308), paper_car())
     samples, level = stands.dataset.recordings[0].samples, nominal(stands.vehicle)
     before, fresh = stands.run(level), stands.run(_with(level, effect, number, value))
-    stands.cache_baseline(level)
-    kept = stands.run(_with(level, effect, number, value))
+    kept = stands.with_baseline(level).run(_with(level, effect, number, value))
     same = all(np.array_equal(values[:samples], kept[group][:samples]) for group, values in before.items())
     assert same != acts
     for group, most in (("wheel", 1e-2), ("ax", 2e-3), ("pressure", 1.0)):
@@ -132,27 +131,27 @@ def test_a_standing_car_is_replayed_for_what_acts_on_it(effect, number, value, a
 
 
 @pytest.mark.parametrize("change", [
-    {"late_s": late("imu", 0.004)}, {"late_s": late("pressure", 0.004)}, {"late_s": late("demand", 0.004)},
+    {"latency_s": late("imu", 0.004)}, {"latency_s": late("pressure", 0.004)}, {"latency_s": late("demand", 0.004)},
     {"window_rows2": 4.0}, {"tooth_share": 0.2},
 ])  # fmt: skip
-def test_what_a_kept_world_was_told_is_not_told_of_other_frames_or_teeth(rig, change):
-    level = nominal(rig.vehicle)
+def test_what_a_kept_world_was_told_is_not_told_of_other_frames_or_teeth(simulator, change):
+    level = nominal(simulator.vehicle)
     changed = replace(level, **change)
-    fresh = Simulator(rig.case, rig.vehicle).run(changed)
-    rig.keep(level)
-    kept = rig.run(changed)
-    assert any(np.abs(values - rig.run(level)[group]).max() > 1e-6 for group, values in fresh.items())
+    fresh = Simulator(simulator.dataset, simulator.vehicle).run(changed)
+    simulator = simulator.with_baseline(level)
+    kept = simulator.run(changed)
+    assert any(np.abs(values - simulator.run(level)[group]).max() > 1e-6 for group, values in fresh.items())
     for group, values in fresh.items():
         assert np.array_equal(kept[group], values), group
 
 
-def test_until_a_cause_begins_what_single_wheels_are_off_is_there(rig):
+def test_until_a_cause_begins_what_single_wheels_are_off_is_there(simulator):
     """Pads of one wheel grow weak in the middle of a stop: until then the four were as unlike as they were."""
-    level = nominal(rig.vehicle)
+    level = nominal(simulator.vehicle)
     unlike = _with(level, "pad_mu_gain", "gain", np.array([0.01, -0.03, 0.02, 0.0]))
     weak = _with(unlike, "pad_mu_gain", "gain", np.array([-0.3, -0.03, 0.02, 0.0]))
     begun = weak.with_onset("pad_mu_gain", 0, 21.0, before=unlike)
-    alone, always, within = (rig.run(world)["wheel"] for world in (unlike, weak, begun))
+    alone, always, within = (simulator.run(world)["wheel"] for world in (unlike, weak, begun))
     assert np.abs(within - alone)[:1049].max() == 0.0
     assert np.abs(within - alone)[1075:1140].max() > 0.5
     assert np.abs(alone - always)[:1049].max() > 0.5
@@ -162,8 +161,8 @@ def test_a_sensor_that_tells_too_much_does_not_press_the_pads_at_the_start():
     """The offset is in the first sample as in all others: no pressure that was never there has to be let off."""
     log, offset = _log(), 1e5
     told = {f"pressure_{w}_pa": log.channels[f"pressure_{w}_pa"] + offset for w in WHEELS}
-    rig = Simulator(prepare([make_log("log", log.t_s, {**log.channels, **told})], 0.308), paper_car())
-    pressure = rig.run(_with(nominal(rig.vehicle), "pressure_offset", "offset_pa", offset))["pressure"]
+    simulator = Simulator(prepare([make_log("log", log.t_s, {**log.channels, **told})], 0.308), paper_car())
+    pressure = simulator.run(_with(nominal(simulator.vehicle), "pressure_offset", "offset_pa", offset))["pressure"]
     assert pressure[:100] == pytest.approx(offset, abs=1.0)
 
 
@@ -172,33 +171,33 @@ def test_a_ground_speed_that_tells_too_much_starts_a_car_as_slow_as_it_was():
     log = _log()
     ground = log.channels["wheel_speed_fl_rad_s"] * 0.308
     channels = {name: values for name, values in log.channels.items() if not name.startswith("wheel_speed")}
-    rig = Simulator(prepare([make_log("log", log.t_s, {**channels, "speed_mps": ground})], 0.308), paper_car())
-    level = nominal(rig.vehicle)
-    rig.cache_baseline(level)
-    right, wrong = (rig.run(world)["gps"] for world in (level, _with(level, "speed_scale", "gain", 0.05)))
+    simulator = Simulator(prepare([make_log("log", log.t_s, {**channels, "speed_mps": ground})], 0.308), paper_car())
+    level = nominal(simulator.vehicle)
+    simulator = simulator.with_baseline(level)
+    right, wrong = (simulator.run(world)["gps"] for world in (level, _with(level, "speed_scale", "gain", 0.05)))
     assert wrong[:20] == pytest.approx(right[:20], rel=1e-3)
     assert np.abs(wrong - right).max() > 0.05  # the drag of a slower car is less
 
 
-def test_brakes_change_nothing_before_they_are_applied(rig):
-    level = nominal(rig.vehicle)
-    rig.keep(level)
-    same, changed = rig.run(level), rig.run(_with(level, "pad_mu_gain", "gain", 0.2))
-    first = int(rig.case.drives[0].segments[-1].first) // rig.case.drives[0].stride
-    assert len(rig.case.drives[0].segments) == SEGMENTS
+def test_brakes_change_nothing_before_they_are_applied(simulator):
+    level = nominal(simulator.vehicle)
+    simulator = simulator.with_baseline(level)
+    same, changed = simulator.run(level), simulator.run(_with(level, "pad_mu_gain", "gain", 0.2))
+    first = int(simulator.dataset.recordings[0].segments[-1].first) // simulator.dataset.recordings[0].stride
+    assert len(simulator.dataset.recordings[0].segments) == SEGMENTS
     assert np.array_equal(same["wheel"][:first], changed["wheel"][:first])
     assert np.abs(same["wheel"][first:] - changed["wheel"][first:]).max() > 0.1
 
 
-def test_pads_begin_at_the_rest_value_of_the_car_at_hand(rig):
+def test_pads_begin_at_the_rest_value_of_the_car_at_hand(simulator):
     """With the friction of the car as handed in, what is stated of its pads would say nothing of the first stops."""
-    level = nominal(rig.vehicle)
+    level = nominal(simulator.vehicle)
     p = level.p.copy()
     p[P.pad_epsilon_w] *= 1.05
-    rig.keep(level)
-    slower = rig.run(replace(level, p=p))["wheel"][-100:] - rig.run(level)["wheel"][-100:]
-    weaker = rig.run(_with(level, "pad_mu_gain", "gain", 1.0 / 1.05 - 1.0))["wheel"][-100:]
-    weaker = weaker - rig.run(level)["wheel"][-100:]
+    simulator = simulator.with_baseline(level)
+    slower = simulator.run(replace(level, p=p))["wheel"][-100:] - simulator.run(level)["wheel"][-100:]
+    weaker = simulator.run(_with(level, "pad_mu_gain", "gain", 1.0 / 1.05 - 1.0))["wheel"][-100:]
+    weaker = weaker - simulator.run(level)["wheel"][-100:]
     assert slower.mean() == pytest.approx(weaker.mean(), rel=0.1)
 
 
@@ -223,8 +222,8 @@ def _driven(time_constant_s: float) -> tuple[Log, np.ndarray]:
     return make_log("log", np.arange(1600) * 0.01, channels | {"ax_mps2": table[::2, 8]}), table[1::2, 4]
 
 
-def _middle(rig: Simulator) -> np.ndarray:
-    inputs = rig.dataset.recordings[0].inputs
+def _middle(simulator: Simulator) -> np.ndarray:
+    inputs = simulator.dataset.recordings[0].inputs
     torque = inputs[:, INPUT.at.motor_torque_nm]
     return 0.5 * (torque[:-1] + torque[1:]) + inputs[:-1, INPUT.at.motor_torque_bend_nm]
 
@@ -233,12 +232,12 @@ def test_what_drives_the_car_has_the_steps_of_the_world_that_made_it():
     """Measured torques smoothed have none; with a lag of the motors that is not theirs they have them wrong."""
     log, true = _driven(0.02)
     vehicle = paper_car()
-    rig = Simulator(prepare([log], 0.308), vehicle).denoised(nominal(vehicle))
+    simulator = Simulator(prepare([log], 0.308), vehicle).prepared(nominal(vehicle))
     right = nominal(vehicle)
     right.p[P.motor_time_constant_s] = 0.02
-    before = np.abs(_middle(rig) - true[: len(_middle(rig))]).max()
-    rig.denoise_inputs(right)
-    after = np.abs(_middle(rig) - true[: len(_middle(rig))]).max()
+    before = np.abs(_middle(simulator) - true[: len(_middle(simulator))]).max()
+    simulator = simulator.denoised(right)
+    after = np.abs(_middle(simulator) - true[: len(_middle(simulator))]).max()
     assert before > 10.0
     assert after < 1.0
 
@@ -260,9 +259,10 @@ def test_what_drives_the_car_is_what_happened_however_the_torque_is_told(late_by
     taken_s = t * (1.0 - 5e-4) if late_by == "clock" else t - 0.006
     seen = 0.8 * true if late_by == "scale" else np.interp(taken_s, t, true)
     changed |= {f"motor_torque_{w}_nm": seen for w in WHEELS}
-    rig = Simulator(prepare([replace(log, channels=changed)], 0.308), vehicle).denoised(world)
-    rig.cache_baseline(world)
-    driving = rig._kept.replays[0].inputs[:, INPUT.at.motor_torque_nm]
+    simulator = (
+        Simulator(prepare([replace(log, channels=changed)], 0.308), vehicle).prepared(world).with_baseline(world)
+    )
+    driving = simulator._baseline.replays[0].inputs[:, INPUT.at.motor_torque_nm]
     assert np.abs(seen - true)[20:-20].max() > 20.0
     assert np.abs(driving - true[: len(driving)])[20:-20].max() < 6.0
     assert np.sqrt(np.mean((driving - true[: len(driving)])[20:-20] ** 2)) < 0.5
@@ -278,27 +278,27 @@ def test_a_torque_told_half_a_row_late_is_the_one_between_two_rows(told):
     vehicle = paper_car()
     level = nominal(vehicle)
     level.p[P.motor_time_constant_s] = 0.008
-    rig = Simulator(prepare([log], 0.308), vehicle).denoised(level)
-    drive = rig.dataset.recordings[0]
+    simulator = Simulator(prepare([log], 0.308), vehicle).prepared(level)
+    drive = simulator.dataset.recordings[0]
     world = (
         replace(level, latency_s=late("motor", 0.005))
         if told == "latency"
         else _with(level, "timestamp_offset", "delay_s", MOTOR_NODE * 0.005)
     )
     happened = {"motor": drive.inputs[:, INPUT.slice("motor_torque_nm")]}
-    seen = rig.measurement_model.measure_rows(happened, drive, world)["motor"][1:, 0]
+    seen = simulator.measurement_model.measure_rows(happened, drive, world)["motor"][1:, 0]
     straight = 0.5 * (happened["motor"][:-1, 0] + happened["motor"][1:, 0])
     far, near = (np.abs(values - true[: len(values)])[20:-20].max() for values in (straight, seen))
     assert near < 0.8 < 2.0 < far
 
 
-def test_a_yaw_rate_comes_later_than_the_accelerations(rig):
+def test_a_yaw_rate_comes_later_than_the_accelerations(simulator):
     """A gyroscope has a filter of its own."""
-    drive = rig.case.drives[0]
+    drive = simulator.dataset.recordings[0]
     ramp = np.arange(len(drive.inputs), dtype=float)[:, None]
-    level = nominal(rig.vehicle)
+    level = nominal(simulator.vehicle)
     in_time, later = (
-        rig.telling.at_rows({"ay": ramp, "yaw": ramp}, drive, world)
+        simulator.measurement_model.measure_rows({"ay": ramp, "yaw": ramp}, drive, world)
         for world in (level, replace(level, latency_s=late("yaw_rate", 0.5 * ROW_S)))
     )
     assert later["yaw"][5:-5] == pytest.approx(in_time["yaw"][5:-5] - 0.5)
@@ -313,7 +313,7 @@ def test_steps_are_short_where_a_torque_steps_and_noise_is_no_step():
         for name, values in log.channels.items()
     }
     for one in (log, replace(log, channels=noisy)):
-        paces = Simulator(prepare([one], 0.308), paper_car())._pace[0]
+        paces = Simulator(prepare([one], 0.308), paper_car())._setups[0].rows_per_step
         assert set(paces[205:212]) == {1}
         assert (paces[260:290] == STEPS).all()
         assert 0.0 < (paces == 1).mean() < 0.4
@@ -321,28 +321,28 @@ def test_steps_are_short_where_a_torque_steps_and_noise_is_no_step():
 
 def test_a_wheel_speed_that_is_a_mean_over_a_window_swings_less():
     log, _ = _driven(0.008)
-    rig = Simulator(prepare([log], 0.308), paper_car())
-    level = nominal(rig.vehicle)
-    sharp, mean = rig.run(level)["wheel"][:, 0], rig.run(replace(level, window_rows2=1.0))["wheel"][:, 0]
+    simulator = Simulator(prepare([log], 0.308), paper_car())
+    level = nominal(simulator.vehicle)
+    sharp, mean = simulator.run(level)["wheel"][:, 0], simulator.run(replace(level, window_rows2=1.0))["wheel"][:, 0]
     step = slice(100, 110)
     assert np.ptp(np.diff(mean[step], 2)) < 0.97 * np.ptp(np.diff(sharp[step], 2))
     assert mean[130:145] == pytest.approx(sharp[130:145], abs=1e-3)
 
 
-def test_a_car_held_straight_goes_on_in_its_line_with_a_weak_brake(rig):
+def test_a_car_held_straight_goes_on_in_its_line_with_a_weak_brake(simulator):
     weak = np.array([-0.3, 0.0, 0.0, 0.0])
-    held = Simulator(rig.case, rig.vehicle.held_straight())
+    held = Simulator(simulator.dataset, simulator.vehicle.without_lateral_dynamics())
 
     def yaw_rate(of: Simulator) -> np.ndarray:
         return of.states(_with(nominal(of.vehicle), "pad_mu_gain", "gain", weak), ["state.yaw_rate_rad_s"])
 
-    assert np.abs(yaw_rate(rig)).max() > 1e-3
+    assert np.abs(yaw_rate(simulator)).max() > 1e-3
     assert np.abs(yaw_rate(held)).max() < 1e-9
     assert "steer_lateral" in held.vehicle.undiagnosable_effects
 
 
-@pytest.mark.parametrize("at_once", [1, 2, 4])
-def test_no_damping_of_a_standing_wheel_makes_the_steps_swing_by_themselves(at_once, monkeypatch):
+@pytest.mark.parametrize("rows", [1, 2, 4])
+def test_no_damping_of_a_standing_wheel_makes_the_steps_swing_by_themselves(rows, monkeypatch):
     """In steps of 5 ms wheels at rest turned to and fro by 0.2 rad/s, and sensitivities at a stop were chance."""
     t = np.arange(1600) * 0.01
     speed = np.clip(20.0 - 2.5 * np.clip(t - 1.0, 0.0, None), 0.0, None)
@@ -351,7 +351,9 @@ def test_no_damping_of_a_standing_wheel_makes_the_steps_swing_by_themselves(at_o
     case = prepare([make_log("log", t, channels)], 0.308)
     (damping,) = [one for one in paper_car().nuisances if one.name == "wheel_brake_windup_time_s"]
     assert damping.bound == 3.0
-    monkeypatch.setattr("hil.diagnosis.simulation.simulator.at_once", lambda drive: np.full(len(drive.inputs), at_once))
-    rig = Simulator(case, paper_car())
-    world = nominal(rig.vehicle).with_nuisances([damping], np.array([damping.bound]))
-    assert np.abs(rig.run(world)["wheel"][-200:]).max() < 1e-4
+    monkeypatch.setattr(
+        "hil.diagnosis.simulation.simulator.rows_per_step", lambda recording: np.full(len(recording.inputs), rows)
+    )
+    simulator = Simulator(case, paper_car())
+    world = nominal(simulator.vehicle).with_nuisances([damping], np.array([damping.bound]))
+    assert np.abs(simulator.run(world)["wheel"][-200:]).max() < 1e-4

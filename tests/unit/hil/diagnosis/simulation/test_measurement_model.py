@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hil.diagnosis.data.grid import at_samples
-from hil.diagnosis.simulation.latency import delayed, without_latency
+from hil.diagnosis.simulation.measurement_model import delayed, without_latency
 from plant.vectors import INPUT
 
 
