@@ -6,9 +6,9 @@ from functools import partial
 
 import numpy as np
 
+from hil.diagnosis.compiled import compiled
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.noise.batched import channel_likelihoods, information_matrix, longitudinal_likelihoods
-from hil.diagnosis.noise.innovations import HUBER
+from hil.diagnosis.noise.innovations import HUBER, channel_likelihoods, longitudinal_likelihoods
 from hil.diagnosis.noise.model import (
     LONGITUDINAL,
     REFERENCE_MPS,
@@ -87,6 +87,30 @@ class _Place:
         return step, -0.5 * float(self.slope @ step)
 
 
+@compiled
+def information_matrix(innovations: Floats, variances: Floats, limit: float) -> Floats:
+    """Information of parameters by which innovations and their variances, (samples, 1 + parameters), differ.
+
+    The first column is at the point, each other one a step of one parameter from it; (parameters, parameters) by
+    these steps. Innovations beyond ``limit`` standard deviations count less, as in the likelihood (Gupta and Mehra
+    1974, IEEE Trans. AC 19, 774).
+    """
+    count = innovations.shape[1] - 1
+    information, moved, grown = np.zeros((count, count)), np.zeros(count), np.zeros(count)
+    for t in range(len(innovations)):
+        inverse = 1.0 / variances[t, 0]
+        size = abs(innovations[t, 0]) * np.sqrt(inverse)
+        weight = inverse * (limit / size if size > limit else 1.0)
+        half = 0.5 * inverse * inverse
+        for k in range(count):
+            moved[k] = innovations[t, 1 + k] - innovations[t, 0]
+            grown[k] = variances[t, 1 + k] - variances[t, 0]
+        for i in range(count):
+            for k in range(count):
+                information[i, k] += weight * moved[i] * moved[k] + half * grown[i] * grown[k]
+    return information
+
+
 def _minimise(costs: Costs, starts: Sequence[Floats], low: Floats, high: Floats, known: Floats) -> Floats:
     """Where the cost is least: from the first start if it is there already, else from the best of all, by scoring.
 
@@ -123,7 +147,7 @@ def _minimise(costs: Costs, starts: Sequence[Floats], low: Floats, high: Floats,
 def _channel_noise(tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise, name: str) -> ChannelNoise:
     """Noise of a track that all others say nothing of."""
     values, at, floor, known = tracks[name], noise.tracks[name], _floor(name), frame.present[name]
-    scaled = values[:, 0] / scale_of(name, frame, noise)
+    scale = scale_of(name, frame, noise)
     common = white_variance(name, ChannelNoise(0.0, 0.0, 0.0, 1.0), frame)
     faster = np.square(frame.speed_mps / REFERENCE_MPS)
     by_speed = name.startswith("wheel")
@@ -132,9 +156,9 @@ def _channel_noise(tracks: Mapping[str, Floats], frame: SampleMasks, noise: Nois
         a, c, tau_s, *more = np.exp(points.T)
         white = common[:, None] + a**2 + (faster[:, None] * more[0] ** 2 if more else 0.0)
         colour = (c**2 if noise.enabled else 0.0 * c) + 1e-16
-        keep = np.exp(-frame.sample_s / tau_s)
+        phi = np.exp(-frame.sample_s / tau_s)
         off, size = np.zeros(white.shape), np.ones(white.shape)
-        return -channel_likelihoods(scaled, frame.log_start, known, white, keep, colour, off, size), off, size
+        return -channel_likelihoods(values, scale, frame.log_start, known, white, phi, colour, off, size), off, size
 
     a = max(_differences(values[:, 0], known), floor)
     offered = [at, *(ChannelNoise(a, 0.0, share * a, tau_s) for share in _COLOURS for tau_s in _TIMES_S)]
@@ -157,26 +181,26 @@ def _longitudinal_noise(tracks: Mapping[str, Floats], frame: SampleMasks, noise:
     usual, spread = np.log(np.array(_TYPICAL[:count]).T.ravel()), np.repeat(_SPREAD, count)
     share = frame.speed_mps / REFERENCE_MPS
     b = noise.tracks["wheel.front-rear"].b if "wheel.front-rear" in noise.tracks else 0.0
-    y, known, white = np.zeros((samples, 3)), np.zeros((samples, 3)), np.zeros((samples, 3))
+    columns = tuple(np.ascontiguousarray(tracks.get(name, tracks[there[0]]), np.float64) for name in LONGITUDINAL)
+    known, white = np.zeros((samples, 3)), np.zeros((samples, 3))
     for name in there:
         m = LONGITUDINAL.index(name)
-        y[:, m], known[:, m] = tracks[name][:, 0] / scale, frame.present[name]
+        known[:, m] = frame.present[name]
         white[:, m] = white_variance(name, ChannelNoise(0.0, b if name == "wheel.mean" else 0.0, 0.0, 1.0), frame)
-    on = 1.0 if noise.enabled else 0.0
+    on, masks = 1.0 if noise.enabled else 0.0, (frame.log_start, frame.segment_start, frame.moving)
 
     def costs(points: Floats) -> tuple[Floats, Floats, Floats]:
         sizes = np.exp(points.T)
         sensor = np.zeros((3, len(points)))
         sensor[[LONGITUDINAL.index(name) for name in there]] = sizes[2 * count :] ** 2
-        keep, colour = np.exp(-frame.sample_s / sizes[count : 2 * count]), on * sizes[:count] ** 2 + 1e-12
-        off, size = np.zeros((samples, 3, len(points))), np.ones((samples, 3, len(points)))
-        found = longitudinal_likelihoods(
-            y, frame.log_start, frame.segment_start, frame.moving, known, white, share, frame.sample_s, keep, colour, sensor,
-            off, size,
-        )  # fmt: skip
+        phi, colour = np.exp(-frame.sample_s / sizes[count : 2 * count]), on * sizes[:count] ** 2 + 1e-12
+        off, size = np.zeros((3, samples, len(points))), np.ones((3, samples, len(points)))
+        likelihoods = longitudinal_likelihoods(
+            columns, scale, *masks, known, white, share, frame.sample_s, phi, colour, sensor, off, size
+        )
         # weak knowledge of sizes and times keeps what the data do not show where roads and cars have it
         unusual = (points[:, : 2 * count] - usual) / spread
-        cost = -found + 0.5 * np.square(unusual).sum(axis=1)
+        cost = -likelihoods + 0.5 * np.square(unusual).sum(axis=1)
         return cost, off.reshape(-1, len(points)), size.reshape(-1, len(points))
 
     sizes, taus = zip(*noise.disturbances, strict=True)

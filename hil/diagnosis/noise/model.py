@@ -94,8 +94,8 @@ class SampleMasks:
         present = {name: known for name, known in present.items() if known.sum() > 50 and name not in twice}
         return cls(
             np.concatenate(fresh), np.concatenate(restart), np.concatenate([d.moving for d in case.recordings]) * 1.0,
-            np.concatenate([d.speed_mps for d in case.recordings]), case.segment_ids(), case.sample_s, present, tuple(present),
-            _jitter_variance(case),
+            np.concatenate([d.speed_mps for d in case.recordings]), case.segment_ids(), case.sample_s, present,
+            tuple(present), _jitter_variance(case),
         )  # fmt: skip
 
 
@@ -212,20 +212,22 @@ def _whiten_longitudinal(
     tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise, out: Mapping[str, Floats]
 ) -> float:
     scale, white = scale_of("long", frame, noise), np.zeros((len(frame.log_start), 3))
-    likelihood, there = 0.0, [name for name in LONGITUDINAL if name in tracks]
-    for name in there:
+    likelihood, measured = 0.0, [name for name in LONGITUDINAL if name in tracks]
+    for name in measured:
         likelihood -= float(np.log(scale) @ frame.present[name])
         white[:, LONGITUDINAL.index(name)] = white_variance(name, noise.tracks[name], frame)
+    taus = [tau_s for _, tau_s in noise.disturbances]
+    phi = np.array([[ar1_coefficient(tau_s, frame.sample_s)] for tau_s in taus])
     on = 1.0 if noise.enabled else 0.0
-    colours = np.array(
-        [(ar1_coefficient(tau, frame.sample_s), on * size**2 + 1e-12) for size, tau in noise.disturbances]
-    )
+    colour = np.array([[on * size**2 + 1e-12] for size, _ in noise.disturbances])
     share = frame.speed_mps / REFERENCE_MPS
-    nothing = np.empty_like(tracks[there[0]]) if len(there) < len(LONGITUDINAL) else None
-    given = tuple(np.ascontiguousarray(tracks.get(name, nothing)) for name in LONGITUDINAL)
-    told = tuple(out.get(name, nothing) for name in LONGITUDINAL)
-    how = (scale, frame.log_start, frame.segment_start, frame.moving, white, share, frame.sample_s, colours)
-    return likelihood + float(longitudinal_innovations(given, *how, told))
+    unmeasured = np.empty_like(tracks[measured[0]]) if len(measured) < len(LONGITUDINAL) else None
+    columns = tuple(np.ascontiguousarray(tracks.get(name, unmeasured)) for name in LONGITUDINAL)
+    outs = tuple(out.get(name, unmeasured) for name in LONGITUDINAL)
+    masks = (frame.log_start, frame.segment_start, frame.moving)
+    return likelihood + float(
+        longitudinal_innovations(columns, scale, *masks, white, share, frame.sample_s, phi, colour, outs)
+    )
 
 
 def _whiten_channel(name: str, values: Floats, frame: SampleMasks, noise: Noise, out: Floats) -> float:
