@@ -61,6 +61,7 @@ class StepwiseSelection:
         self.settings, self.say = settings, say
         self.rig = Simulator(case, vehicle).denoised(base)
         self.frame = SampleMasks.of(self.rig.dataset)
+        say("replaying the car as handed in")
         self.numbers = NuisanceFit(self.rig, self.frame, vehicle, base, settings.relinearise)
         self.unlisted = NonparametricSearch(self.numbers, settings, say)
         self.effective_parameters = float(len(self.numbers.nuisances))
@@ -73,8 +74,6 @@ class StepwiseSelection:
 
     def run(self) -> Diagnosis:
         """All of it."""
-        self.say("replaying the car as handed in")
-        self.numbers.relinearise(np.zeros(len(self.numbers.nuisances)))
         self.handed_in = self.fitter
         nominal, noise = self.fitter.start(self.settings.noise_model)
         self.say("noise, and the vehicle's numbers within their tolerance")

@@ -87,9 +87,7 @@ def test_what_was_taken_to_begin_and_was_always_there_has_no_beginning(always):
     second = next(moment for moment in segment_starts(case) if moment[0] == 1)
 
     def fitter() -> Fitter:
-        numbers = NuisanceFit(rig, SampleMasks.of(case), vehicle, base, relinearise=True)
-        numbers.relinearise(np.zeros(len(numbers.nuisances)))
-        return numbers.fitter
+        return NuisanceFit(rig, SampleMasks.of(case), vehicle, base, relinearise=True).fitter
 
     there = Term(pads, -0.2, onset=None if always else second)
     as_handed_in = fitter().start()[0].z

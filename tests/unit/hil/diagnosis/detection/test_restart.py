@@ -25,13 +25,12 @@ def test_pads_that_brake_gains_stood_in_for_are_found():
     vehicle = load_vehicle(VEHICLE)
     case = prepare([log_as_driven(vehicle, 0.318)], 0.318)
     rig, base = Simulator(case, vehicle), nominal(vehicle)
-    numbers = NuisanceFit(rig, SampleMasks.of(case), vehicle, base, relinearise=True)
     (pads,) = [one for one in candidates(columns()) if one.name == "pad_mu_gain@car"]
     rng = np.random.default_rng(2)
     (drive,) = case.recordings
     for group, told in rig.run(pads.applied(base, WEAKER)).items():
         drive.measured[group][:] = told + DEVIATIONS.get(group, 0.02) * rng.standard_normal(told.shape)
-    numbers.relinearise(np.zeros(len(numbers.nuisances)))
+    numbers = NuisanceFit(rig, SampleMasks.of(case), vehicle, base, relinearise=True)
     bent, noise = numbers.fit(*numbers.fitter.start())
     gains = [k for k, one in enumerate(numbers.nuisances) if one.name.startswith("brake_gain")]
     assert (bent.z[gains] < -2.0).any()

@@ -27,13 +27,12 @@ def _accepted(hidden: float) -> Diagnosis:
     vehicle = load_vehicle(VEHICLE)
     case = prepare([log_as_driven(vehicle, 0.318)], 0.318)
     rig, base = Simulator(case, vehicle), nominal(vehicle)
-    numbers = NuisanceFit(rig, SampleMasks.of(case), vehicle, base, relinearise=True)
     (wind,) = [one for one in candidates(columns()) if one.name == "headwind.wind_mps@car"]
     rng = np.random.default_rng(2)
     (drive,) = case.recordings
     for group, told in rig.run(wind.applied(base, hidden)).items():
         drive.measured[group][:] = told + DEVIATIONS.get(group, 0.02) * rng.standard_normal(told.shape)
-    numbers.relinearise(np.zeros(len(numbers.nuisances)))
+    numbers = NuisanceFit(rig, SampleMasks.of(case), vehicle, base, relinearise=True)
     fitter = numbers.fitter
     bare, noise = numbers.fit(*fitter.start())
     begun = fitter.at(bare.z, (Term(wind, 0.5 * hidden),), noise)

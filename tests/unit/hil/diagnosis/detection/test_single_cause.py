@@ -38,7 +38,6 @@ class _Driven:
         for group, told in rig.run(world).items():
             drive.measured[group][:] = told + DEVIATIONS.get(group, 0.02) * rng.standard_normal(told.shape)
         self.numbers = NuisanceFit(rig, SampleMasks.of(case), vehicle, base, relinearise=True)
-        self.numbers.relinearise(np.zeros(len(self.numbers.nuisances)))
         self.fitter = self.numbers.fitter
         self.bare, self.noise = self.numbers.fit(*self.fitter.start())
         self.case, self.vehicle = case, vehicle

@@ -27,17 +27,15 @@ def _replayed(name: str, deviations: float) -> tuple[Watched, int]:
     first = log_of_pulses()
     logs = [first, first]  # several manoeuvres, to hold some out
     rig = Simulator(prepare(logs, 0.308), vehicle)
-    numbers = NuisanceFit(rig, SampleMasks.of(rig.dataset), vehicle, base, relinearise=True)
-    names = [nuisance.name for nuisance in numbers.nuisances]
+    names = [nuisance.name for nuisance in vehicle.nuisances]
     number = names.index(name)
     off = np.where(np.arange(len(names)) == number, deviations, 0.0)
-    told, at = rig.run(base.with_nuisances(numbers.nuisances, off)), 0
+    told, at = rig.run(base.with_nuisances(vehicle.nuisances, off)), 0
     for drive in rig.dataset.recordings:
         for group, values in told.items():
             drive.measured[group][:] = values[at : at + drive.samples]
         at += drive.samples
-    numbers.relinearise(np.zeros(len(names)))
-    of = numbers.fitter
+    of = NuisanceFit(rig, SampleMasks.of(rig.dataset), vehicle, base, relinearise=True).fitter
     fitter = Watched(of.simulator, of.masks, of.base, of.nuisances, of.nuisance_jacobian)
     fitter.replayed = []
     model, noise = fitter.start()
