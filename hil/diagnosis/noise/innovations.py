@@ -31,7 +31,7 @@ side (*lanes*: likelihoods for the estimate of the noise). One body serves both,
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numba import njit
@@ -46,7 +46,8 @@ DIFFUSE_VARIANCE = 1e4
 _SAMPLES_PER_LOGARITHM = 4
 """Variances of so many samples are multiplied before one logarithm is taken; their product stays a normal float."""
 Three = tuple[Floats, Floats, Floats]
-_inlined = cast(Callable[[Callable[..., Any]], Callable[..., Any]], njit(inline="always", error_model="numpy"))
+_Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
+_inlined = cast(Callable[[_Kernel], _Kernel], njit(inline="always", error_model="numpy"))
 
 
 class _Track(NamedTuple):
@@ -65,6 +66,7 @@ class _Bank(NamedTuple):
     cov: Floats  # (states, states, lanes): P
     h: Floats  # (states, lanes): P H'
     gained: Floats  # (columns,): (y - H x) / S
+    total: Floats  # (lanes,): S
     inverse: Floats  # (lanes,): 1 / S
     product: Floats  # (lanes,): product of S since the last logarithm
     likelihood: Floats  # (lanes,)
@@ -75,7 +77,7 @@ def _bank(states: int, columns: int, own: int) -> _Bank:
     lanes = columns if own else 1
     return _Bank(
         np.zeros((states, columns)), np.zeros((states, states, lanes)), np.zeros((states, lanes)), np.zeros(columns),
-        np.zeros(lanes), np.ones(lanes), np.zeros(lanes),
+        np.zeros(lanes), np.zeros(lanes), np.ones(lanes), np.zeros(lanes),
     )  # fmt: skip
 
 
@@ -143,7 +145,7 @@ def _update(
             h[i, k] = one * cov[i, first, k] + other * cov[i, second, k]
     for k in range(lanes):
         total = white + sensor[k] + one * h[first, k] + other * h[second, k]
-        bank.inverse[k] = 1.0 / total
+        bank.total[k], bank.inverse[k] = total, 1.0 / total
         innovation = track.y[t, (1 - own) * k] * even - one * x[first, k] - other * x[second, k]
         bank.likelihood[k] -= 0.5 * _robust_square(innovation * innovation * bank.inverse[k])
         bank.product[k] *= total
@@ -159,8 +161,9 @@ def _update(
         for k in range(columns):
             x[i, k] += h[i, own * k] * bank.gained[k]
         for j in range(states):
-            for k in range(lanes):
-                cov[i, j, k] -= h[i, k] * h[j, k] * bank.inverse[k]
+            for k in range(lanes):  # from a diffuse P, R remains by cancellation: rounding shows in its sixth digit
+                square = h[i, k] * h[j, k]
+                cov[i, j, k] -= square * bank.inverse[k] if own else square / bank.total[k]
 
 
 @_inlined
@@ -222,10 +225,11 @@ def longitudinal_innovations(
     speed = _Track(tracks[0], scale, outs[0], outs[0])
     acceleration = _Track(tracks[1], scale, outs[1], outs[1])
     ground = _Track(tracks[2], scale, outs[2], outs[2])
-    return _longitudinal(
+    likelihoods = _longitudinal(
         speed, acceleration, ground, log_start, segment_start, rolling, white, white, share, step_s, phi, colour,
         np.zeros((3, 1)), 0,
-    )[0]  # fmt: skip
+    )  # fmt: skip
+    return float(likelihoods[0])
 
 
 @compiled
@@ -304,7 +308,7 @@ def channel_innovations(
     ``phi`` and ``colour`` are AR(1) coefficient and variance; the rest is as in `longitudinal_innovations`.
     """
     track, variance = _Track(y, scale, out, out), white.reshape(-1, 1)
-    return _channel(track, log_start, white, variance, np.full(1, phi), np.full(1, colour), 0)[0]
+    return float(_channel(track, log_start, white, variance, np.full(1, phi), np.full(1, colour), 0)[0])
 
 
 @compiled
