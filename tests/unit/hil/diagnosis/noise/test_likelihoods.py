@@ -1,4 +1,4 @@
-"""Likelihoods over lanes are those of the filters that whiten, lane by lane."""
+"""Likelihoods of many noises are those of the filters that whiten, noise by noise."""
 
 import numpy as np
 import pytest
@@ -70,7 +70,7 @@ def test_information_is_what_innovations_and_variances_change() -> None:
     off = np.stack([rng.standard_normal(count)] * 2, axis=1)
     size = np.ones((count, 2)) * np.exp([0.0, step])
     assert information_matrix(off, size, 6.0)[0, 0] / step**2 == pytest.approx(count / 2, rel=1e-3)
-    off[:, 1] += step  # a mean is told by all samples, by one far off in part
+    off[:, 1] += step  # a mean shifts all samples, one far off counts less
     off[0, 0] += 60.0
     off[0, 1] += 60.0
     assert information_matrix(off, np.ones((count, 2)), 6.0)[0, 0] / step**2 == pytest.approx(count - 0.9, abs=0.02)
