@@ -8,8 +8,6 @@ parameters, or ends the selection (`hil.diagnosis.detection.forward_step`).
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from hil.diagnosis.data.dataset import Dataset
 from hil.diagnosis.detection.candidates import CandidateSet, unexcited_sensors
 from hil.diagnosis.detection.forward_step import Added, Done, ForwardStep, Restarted, Screening, State
@@ -71,9 +69,8 @@ class StepwiseSelection:
         self.settings, self.progress = settings, progress
         simulator = Simulator(dataset, vehicle).prepared(base)
         self.vehicle, self.masks = vehicle, SampleMasks.of(simulator.dataset)
-        self.nuisance_fit = NuisanceFit(simulator, self.masks, vehicle, base, settings.relinearise)
         progress("simulating the nominal vehicle")
-        self.nuisance_fit.relinearise(np.zeros(len(self.nuisance_fit.nuisances)))
+        self.nuisance_fit = NuisanceFit(simulator, self.masks, vehicle, base, settings.relinearise)
         self.nominal_fitter = self.fitter
         self.nominal, self.first_noise = self.fitter.start(settings.noise_model)
 

@@ -1,1 +1,1 @@
-"""Fits: candidates, the linear problem, non-linear steps, and how much the model itself errs."""
+"""Estimation: takes residuals, their noise and a simulator; gives fitted nuisances and terms with their information."""

@@ -1,8 +1,8 @@
-"""Causes that are a number of the vehicle: what of them is the number's tolerance, and what the cause.
+"""Aliases: terms that change the same parameter as a nuisance, and the most likely split between the two.
 
-A dead time that is 15 ms too long is the vehicle's dead time off by as much, and stamps of a node that are late are its
-latency: no data tell the two apart, only what is stated. A fit ends anywhere on that line; here its most likely point
-is taken.
+Takes a fitted model; gives the same car at its most likely point. A dead time that is 15 ms longer is the vehicle's own
+dead time off by as much, and late time stamps of a node are its latency: no data separate the two, only their priors. A
+fit ends anywhere on that line.
 """
 
 from collections.abc import Sequence
@@ -20,30 +20,30 @@ from plant.injection.theta import THETA
 from plant.vectors import OUTPUT, PARAMETER
 
 _STAMPS = "timestamp_offset"
-"""Of the stamps of a node, the same number as its latency."""
+"""Effect on the time stamps of a node, which is an offset of its latency."""
 
 
 @dataclass(frozen=True)
 class Alias:
-    """The number of the vehicle that a cause is: which of the nuisances, where it lies, how much a unit of the cause
-    moves it; whether it is a latency."""
+    """Nuisance that a term is an alias of: its index, the index ``at`` of its parameter, the ``slope`` of the parameter
+    by the term's value, and whether the parameter is a latency."""
 
     nuisance: int
     at: int
     slope: float
     latency: bool = False
 
-    def of(self, world: ParameterSet) -> float:
-        """The number in a world, without the cause."""
-        return world.latency_s[self.at] if self.latency else float(world.p[self.at])
+    def of(self, parameters: ParameterSet) -> float:
+        """The parameter without the term."""
+        return parameters.latency_s[self.at] if self.latency else float(parameters.p[self.at])
 
     def deviation(self, nuisances: Sequence[Nuisance]) -> float:
-        """One standard deviation of the number, in units of the cause."""
+        """Prior standard deviation of the nuisance, in units of the term's value."""
         return abs(nuisances[self.nuisance].step[0] / self.slope)
 
 
-def alias_of(term: Term, nuisances: Sequence[Nuisance], world: ParameterSet) -> Alias | None:
-    """The number that the cause is in a world without it; None: it is none, or more than one."""
+def alias_of(term: Term, nuisances: Sequence[Nuisance], parameters: ParameterSet) -> Alias | None:
+    """Alias of a term, given the parameter set without it; None where it is no or more than one parameter."""
     if term.onset is not None:
         return None
     if term.candidate.effect.name == _STAMPS:
@@ -52,10 +52,10 @@ def alias_of(term: Term, nuisances: Sequence[Nuisance], world: ParameterSet) -> 
     if term.candidate.location != "car":
         return None
     step = 0.01 * term.candidate.parameter.typical
-    moved = [_numbers(term, value, world) for value in (term.value, term.value - step)]
+    moved = [_parameters_with(term, value, parameters) for value in (term.value, term.value - step)]
     if moved[0] is None or moved[1] is None:
         return None
-    changed = np.flatnonzero(moved[0] != world.p).tolist()
+    changed = np.flatnonzero(moved[0] != parameters.p).tolist()
     for k, nuisance in enumerate(nuisances):
         if nuisance.kind is NuisanceKind.VEHICLE and list(nuisance.at) == changed:
             slope = float(moved[0][changed[0]] - moved[1][changed[0]]) / step
@@ -64,48 +64,52 @@ def alias_of(term: Term, nuisances: Sequence[Nuisance], world: ParameterSet) -> 
 
 
 def resolve_aliases(model: Model, nuisances: Sequence[Nuisance], base: ParameterSet) -> Model:
-    """The same car with the most likely share of each cause in the number that it is; ``base`` is as handed in."""
-    for number, term in enumerate(model.terms):
-        same = alias_of(term, nuisances, base.with_nuisances(nuisances, model.z))
-        if same is None:
+    """The model with the most likely split between each term and its alias; ``base`` is the nominal vehicle."""
+    for k, term in enumerate(model.terms):
+        alias = alias_of(term, nuisances, base.with_nuisances(nuisances, model.z))
+        if alias is None:
             continue
-        step, spread = nuisances[same.nuisance].step[0], term.candidate.prior_sd * same.slope
-        wanted = _value(term, base.with_nuisances(nuisances, model.z), same)
+        step, spread = nuisances[alias.nuisance].step[0], term.candidate.prior_sd * alias.slope
+        wanted = _value(term, base.with_nuisances(nuisances, model.z), alias)
         z = model.z.copy()
-        z[same.nuisance] = (wanted - same.of(base)) * step / (step**2 + spread**2)
+        z[alias.nuisance] = (wanted - alias.of(base)) * step / (step**2 + spread**2)
         without = base.with_nuisances(nuisances, z)
         parameter = term.candidate.parameter
 
-        def off(
-            value: float, term: Term = term, without: ParameterSet = without, same: Alias = same, wanted: float = wanted
+        def excess(
+            value: float,
+            term: Term = term,
+            without: ParameterSet = without,
+            alias: Alias = alias,
+            wanted: float = wanted,
         ) -> float:
-            return _value(replace(term, value=value), without, same) - wanted
+            return _value(replace(term, value=value), without, alias) - wanted
 
-        if off(parameter.low) * off(parameter.high) >= 0.0:
+        if excess(parameter.low) * excess(parameter.high) >= 0.0:
             continue
         terms = list(model.terms)
-        terms[number] = replace(term, value=float(brentq(off, parameter.low, parameter.high, xtol=1e-12)))
+        terms[k] = replace(term, value=float(brentq(excess, parameter.low, parameter.high, xtol=1e-12)))
         cost = model.cost + float(z @ z - model.z @ model.z)
         model = replace(model, z=z, terms=tuple(terms), cost=cost)
     return model
 
 
-def _value(term: Term, world: ParameterSet, same: Alias) -> float:
-    """The number as the equations read it."""
-    numbers = None if same.latency else _numbers(term, term.value, world)
-    if numbers is None:
-        return same.of(world) + (term.value if same.latency else 0.0)
-    return float(numbers[same.at])
+def _value(term: Term, parameters: ParameterSet, alias: Alias) -> float:
+    """The aliased parameter as the equations read it, term included."""
+    p = None if alias.latency else _parameters_with(term, term.value, parameters)
+    if p is None:
+        return alias.of(parameters) + (term.value if alias.latency else 0.0)
+    return float(p[alias.at])
 
 
-def _numbers(term: Term, value: float, world: ParameterSet) -> Floats | None:
-    """Parameters as the equations read them with the cause; None where it is more than parameters."""
+def _parameters_with(term: Term, value: float, parameters: ParameterSet) -> Floats | None:
+    """Parameters, (parameters,), as the equations read them with the term; None where it changes more than these."""
     effect = term.candidate.effect
     if effect.static is None or effect.dynamic is not None or effect.rates is not None or effect.sensing:
         return None
     q, y = np.zeros(Q.size), np.zeros(OUTPUT.size)
-    q[: PARAMETER.size] = world.p
-    theta = term.candidate.applied(replace(world, theta=THETA.neutral()), value).theta
+    q[: PARAMETER.size] = parameters.p
+    theta = term.candidate.applied(replace(parameters, theta=THETA.neutral()), value).theta
     q[Q.slice("theta")] = theta
     first = Q.slice("theta").start + THETA.slice(effect.name, effect.parameters[0].name).start
     getattr(effect.static, "py_func", effect.static)(q, first, y)

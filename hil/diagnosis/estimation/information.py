@@ -1,4 +1,8 @@
-"""The linearised problem: whitened residual and sensitivities summed by manoeuvre, nuisances within tolerance."""
+"""The linearised problem: information matrices by segment, nuisances marginalised, bounded steps.
+
+Takes whitened residuals r and a Jacobian J (samples, columns); gives the products [r J]' [r J] by segment and solves
+(J' J + I) dz = J' r - z for nuisances in prior standard deviations and unbounded or bounded columns beside them.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,14 +17,24 @@ from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator
 
 _CHUNK = 48
+"""Columns whitened at a time, for the memory they take."""
 _HELD = 1e15
-_ROUNDS = 20
+"""Information added to a nuisance that does not move: far above that of any data."""
+_DIVERGED = 1e12
+"""Largest difference quotient, for simulations that diverge at a step."""
+_RIDGE = 1e-9
+"""Share of each diagonal element that is added to it, for columns that are alike to rounding."""
+_ACTIVE_SET_ROUNDS = 20
+"""Rounds of the active set at most."""
 
 
 @dataclass(frozen=True, eq=False)
 class InformationBlocks:
-    """Sums of products per manoeuvre: ``matrix`` (manoeuvres, m, m) of [residual, nuisances, columns]; how many
-    samples, and the log-likelihood of the noise at the residual."""
+    """Information by segment: ``matrix`` (segments, m, m), products of the whitened [residual, nuisances, columns].
+
+    ``nuisances`` is their number, ``samples`` the number of compared samples, ``likelihood`` the log-likelihood of the
+    noise at the residual.
+    """
 
     matrix: Floats
     nuisances: int
@@ -28,52 +42,59 @@ class InformationBlocks:
     likelihood: float
 
     def total(self, weights: Floats | None = None) -> Floats:
-        """Sum over manoeuvres, weighted."""
+        """Sum over segments, weighted; (m, m)."""
         if weights is None:
             return np.asarray(self.matrix.sum(axis=0))
         return np.asarray(np.tensordot(weights, self.matrix, axes=1))
 
-    def since(self, manoeuvre: int) -> Floats:
-        """Sum over manoeuvres for columns that are nothing before this one; nuisances always are."""
-        total, later, own = self.total(), self.matrix[manoeuvre:].sum(axis=0), 1 + self.nuisances
+    def since(self, segment: int) -> Floats:
+        """Sum over segments for columns that are zero before this one; nuisances act in all."""
+        total, later, own = self.total(), self.matrix[segment:].sum(axis=0), 1 + self.nuisances
         total[own:], total[:, own:] = later[own:], later[:, own:]
         return total
 
 
 def finite_difference_jacobian(
-    rig: Simulator, frame: SampleMasks, base: Stack, worlds: Sequence[ParameterSet], steps: Sequence[float]
+    simulator: Simulator,
+    frame: SampleMasks,
+    base: Stack,
+    parameter_sets: Sequence[ParameterSet],
+    steps: Sequence[float],
 ) -> dict[str, Floats]:
-    """Finite differences of all worlds against ``base``, as tracks (samples, worlds)."""
-    radius = float(rig.vehicle.parameters.wheel.rolling_radius_m)
-    out = {name: np.zeros((len(frame.log_start), len(worlds)), np.float32) for name in frame.names}
-    for k, (stack, step) in enumerate(zip(rig.run_all(worlds), steps, strict=True)):
+    """Finite differences of simulated channels, by track (samples, parameter sets), each divided by its step.
+
+    ``base`` are the channels at no step.
+    """
+    radius = float(simulator.vehicle.parameters.wheel.rolling_radius_m)
+    out = {name: np.zeros((len(frame.log_start), len(parameter_sets)), np.float32) for name in frame.names}
+    for k, (stack, step) in enumerate(zip(simulator.run_all(parameter_sets), steps, strict=True)):
         change = {group: (values - base[group]) / step for group, values in stack.items()}
         for name, values in tracks_of(change, frame, radius).items():
-            out[name][:, k] = np.clip(values[:, 0], -1e12, 1e12)
+            out[name][:, k] = np.clip(values[:, 0], -_DIVERGED, _DIVERGED)
     return out
 
 
 def information_blocks(
     residual: dict[str, Floats], columns: dict[str, Floats], frame: SampleMasks, noise: Noise, nuisances: int
 ) -> InformationBlocks:
-    """Whiten residual and columns, and sum their products by manoeuvre."""
+    """Whiten residual (samples, 1) and columns (samples, columns) by track, and sum their products by segment."""
     white_residual, likelihood = whiten(residual, frame, noise)
     count = next(iter(columns.values())).shape[1]
-    blocks = np.asarray(frame.segment_id, np.int64)
-    manoeuvres = int(blocks.max()) + 1
-    order = np.argsort(blocks, kind="stable")
-    bounds = np.searchsorted(blocks[order], np.arange(manoeuvres + 1))
-    whitened = {name: np.empty((len(blocks), count + 1), np.float32) for name in residual}
+    segments = np.asarray(frame.segment_id, np.int64)
+    segment_count = int(segments.max()) + 1
+    order = np.argsort(segments, kind="stable")
+    bounds = np.searchsorted(segments[order], np.arange(segment_count + 1))
+    whitened = {name: np.empty((len(segments), count + 1), np.float32) for name in residual}
     for name, values in white_residual.items():
         whitened[name][:, 0] = _limited(values[:, 0])
     for begin in range(0, count, _CHUNK):
         chunk = {name: values[:, begin : begin + _CHUNK] for name, values in columns.items()}
         for name, values in whiten(chunk, frame, noise)[0].items():
             whitened[name][:, 1 + begin : 1 + begin + values.shape[1]] = values
-    matrix = np.zeros((manoeuvres, count + 1, count + 1))
+    matrix = np.zeros((segment_count, count + 1, count + 1))
     for values in whitened.values():
-        ordered = values[order] if (np.diff(blocks) < 0).any() else values
-        for k in range(manoeuvres):
+        ordered = values[order] if (np.diff(segments) < 0).any() else values
+        for k in range(segment_count):
             part = ordered[bounds[k] : bounds[k + 1]]
             matrix[k] += part.T @ part
     samples = int(sum(float(known.sum()) for known in frame.present.values()))
@@ -81,15 +102,16 @@ def information_blocks(
 
 
 def _limited(innovations: Floats) -> Floats:
-    """Innovations within six standard deviations: a single wild sample is no evidence for a cause."""
+    """Innovations within `HUBER` standard deviations: a single outlier is no evidence for a cause."""
     return np.clip(innovations, -HUBER, HUBER)
 
 
 @dataclass(frozen=True, eq=False)
 class Marginal:
-    """Residual and columns after the nuisances (and what is accepted) have taken their part.
+    """Information of the columns, nuisances and accepted terms marginalised.
 
-    ``b`` (columns,) products with the residual, ``q`` (columns, columns) among themselves, ``chi2`` of the residual.
+    ``b`` (columns,) is the score (products with the residual), ``q`` (columns, columns) the information matrix,
+    ``chi2`` that of the residual.
     """
 
     b: Floats
@@ -100,11 +122,11 @@ class Marginal:
 def marginalise(
     total: Floats, nuisances: int, free: Sequence[int] = (), z: Floats | None = None, held: Sequence[int] = ()
 ) -> Marginal:
-    """Project out nuisances (normal, standard deviation 1, now ``z`` off) and the columns ``free`` (unbounded).
+    """Project out nuisances (Gaussian prior of standard deviation 1, now at ``z``) and the columns ``free`` (no prior).
 
-    Nuisances that are ``held`` take no part.
+    ``total`` (m, m) are products of [residual, nuisances, columns]. Nuisances that are ``held`` do not move.
     """
-    a, right = _nuisance_system(total, nuisances, free, z, held)
+    a, right = _normal_equations(total, nuisances, free, z, held)
     solved = np.linalg.solve(a, right) if len(a) else np.zeros((0, total.shape[1]))
     left = total - right.T @ solved
     keep = 1 + nuisances
@@ -113,96 +135,95 @@ def marginalise(
 
 
 def marginalise_from_onset(
-    found: InformationBlocks, columns: Sequence[Sequence[int]], free: Sequence[int], z: Floats, held: Sequence[int]
+    information: InformationBlocks,
+    groups: Sequence[Sequence[int]],
+    free: Sequence[int],
+    z: Floats,
+    held: Sequence[int],
 ) -> tuple[Floats, Floats]:
-    """As `marginalise`, for signatures that are nothing before the begin of each manoeuvre.
+    """As `marginalise`, for signatures that are zero before an onset at the start of each segment.
 
     Parameters
     ----------
-    columns : which columns are one signature together, for each of them.
+    groups : columns that are summed to one signature, for each signature.
 
     Returns
     -------
-    Products with the residual, and with itself, (manoeuvres, signatures).
+    Products with the residual, and with itself, (segments, signatures).
     """
-    a, right = _nuisance_system(found.total(), found.nuisances, free, z, held)
-    taken, keep = _taken(found.nuisances, free), 1 + found.nuisances
-    later = np.cumsum(found.matrix[::-1], axis=0)[::-1]
-    along = np.linalg.solve(a, right[:, 0])
-    b, q = np.empty((2, len(later), len(columns)))
-    for k, own in enumerate(columns):
-        at = [keep + column for column in own]
-        cross = later[:, taken][:, :, at].sum(axis=2)
+    a, right = _normal_equations(information.total(), information.nuisances, free, z, held)
+    at, keep = _unknowns(information.nuisances, free), 1 + information.nuisances
+    later = np.cumsum(information.matrix[::-1], axis=0)[::-1]
+    step = np.linalg.solve(a, right[:, 0])
+    b, q = np.empty((2, len(later), len(groups)))
+    for k, group in enumerate(groups):
+        own = [keep + column for column in group]
+        cross = later[:, at][:, :, own].sum(axis=2)
         cross[:, list(held)] = 0.0
-        b[:, k] = later[:, 0, at].sum(axis=1) - cross @ along
-        q[:, k] = later[:, at][:, :, at].sum(axis=(1, 2)) - np.sum(cross * np.linalg.solve(a, cross.T).T, axis=1)
+        b[:, k] = later[:, 0, own].sum(axis=1) - cross @ step
+        q[:, k] = later[:, own][:, :, own].sum(axis=(1, 2)) - np.sum(cross * np.linalg.solve(a, cross.T).T, axis=1)
     return b, q
 
 
-def _taken(nuisances: int, free: Sequence[int]) -> list[int]:
+def _unknowns(nuisances: int, free: Sequence[int]) -> list[int]:
+    """Rows of the information matrix that are solved for: nuisances, then the columns ``free``."""
     return [1 + k for k in range(nuisances)] + [1 + nuisances + k for k in free]
 
 
-def _nuisance_system(
-    total: Floats, nuisances: int, free: Sequence[int], z: Floats | None, held: Sequence[int]
+def _normal_equations(
+    total: Floats, nuisances: int, free: Sequence[int], z: Floats | None, held: Sequence[int] = ()
 ) -> tuple[Floats, Floats]:
-    """Information of what takes its part, what is known before included, and its products with all there is."""
-    taken = _taken(nuisances, free)
-    a = total[np.ix_(taken, taken)].copy()
-    right = total[taken].copy()
+    """Information of nuisances and ``free`` columns, priors included, and its right-hand sides.
+
+    The right-hand sides are products with [residual, nuisances, columns], (unknowns, 1 + nuisances + columns); of the
+    residual the pull of the priors at ``z`` is taken. Nuisances that are ``held`` do not move.
+    """
+    at = _unknowns(nuisances, free)
+    a = total[np.ix_(at, at)].copy()
+    right = total[at].copy()
     a[range(nuisances), range(nuisances)] += 1.0
     if z is not None:
         right[:nuisances, 0] -= z
     a[list(held), list(held)] += _HELD
     right[list(held)] = 0.0
-    a[range(len(a)), range(len(a))] += 1e-9 * (1.0 + np.diag(a))
+    a[range(len(a)), range(len(a))] += _RIDGE * (1.0 + np.diag(a))
     return a, right
 
 
 def solve(total: Floats, nuisances: int, free: Sequence[int], z: Floats) -> tuple[Floats, Floats]:
-    """Steps of the nuisances and of the columns ``free``, and the covariance of the latter."""
+    """Steps of the nuisances and of the columns ``free``, (unknowns,), and the covariance of the latter."""
     a, right = _normal_equations(total, nuisances, free, z)
     inverse = np.linalg.inv(a)
-    return np.asarray(inverse @ right), np.asarray(inverse[nuisances:, nuisances:])
+    return np.asarray(inverse @ right[:, 0].copy()), np.asarray(inverse[nuisances:, nuisances:])
 
 
 def solve_bounded(
     total: Floats, nuisances: int, free: Sequence[int], z: Floats, low: Floats, high: Floats, damping: float = 0.0
 ) -> tuple[Floats, Floats, float]:
-    """As `solve`, no step below ``low`` or above ``high``, and what it takes off the cost if the model is linear.
+    """As `solve`, with bounds ``low`` and ``high`` on the steps, and the decrease of the cost if the model is linear.
 
-    ``damping`` shortens the step in proportion to each number's own information (Marquardt 1963). What would go too far
-    stays at its end while all others are solved for again (active set; Nocedal and Wright 2006, alg. 16.3).
+    ``damping`` adds a share of each unknown's own information (Marquardt 1963). An unknown that would pass its bound
+    stays there while all others are solved for again (active set; Nocedal and Wright 2006, alg. 16.3).
     """
-    a, right = _normal_equations(total, nuisances, free, z)
+    a, sides = _normal_equations(total, nuisances, free, z)
+    right = sides[:, 0].copy()
     damped = a.copy()
     damped[range(len(a)), range(len(a))] *= 1.0 + damping
-    change, ended = np.zeros(len(a)), np.zeros(len(a), bool)
-    for _ in range(_ROUNDS):
-        inside = np.flatnonzero(~ended)
-        rest = right[inside] - damped[np.ix_(inside, np.flatnonzero(ended))] @ change[ended]
+    change, at_bound = np.zeros(len(a)), np.zeros(len(a), bool)
+    for _ in range(_ACTIVE_SET_ROUNDS):
+        inside = np.flatnonzero(~at_bound)
+        rest = right[inside] - damped[np.ix_(inside, np.flatnonzero(at_bound))] @ change[at_bound]
         change[inside] = np.linalg.solve(damped[np.ix_(inside, inside)], rest)
-        beyond = ~ended & ((change < low) | (change > high))
+        beyond = ~at_bound & ((change < low) | (change > high))
         pull = right - damped @ change
-        back = ended & np.where(change <= low, pull > 0.0, pull < 0.0) & (low < high)
-        if not beyond.any() and not back.any():
+        released = at_bound & np.where(change <= low, pull > 0.0, pull < 0.0) & (low < high)
+        if not beyond.any() and not released.any():
             break
         change = np.clip(change, low, high)
-        ended = (ended & ~back) | beyond
+        at_bound = (at_bound & ~released) | beyond
     change = np.clip(change, low, high)
-    open_ones = [k for k in range(len(a)) if k >= nuisances or not ended[k]]
-    covariance = np.linalg.inv(a[np.ix_(open_ones, open_ones)])
+    reported = [k for k in range(len(a)) if k >= nuisances or not at_bound[k]]
+    covariance = np.linalg.inv(a[np.ix_(reported, reported)])
     columns = len(a) - nuisances
-    at = len(open_ones) - columns
+    at = len(reported) - columns
     return change, covariance[at:, at:], float(2.0 * right @ change - change @ a @ change)
-
-
-def _normal_equations(total: Floats, nuisances: int, free: Sequence[int], z: Floats) -> tuple[Floats, Floats]:
-    """Normal equations: information with what is known before, and the pull."""
-    taken = _taken(nuisances, free)
-    a = total[np.ix_(taken, taken)].copy()
-    right = total[taken, 0].copy()
-    a[range(nuisances), range(nuisances)] += 1.0
-    right[:nuisances] -= z
-    a[range(len(a)), range(len(a))] += 1e-9 * (1.0 + np.diag(a))
-    return a, right

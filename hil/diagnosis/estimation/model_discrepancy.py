@@ -1,11 +1,10 @@
-"""The model's own error, measured: how much more each number of an effect seems to explain where nothing is hidden.
+"""Model discrepancy: how much more of a candidate the plant's own form error explains than noise does.
 
-Two models of one car, written apart, differ in form; some effects imitate such differences. ``model_discrepancy.toml`` holds
-the root mean square of each number's estimate over its standard deviation, on drives of a car that shares no code with
-the plant and has nothing hidden (``brakebench trials --own-error``); 1 would be a perfect model. Whole car, axle, side
-and wheel have each their own: what the form does to all wheels alike it does not do to one. A gain in chi-squared is
-divided by its square before it is called beyond noise. The same is measured for the laws in no list, of all their
-coefficients together. It holds more of what errs more where a set says nothing of the car's springs (``unsprung``).
+Takes a candidate; gives the variance its gain in chi-squared is divided by. Two vehicle models written apart differ in
+form, and some effects imitate such differences. ``model_discrepancy.toml`` holds the root mean square of estimate over
+standard deviation of each effect parameter, by kind of location (car, axle, side, wheel), on drives of the reference
+car with nothing hidden (``brakebench trials --own-error``); 1 is a perfect model. Nonparametric terms are measured
+the same way, over all their coefficients. ``unsprung`` holds larger ratios where a vehicle set states no suspension.
 """
 
 import tomllib
@@ -16,17 +15,16 @@ from importlib import resources
 from hil.diagnosis.estimation.terms import Candidate, location_kind
 
 UNMEASURED_RATIO = 1.2
-"""Where nothing was measured."""
+"""Ratio where nothing was measured: a little above the median of those that were (1.08)."""
 UNSURE, FEW = 2.0, 1.4
-"""Beyond this ratio an estimate is off by the model more than by noise, and by how much is known from thirty drives:
-the quantile asked for is Student's of thirty degrees of freedom, whose square is so much larger than the normal one's
-at 1.25e-5."""
+"""Ratio from which the model errs more than the noise, and the factor on its variance there.
+
+A ratio is known from some thirty drives, so the quantile of the threshold is that of Student's distribution with
+thirty degrees of freedom; its square is 1.4 times that of the normal one at a probability of 1.25e-5."""
 UNLISTED = "unlisted"
-"""Name of all laws in no list."""
-
-
+"""Name of all nonparametric terms in the tables."""
 Table = Mapping[str, Mapping[str, Mapping[str, float]]]
-"""Ratios by effect, number and kind of place."""
+"""Ratios by effect, parameter and kind of location."""
 
 
 @cache
@@ -37,28 +35,27 @@ def _tables() -> Mapping[str, Table]:
 
 
 def variance_inflation(candidate: Candidate) -> float:
-    """What the gain of a candidate is divided by, at least 1."""
+    """Variance inflation of a candidate's gain in chi-squared, at least 1."""
     return _variance(candidate.effect.name, candidate.parameter.name, candidate.location, candidate.suspension_stated)
 
 
-def variance_inflation_nonparametric(name: str, place: str) -> float:
-    """The same for a law in no list, by `hil.diagnosis.detection.nonparametric.NonparametricTerm.name`, whatever is known of the springs."""
-    return _variance(UNLISTED, name, place, sprung=False)
+def variance_inflation_nonparametric(name: str, location: str) -> float:
+    """The same for a nonparametric term by its name, whatever is stated of the suspension."""
+    return _variance(UNLISTED, name, location, suspension_stated=False)
 
 
-def _variance(effect: str, number: str, place: str, sprung: bool) -> float:
-    kind = location_kind(place)
-    ratio = _ratio("ratio", effect, number, kind, UNMEASURED_RATIO)
-    if not sprung:
-        ratio = max(ratio, _ratio("unsprung", effect, number, kind, 1.0))
+def _variance(effect: str, parameter: str, location: str, suspension_stated: bool) -> float:
+    kind = location_kind(location)
+    ratio = _ratio("ratio", effect, parameter, kind, UNMEASURED_RATIO)
+    if not suspension_stated:
+        ratio = max(ratio, _ratio("unsprung", effect, parameter, kind, 1.0))
     return with_uncertainty(max(ratio, 1.0) ** 2)
 
 
-def _ratio(table: str, effect: str, number: str, kind: str, otherwise: float) -> float:
-    return _tables().get(table, {}).get(effect, {}).get(number, {}).get(kind, otherwise)
+def _ratio(table: str, effect: str, parameter: str, kind: str, default: float) -> float:
+    return _tables().get(table, {}).get(effect, {}).get(parameter, {}).get(kind, default)
 
 
 def with_uncertainty(variance: float) -> float:
-    """What a gain is divided by where the model errs by ``variance``, in variances of noise: more if it is large, for
-    it is known from few drives or numbers."""
+    """Variance inflation with its own uncertainty: a large ratio comes from few drives or parameters."""
     return variance * (FEW if variance > UNSURE**2 else 1.0)

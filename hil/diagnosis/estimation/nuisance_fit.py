@@ -1,4 +1,7 @@
-"""The vehicle's numbers: sensitivities to them, and their fit with the noise in turn."""
+"""Fit of the nuisance parameters and the noise in turn, with the Jacobian taken again where the fit has moved.
+
+Takes a simulator of the nominal vehicle; gives fitters with the Jacobian at a point, and the fitted model and noise.
+"""
 
 from collections import deque
 from collections.abc import Sequence
@@ -15,20 +18,23 @@ from hil.diagnosis.vehicle.priors import recording_nuisances
 from hil.diagnosis.vehicle.spec import Vehicle
 
 _KINKED = ("ehb_dead_time_s",)
-"""What acts from step to step, with a kink at each."""
+"""Nuisances with a kink at each simulation step: a dead time is a whole number of these."""
 _COARSE, _FINE = 0.5, 3.0
-"""Finite differences: in standard deviations of what is known before, and of what data say."""
-_TURNS, _MOST_ANEW, _SETTLED, _STALE, _FAR = 20, 4, 3.0, 0.3, 1.0
+"""Steps of finite differences: in prior and, later, in posterior standard deviations."""
+_TURNS, _MOST_LINEARISATIONS, _SETTLED = 20, 4, 3.0
+"""Turns of noise and nuisances at most, Jacobians at most, and the decrease of the cost at which a fit has settled."""
+_STALE, _FAR = 0.3, 1.0
+"""Distance, in prior standard deviations, at which the Jacobian is stale: of a settled fit, and of any."""
 _REMEMBERED, _STILL = 3, 0.5
-"""Times that sensitivities were taken last, and how far numbers may be from there, in standard deviations, for those of
-the best of several causes to serve again when it is accepted. A fit of the numbers themselves asks for `_STALE`."""
+"""Jacobians that are remembered, and the distance, in prior standard deviations, within which one serves again when the
+best of several causes is accepted."""
 
 
 class NuisanceFit:
-    """What may be off in the car as handed in (``base``), within its tolerance.
+    """Nuisances of the nominal vehicle (``base``), linearised there first.
 
-    ``fitter`` has the sensitivities last taken and the simulator of the fits to come; ``relinearise`` False keeps the
-    first sensitivities.
+    ``fitter`` has the Jacobian taken last and the simulator of the fits to come; ``relinearise`` False keeps the
+    first Jacobian.
     """
 
     def __init__(
@@ -40,6 +46,7 @@ class NuisanceFit:
         self._steps: Floats = np.full(len(self.nuisances), _COARSE)
         self.fitter = Fitter(rig, frame, base, self.nuisances, {})
         self._taken: deque[tuple[Floats, tuple[Term, ...], Fitter]] = deque(maxlen=_REMEMBERED)
+        self.relinearise(np.zeros(len(self.nuisances)))
 
     def relinearise(self, z: Floats, terms: Sequence[Term] = ()) -> None:
         """Take the sensitivities where the numbers are ``z`` standard deviations off, beside these effects.
@@ -71,18 +78,18 @@ class NuisanceFit:
         self._taken.append((z, tuple(terms), self.fitter))
 
     def relinearise_cached(self, z: Floats, terms: Sequence[Term]) -> None:
-        """As `anew`, or those taken lately where a car with these effects was alike."""
-        for around, taken, fitter in self._taken:
-            if float(np.abs(z - around).max()) <= _STILL and same_terms(taken, terms):
+        """As `relinearise`, or a remembered Jacobian of a model that was alike."""
+        for around, others, fitter in self._taken:
+            if float(np.abs(z - around).max()) <= _STILL and same_terms(others, terms):
                 self.fitter = fitter.with_simulator(self.fitter.simulator)
                 return
         self.relinearise(z, terms)
 
     def fit(self, model: Model, noise: Noise) -> tuple[Model, Noise]:
-        """Numbers and noise in turn, with sensitivities taken anew until neither moves.
+        """Nuisances and noise in turn until neither moves, with a new Jacobian where the nuisances moved.
 
-        What the numbers have not explained yet counts as noise, so the steps are forgiving; the first are made with the
-        noise at hand, for noise found there would take edges for its own that numbers explain.
+        What is not explained yet counts as noise, so steps are forgiving. The first turn keeps the noise given: an
+        estimate there would take for noise what the nuisances explain.
         """
         cost, around, times = np.inf, model.z, 0
         for turn in range(_TURNS):
@@ -91,7 +98,11 @@ class NuisanceFit:
             model = self.fitter.fit(model, noise, 4, follow=True)
             settled, cost = cost - model.cost < _SETTLED, model.cost
             stale = float(np.abs(model.z - around).max()) > (_STALE * (1 + 2 * times) if settled else _FAR)
-            most = _MOST_ANEW if self.fitter.birge_ratio(model.z) < BIASED_BIRGE_RATIO else 2 * _MOST_ANEW
+            most = (
+                _MOST_LINEARISATIONS
+                if self.fitter.birge_ratio(model.z) < BIASED_BIRGE_RATIO
+                else 2 * _MOST_LINEARISATIONS
+            )
             if self._relinearise and stale and times < most:
                 information = np.diag(self.fitter.nuisance_information(noise))
                 self._steps = np.clip(_FINE / np.sqrt(np.maximum(information, 1e-9)), 0.03, _COARSE)
@@ -103,5 +114,5 @@ class NuisanceFit:
         return model, noise
 
     def linearisation_stale(self, model: Model, around: Floats) -> bool:
-        """Whether the sensitivities taken at ``around`` hold no longer."""
+        """The Jacobian taken at ``around`` holds no longer for the model."""
         return self._relinearise and float(np.abs(model.z - around).max()) >= _FAR

@@ -1,1 +1,1 @@
-"""Noise: what it is made of, how likely a residual is by it, and its estimate."""
+"""Noise: takes residuals of a simulation; gives their noise model, innovations and log-likelihood."""

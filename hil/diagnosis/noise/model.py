@@ -1,4 +1,8 @@
-"""The noise model: sensor noise and coloured disturbances, and residuals whitened by them."""
+"""The noise model: white sensor noise and coloured disturbances of each track, and residuals whitened by it.
+
+Takes channels of a dataset (residuals or Jacobian columns); gives them as *tracks* (wheels as mean and differences, so
+that errors of tracks are independent) and as innovations, with the log-likelihood.
+"""
 
 import operator
 from collections.abc import Callable, Mapping
@@ -14,16 +18,25 @@ from hil.diagnosis.parallel import parallel_map
 
 Stack = Mapping[str, Floats]
 REFERENCE_MPS = 20.0
+"""Speed at which noise in proportion to speed is stated."""
 MODES = np.array([[0.25, 0.25, 0.25, 0.25], [0.25, 0.25, -0.25, -0.25], [0.5, -0.5, 0.0, 0.0], [0.0, 0.0, 0.5, -0.5]])
 MODE_NAMES = ("mean", "front-rear", "left-right front", "left-right rear")
 _SWING_S = 0.3
+"""After the start of a segment, how long yaw rate and lateral acceleration are not compared: the body swings in."""
 LONGITUDINAL = ("wheel.mean", "ax", "gps")
-_WIDE = 8  # columns from which on threads are worth their while
+"""Tracks along the road, in the order of the Kalman filter."""
+_WIDE = 8
+"""Columns from which threads pay."""
+_LEAST_SAMPLES = 50
+"""Compared samples that a track needs: its noise cannot be estimated from fewer."""
 
 
 @dataclass(frozen=True, eq=False)
 class ChannelNoise:
-    """Noise of one track: white variance a^2 + (b v / 20)^2, AR(1) of standard deviation c and time constant tau."""
+    """Noise of one track: white variance a^2 + (b v / 20 m/s)^2, AR(1) of standard deviation c and time constant tau_s.
+
+    a, b and c have the unit of the track.
+    """
 
     a: float
     b: float
@@ -35,12 +48,12 @@ class ChannelNoise:
 class Noise:
     """Noise of all tracks.
 
-    ``disturbances``: force, slope, accelerometer (standard deviation m/s2, tau s), what all wheels tell wrong (m/s at
-    20 m/s, tau s), and what the ground speed does (m/s, tau s) where there is one.
+    ``disturbances`` are (standard deviation, tau in s) of force, slope and accelerometer (m/s2), of the error all
+    wheels share (m/s at 20 m/s), and of the ground speed (m/s) where one is logged; see
+    `hil.diagnosis.noise.innovations`.
 
-    ``scales``: by how much a manoeuvre is noisier than the others (one number each), per track; the moving car's
-    tracks share those of "long". Where the car is driven hard the model's own error is larger too.
-    ``enabled`` False keeps white sensor noise alone: what every test of a free-running simulation must not do.
+    ``scales`` are factors of the standard deviations, (segments,) by track; the tracks along the road share those of
+    "long". Where the car is driven hard the model's own error is larger too. ``enabled`` False keeps white noise alone.
     """
 
     tracks: Mapping[str, ChannelNoise]
@@ -51,9 +64,10 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class SampleMasks:
-    """What does not change with the residual: masks, starts, speeds, per sample of all drives.
+    """Masks, starts and speeds by sample, (samples,) over all recordings; the same for every residual.
 
-    ``waited`` is the variance of each track that comes of frames that wait for the bus: its slope times their time.
+    ``log_start``, ``segment_start`` and ``moving`` are 1 where true; ``present`` by track is 1 where it is compared.
+    ``jitter_variance`` by track comes of frames that wait for the bus: the squared slope times the time waited.
     """
 
     log_start: Floats
@@ -68,39 +82,40 @@ class SampleMasks:
 
     @classmethod
     def of(cls, case: Dataset) -> "SampleMasks":
-        """Of a case."""
-        fresh, restart = [], []
+        """Masks of a dataset."""
+        log_start, segment_start = [], []
         for drive in case.recordings:
-            begin, again = np.zeros(drive.samples), np.zeros(drive.samples)
-            begin[0] = 1.0
+            first, later = np.zeros(drive.samples), np.zeros(drive.samples)
+            first[0] = 1.0
             for segment in drive.segments[1:]:
-                again[segment.first // drive.stride] = 1.0
-            fresh.append(begin)
-            restart.append(again)
+                later[segment.first // drive.stride] = 1.0
+            log_start.append(first)
+            segment_start.append(later)
         tracks: dict[str, list[Floats]] = {}
         for drive in case.recordings:
             for group, values in drive.measured.items():
-                shown = _known(group, values, drive.moving, drive.resting)
-                for name, known in shown.items():
+                for name, known in _known(group, values, drive.moving, drive.resting).items():
                     tracks.setdefault(name, []).append(known * drive.compared.get(name, 1.0))
         present = {name: np.concatenate(parts) for name, parts in tracks.items()}
-        begun = np.concatenate(restart)  # a lag mixes the first sample with those before, a body in a bend swings in
-        swings = np.convolve(begun, np.ones(int(np.ceil(_SWING_S / case.sample_s))))[: len(begun)]
+        starts = np.concatenate(segment_start)  # a lag mixes the first sample with those before
+        swings = np.convolve(starts, np.ones(int(np.ceil(_SWING_S / case.sample_s))))[: len(starts)]
         present = {
-            name: np.where((swings if name in ("ay", "yaw") else begun) > 0.5, 0.0, known)
+            name: np.where((swings if name in ("ay", "yaw") else starts) > 0.5, 0.0, known)
             for name, known in present.items()
         }
-        twice = _redundant_channels(case)
-        present = {name: known for name, known in present.items() if known.sum() > 50 and name not in twice}
+        redundant = _redundant_channels(case)
+        present = {
+            name: known for name, known in present.items() if known.sum() > _LEAST_SAMPLES and name not in redundant
+        }
         return cls(
-            np.concatenate(fresh), np.concatenate(restart), np.concatenate([d.moving for d in case.recordings]) * 1.0,
-            np.concatenate([d.speed_mps for d in case.recordings]), case.segment_ids(), case.sample_s, present, tuple(present),
-            _jitter_variance(case),
+            np.concatenate(log_start), starts, np.concatenate([d.moving for d in case.recordings]) * 1.0,
+            np.concatenate([d.speed_mps for d in case.recordings]), case.segment_ids(), case.sample_s, present,
+            tuple(present), _jitter_variance(case),
         )  # fmt: skip
 
 
 def _redundant_channels(case: Dataset) -> set[str]:
-    """Tracks of the torques where motors act at one axle alone: what front and rear differ by is the mean again."""
+    """Torque tracks that repeat others where motors act on one axle alone: front less rear is the mean again."""
     torques = [np.nan_to_num(drive.measured["motor"]) for drive in case.recordings if "motor" in drive.measured]
     acts = [any(one[:, axle].any() for one in torques) for axle in (slice(0, 2), slice(2, 4))]
     if acts[0] == acts[1]:
@@ -109,11 +124,11 @@ def _redundant_channels(case: Dataset) -> set[str]:
 
 
 def _jitter_variance(case: Dataset) -> dict[str, Floats]:
-    """Variance by waiting of all tracks but the wheels', whose stamps are the log's.
+    """Variance by frames that wait, (samples,) by track; none for the wheels, whose time stamps are the log's.
 
-    At a corner the steeper side counts; two rows of a sample wait apart.
+    At a corner the steeper side counts; rows that are averaged to a sample wait independently.
     """
-    found: dict[str, list[Floats]] = {}
+    variances: dict[str, list[Floats]] = {}
     for drive in case.recordings:
         wait = drive.timestamp_jitter_s / (drive.stride**0.5 * case.sample_s)
         for group, values in drive.measured.items():
@@ -124,12 +139,12 @@ def _jitter_variance(case: Dataset) -> dict[str, Floats]:
             steps = wait * np.abs(np.nan_to_num(np.diff(values, axis=0)) @ weights)
             ahead, behind = np.pad(steps, ((0, 1), (0, 0))), np.pad(steps, ((1, 0), (0, 0)))
             for name, column in zip(names, (np.maximum(ahead, behind) ** 2).T, strict=True):
-                found.setdefault(name, []).append(column)
-    return {name: np.concatenate(parts) for name, parts in found.items()}
+                variances.setdefault(name, []).append(column)
+    return {name: np.concatenate(parts) for name, parts in variances.items()}
 
 
 def _known(group: str, values: Floats, moving_now: Floats, resting: Floats) -> dict[str, Floats]:
-    """Tracks of a group and where they are compared."""
+    """Tracks of a group of channels (samples, channels), 1 where each is compared, else 0."""
     finite = np.isfinite(values)
     if group in SINGLES:
         known = finite[:, 0] & (moving_now + (resting if group != "gps" else 0.0) > 0.5)
@@ -142,42 +157,42 @@ def _known(group: str, values: Floats, moving_now: Floats, resting: Floats) -> d
 
 
 def tracks_of(stack: Stack, frame: SampleMasks, radius_m: float) -> dict[str, Floats]:
-    """Residuals or sensitivities (samples, channels) of groups as tracks (samples, 1); wheel speeds as m/s."""
-    found: dict[str, Floats] = {}
+    """Residuals or differences (samples, channels) by group as tracks (samples, 1); wheel speeds in m/s."""
+    tracks: dict[str, Floats] = {}
     for group, values in stack.items():
         if group in SINGLES:
-            found[group] = values
+            tracks[group] = values
             continue
         factor = radius_m if group == "wheel" else 1.0
         if group == "wheel" and "wheel.front-rear" not in frame.names:
-            found["wheel.mean"] = factor * np.nanmean(values, axis=1, keepdims=True)
+            tracks["wheel.mean"] = factor * np.nanmean(values, axis=1, keepdims=True)
             continue
         modes = values @ (factor * MODES.T)
-        found |= {f"{group}.{mode}": modes[:, k : k + 1] for k, mode in enumerate(MODE_NAMES)}
-    return {name: np.where(np.isnan(values), 0.0, values) for name, values in found.items() if name in frame.names}
+        tracks |= {f"{group}.{mode}": modes[:, k : k + 1] for k, mode in enumerate(MODE_NAMES)}
+    return {name: np.where(np.isnan(values), 0.0, values) for name, values in tracks.items() if name in frame.names}
 
 
 def whiten(
     tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise, into: Mapping[str, Floats] | None = None
 ) -> tuple[dict[str, Floats], float]:
-    """Innovations by track, (samples, columns), in the precision given, and the log-likelihood of the first column.
+    """Innovations by track, (samples, columns) in the precision given, and the log-likelihood of the first column.
 
     They are written ``into`` arrays by track, where these are given.
     """
     out = {name: np.empty_like(values) for name, values in tracks.items()} if into is None else dict(into)
-    apart: list[Callable[[], float]] = [
+    filters: list[Callable[[], float]] = [
         partial(_whiten_channel, name, values, frame, noise, out[name])
         for name, values in tracks.items()
         if name not in LONGITUDINAL
     ]
     if any(name in tracks for name in LONGITUDINAL):
-        apart.insert(0, partial(_whiten_longitudinal, tracks, frame, noise, out))
+        filters.insert(0, partial(_whiten_longitudinal, tracks, frame, noise, out))
     wide = max((values.shape[1] for values in tracks.values()), default=0) >= _WIDE
-    return out, sum(parallel_map(operator.call, apart) if wide else (one() for one in apart))
+    return out, sum(parallel_map(operator.call, filters) if wide else (one() for one in filters))
 
 
 def whitened(tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise) -> Floats:
-    """Innovations of all tracks, one below the other in the frame's order, (tracks samples, columns)."""
+    """Innovations of all tracks, one below the other in the order of the masks, (tracks x samples, columns)."""
     samples, (columns, kind) = len(frame.log_start), next((one.shape[1], one.dtype) for one in tracks.values())
     joined = np.empty((len(frame.names) * samples, columns), kind)
     parts = {name: joined[k * samples : (k + 1) * samples] for k, name in enumerate(frame.names)}
@@ -186,7 +201,7 @@ def whitened(tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise) -> 
 
 
 def white_variance(name: str, track: ChannelNoise, frame: SampleMasks) -> Floats:
-    """Variance of the white noise of a track, by sample; 0 where nothing is known."""
+    """Variance of the white noise of a track, (samples,); 0 where it is not compared."""
     variance: float | Floats = track.a**2
     if track.b:
         variance = variance + (track.b * frame.speed_mps / REFERENCE_MPS) ** 2
@@ -196,7 +211,7 @@ def white_variance(name: str, track: ChannelNoise, frame: SampleMasks) -> Floats
 
 
 def scale_of(name: str, frame: SampleMasks, noise: Noise) -> Floats:
-    """Scale of every sample."""
+    """Factor of the standard deviation of a track, (samples,)."""
     scales = noise.scales.get(name)
     return (
         np.ones(len(frame.log_start)) if scales is None else np.asarray(scales[np.asarray(frame.segment_id, np.int64)])
@@ -204,7 +219,7 @@ def scale_of(name: str, frame: SampleMasks, noise: Noise) -> Floats:
 
 
 def ar1_coefficient(tau_s: float, step_s: float) -> float:
-    """What is left of coloured noise from sample to sample."""
+    """AR(1) coefficient of coloured noise of time constant ``tau_s`` at sample time ``step_s``."""
     return float(np.exp(-step_s / max(tau_s, 1e-3)))
 
 
@@ -212,20 +227,22 @@ def _whiten_longitudinal(
     tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise, out: Mapping[str, Floats]
 ) -> float:
     scale, white = scale_of("long", frame, noise), np.zeros((len(frame.log_start), 3))
-    likelihood, there = 0.0, [name for name in LONGITUDINAL if name in tracks]
-    for name in there:
+    likelihood, measured = 0.0, [name for name in LONGITUDINAL if name in tracks]
+    for name in measured:
         likelihood -= float(np.log(scale) @ frame.present[name])
         white[:, LONGITUDINAL.index(name)] = white_variance(name, noise.tracks[name], frame)
+    taus = [tau_s for _, tau_s in noise.disturbances]
+    phi = np.array([[ar1_coefficient(tau_s, frame.sample_s)] for tau_s in taus])
     on = 1.0 if noise.enabled else 0.0
-    colours = np.array(
-        [(ar1_coefficient(tau, frame.sample_s), on * size**2 + 1e-12) for size, tau in noise.disturbances]
-    )
+    colour = np.array([[on * size**2 + 1e-12] for size, _ in noise.disturbances])
     share = frame.speed_mps / REFERENCE_MPS
-    nothing = np.empty_like(tracks[there[0]]) if len(there) < len(LONGITUDINAL) else None
-    given = tuple(np.ascontiguousarray(tracks.get(name, nothing)) for name in LONGITUDINAL)
-    told = tuple(out.get(name, nothing) for name in LONGITUDINAL)
-    how = (scale, frame.log_start, frame.segment_start, frame.moving, white, share, frame.sample_s, colours)
-    return likelihood + float(longitudinal_innovations(given, *how, told))
+    unmeasured = np.empty_like(tracks[measured[0]]) if len(measured) < len(LONGITUDINAL) else None
+    columns = tuple(np.ascontiguousarray(tracks.get(name, unmeasured)) for name in LONGITUDINAL)
+    outs = tuple(out.get(name, unmeasured) for name in LONGITUDINAL)
+    masks = (frame.log_start, frame.segment_start, frame.moving)
+    return likelihood + float(
+        longitudinal_innovations(columns, scale, *masks, white, share, frame.sample_s, phi, colour, outs)
+    )
 
 
 def _whiten_channel(name: str, values: Floats, frame: SampleMasks, noise: Noise, out: Floats) -> float:

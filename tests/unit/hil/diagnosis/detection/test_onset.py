@@ -82,7 +82,6 @@ def test_a_scanned_onset_of_what_was_always_there_goes(always):
 
     def fitter() -> Fitter:
         nuisance_fit = NuisanceFit(simulator, SampleMasks.of(dataset), vehicle, base, relinearise=True)
-        nuisance_fit.relinearise(np.zeros(len(nuisance_fit.nuisances)))
         return nuisance_fit.fitter
 
     there = Term(pads, -0.2, onset=None if always else second)

@@ -25,13 +25,12 @@ def test_pads_that_brake_gains_absorbed_are_estimated():
     vehicle = load_vehicle(VEHICLE)
     dataset = prepare([log_as_driven(vehicle, 0.318)], 0.318)
     simulator, base = Simulator(dataset, vehicle), nominal(vehicle)
-    nuisance_fit = NuisanceFit(simulator, SampleMasks.of(dataset), vehicle, base, relinearise=True)
     (pads,) = [one for one in candidates(columns()) if one.name == "pad_mu_gain@car"]
     rng = np.random.default_rng(2)
     (recording,) = dataset.recordings
     for group, values in simulator.run(pads.applied(base, WEAKER)).items():
         recording.measured[group][:] = values + DEVIATIONS.get(group, 0.02) * rng.standard_normal(values.shape)
-    nuisance_fit.relinearise(np.zeros(len(nuisance_fit.nuisances)))
+    nuisance_fit = NuisanceFit(simulator, SampleMasks.of(dataset), vehicle, base, relinearise=True)
     biased, noise = nuisance_fit.fit(*nuisance_fit.fitter.start())
     gains = [k for k, one in enumerate(nuisance_fit.nuisances) if one.name.startswith("brake_gain")]
     assert (biased.z[gains] < -2.0).any()

@@ -48,13 +48,12 @@ def _accepted(hidden: float) -> _Accepted:
     vehicle = load_vehicle(VEHICLE)
     dataset = prepare([log_as_driven(vehicle, 0.318)], 0.318)
     simulator, base = Simulator(dataset, vehicle), nominal(vehicle)
-    nuisance_fit = NuisanceFit(simulator, SampleMasks.of(dataset), vehicle, base, relinearise=True)
     (wind,) = [one for one in candidates(columns()) if one.name == "headwind.wind_mps@car"]
     rng = np.random.default_rng(2)
     (recording,) = dataset.recordings
     for group, values in simulator.run(wind.applied(base, hidden)).items():
         recording.measured[group][:] = values + DEVIATIONS.get(group, 0.02) * rng.standard_normal(values.shape)
-    nuisance_fit.relinearise(np.zeros(len(nuisance_fit.nuisances)))
+    nuisance_fit = NuisanceFit(simulator, SampleMasks.of(dataset), vehicle, base, relinearise=True)
     fitter = nuisance_fit.fitter
     bare, noise = nuisance_fit.fit(*fitter.start())
     start = fitter.at(bare.z, (Term(wind, 0.5 * hidden),), noise)

@@ -38,7 +38,6 @@ class _Driven:
         for group, values in simulator.run(changed).items():
             recording.measured[group][:] = values + DEVIATIONS.get(group, 0.02) * rng.standard_normal(values.shape)
         nuisance_fit = NuisanceFit(simulator, masks, vehicle, base, relinearise=True)
-        nuisance_fit.relinearise(np.zeros(len(nuisance_fit.nuisances)))
         self.fitter = nuisance_fit.fitter
         self.bare, self.noise = nuisance_fit.fit(*self.fitter.start())
 

@@ -1,4 +1,4 @@
-"""Causes that are a number of the vehicle: the same car, told at its most likely."""
+"""Aliases: terms that change the parameter of a nuisance, resolved to the most likely split."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def _number(model: Model, at: int) -> float:
     ("rotating_inertia@car", "wheel_inertia_kg_m2", 1.0),
     ("ehb_bandwidth.frequency@car", "ehb_natural_frequency_hz", VEHICLE.parameters.ehb.natural_frequency_hz),
 ])  # fmt: skip
-def test_a_cause_is_found_to_be_a_number_of_the_vehicle(name, number, slope):
+def test_a_term_is_an_alias_of_a_nuisance(name, number, slope):
     candidate = CANDIDATES[name]
     same = alias_of(Term(candidate, 0.2 * candidate.parameter.typical), VEHICLE.nuisances, BASE)
     assert same is not None
@@ -46,15 +46,15 @@ def test_a_cause_is_found_to_be_a_number_of_the_vehicle(name, number, slope):
 
 @pytest.mark.parametrize("node", ["imu", "pressure", "motor"])
 def test_stamps_of_a_node_that_are_late_are_its_latency(node):
-    """45 ms were told as 39, with six by a latency that went as far as it may."""
+    """Late by 45 ms, of which a latency at its bound had taken 6: nearly all is the term's."""
     nuisances = (*VEHICLE.nuisances, *recording_nuisances(True, LATENCY_S))
     at = next(k for k, nuisance in enumerate(nuisances) if nuisance.name == f"late_{node}")
     z = np.zeros(len(nuisances))
     z[at] = 3.0
     term = Term(CANDIDATES[f"timestamp_offset@{node}"], 0.039)
-    told = resolve_aliases(Model(z, (term,), {}, 9.0, np.zeros((0, 0))), nuisances, BASE)
-    late = BASE.with_nuisances(nuisances, told.z).latency_s[nuisances[at].at[0]]
-    assert told.terms[0].value + late == pytest.approx(0.045)
+    resolved = resolve_aliases(Model(z, (term,), {}, 9.0, np.zeros((0, 0))), nuisances, BASE)
+    late = BASE.with_nuisances(nuisances, resolved.z).latency_s[nuisances[at].at[0]]
+    assert resolved.terms[0].value + late == pytest.approx(0.045)
     assert abs(late) < 5e-4
     same = alias_of(term, nuisances, BASE)
     assert same is not None
@@ -62,32 +62,32 @@ def test_stamps_of_a_node_that_are_late_are_its_latency(node):
 
 
 def test_stamps_of_the_wheels_are_no_latency():
-    """All others are told against them."""
+    """The clock of all others is relative to theirs."""
     nuisances = (*VEHICLE.nuisances, *recording_nuisances(True, LATENCY_S))
     assert alias_of(Term(CANDIDATES["timestamp_offset@wheel"], 0.02), nuisances, BASE) is None
 
 
 @pytest.mark.parametrize("name", ["pad_mu_gain@fl", "road_grade@car", "imu_bias.ax_mps2@car", "slip_stiffness@car"])
-def test_other_causes_are_none(name):
+def test_other_terms_have_no_alias(name):
     candidate = CANDIDATES[name]
     assert alias_of(Term(candidate, 0.2 * candidate.parameter.typical), VEHICLE.nuisances, BASE) is None
 
 
 def test_the_car_stays_and_the_number_goes_back_to_what_is_stated():
-    """6 ms beside a dead time that three standard deviations have made longer: most of both is the cause."""
+    """6 ms by the term and three standard deviations by the nuisance: most of both is the term's."""
     model, at = _model("ehb_dead_time@car", 0.006, 3.0, "ehb_dead_time_s")
-    told = resolve_aliases(model, VEHICLE.nuisances, BASE)
-    assert abs(told.z[at]) < 0.3
-    assert told.terms[0].value + _number(told, at) == pytest.approx(0.006 + _number(model, at))
-    assert told.cost == pytest.approx(100.0 + told.z[at] ** 2)
-    again = resolve_aliases(told, VEHICLE.nuisances, BASE)
-    assert again.terms[0].value == pytest.approx(told.terms[0].value)
+    resolved = resolve_aliases(model, VEHICLE.nuisances, BASE)
+    assert abs(resolved.z[at]) < 0.3
+    assert resolved.terms[0].value + _number(resolved, at) == pytest.approx(0.006 + _number(model, at))
+    assert resolved.cost == pytest.approx(100.0 + resolved.z[at] ** 2)
+    again = resolve_aliases(resolved, VEHICLE.nuisances, BASE)
+    assert again.terms[0].value == pytest.approx(resolved.terms[0].value)
 
 
 def test_a_share_is_of_what_the_number_is_now():
     model, at = _model("ehb_bandwidth.frequency@car", -0.2, 2.0, "ehb_natural_frequency_hz")
-    told = resolve_aliases(model, VEHICLE.nuisances, BASE)
-    assert _number(told, at) * (1.0 + told.terms[0].value) == pytest.approx(_number(model, at) * 0.8)
+    resolved = resolve_aliases(model, VEHICLE.nuisances, BASE)
+    assert _number(resolved, at) * (1.0 + resolved.terms[0].value) == pytest.approx(_number(model, at) * 0.8)
 
 
 def test_what_no_value_of_the_cause_can_make_stays_as_it_is():

@@ -1,4 +1,4 @@
-"""The linearised problem: nuisances within their tolerance take their part, and no more."""
+"""The linearised problem: nuisances are marginalised by their prior, steps stay within bounds."""
 
 import numpy as np
 import pytest
@@ -34,18 +34,18 @@ def test_a_nuisance_that_is_held_explains_nothing_more(seed, side):
 
 
 @given(seed=st.integers(0, 10_000))
-def test_nuisances_take_their_part_by_least_squares_with_their_prior(seed):
+def test_nuisances_are_marginalised_by_least_squares_with_their_prior(seed):
     total, z = _products(seed), np.array([0.4, 1.0, -0.2])
-    found = marginalise(total, NUISANCES, z=z)
+    marginal = marginalise(total, NUISANCES, z=z)
     own = slice(1, 1 + NUISANCES)
     a = total[own, own] + np.eye(NUISANCES)
     moved = np.linalg.solve(a, total[own, 0] - z)
     expected = total[1 + NUISANCES :, 0] - total[1 + NUISANCES :, own] @ moved
-    assert found.b == pytest.approx(expected, rel=1e-6, abs=1e-6)
+    assert marginal.b == pytest.approx(expected, rel=1e-6, abs=1e-6)
 
 
 @given(seed=st.integers(0, 10_000), begin=st.integers(0, 3))
-def test_a_signature_from_a_manoeuvre_on_is_one_that_is_nothing_before(seed, begin):
+def test_a_signature_from_an_onset_is_zero_before_it(seed, begin):
     rng, z = np.random.default_rng(seed), np.array([0.4, 3.0, -0.2])
     manoeuvres = rng.standard_normal((4, 50, 1 + NUISANCES + COLUMNS))
     matrix = np.stack([rows.T @ rows for rows in manoeuvres])
@@ -63,24 +63,24 @@ def test_a_signature_from_a_manoeuvre_on_is_one_that_is_nothing_before(seed, beg
 
 
 @given(seed=st.integers(0, 10_000))
-def test_a_step_within_its_ends_is_the_best_there_is(seed):
-    """Held against bounded least squares on the same problem, tolerances as rows of their own."""
+def test_a_bounded_step_is_optimal(seed):
+    """Held against bounded least squares on the same problem, priors as rows of their own."""
     rng = np.random.default_rng(seed)
     columns = rng.standard_normal((40, NUISANCES + 2)) * 10.0 ** rng.uniform(-1.0, 1.0, NUISANCES + 2)
     joined = np.column_stack((rng.standard_normal(40) * 5.0, columns))
     z = rng.uniform(-1.0, 1.0, NUISANCES)
     low, high = -rng.uniform(0.0, 2.0, NUISANCES + 2), rng.uniform(1e-3, 2.0, NUISANCES + 2)
-    change, _, foretold = solve_bounded(joined.T @ joined, NUISANCES, range(2), z, low, high)
+    change, _, decrease = solve_bounded(joined.T @ joined, NUISANCES, range(2), z, low, high)
     prior = np.eye(NUISANCES, NUISANCES + 2)
     rows, right = np.vstack((columns, prior)), np.concatenate((joined[:, 0], -z))
     best = lsq_linear(rows, right, (low, high), tol=1e-12, method="bvls")
     assert ((low - 1e-9 <= change) & (change <= high + 1e-9)).all()
     left = float(np.sum((rows @ change - right) ** 2))
     assert left == pytest.approx(2.0 * best.cost, rel=1e-6)
-    assert foretold == pytest.approx(float(right @ right) - left, rel=1e-6, abs=1e-6)
+    assert decrease == pytest.approx(float(right @ right) - left, rel=1e-6, abs=1e-6)
 
 
-def test_a_step_without_ends_is_the_step_of_solve():
+def test_a_step_with_far_bounds_is_the_step_of_solve():
     rng = np.random.default_rng(5)
     joined = rng.standard_normal((50, 1 + NUISANCES + 1))
     total, z, far = joined.T @ joined, rng.standard_normal(NUISANCES), np.full(NUISANCES + 1, 1e3)

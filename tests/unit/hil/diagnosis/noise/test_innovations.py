@@ -35,11 +35,12 @@ def _moving_car(n: int, rng: np.random.Generator) -> np.ndarray:
 def _moved(y, fresh, rolling, white, share, colours, out) -> None:
     """The filter over (samples, 3 tracks, 1), without a restart."""
     tracks = tuple(np.ascontiguousarray(y[:, m]) for m in range(3))
-    found = tuple(np.empty_like(track) for track in tracks)
+    outs = tuple(np.empty_like(track) for track in tracks)
+    phi, colour = np.ascontiguousarray(colours.T)[:, :, None]
     longitudinal_innovations(
-        tracks, np.ones(len(y)), fresh, np.zeros(len(y)), rolling, white, share, STEP_S, colours, found
+        tracks, np.ones(len(y)), fresh, np.zeros(len(y)), rolling, white, share, STEP_S, phi, colour, outs
     )
-    out[:] = np.stack(found, axis=1)
+    out[:] = np.stack(outs, axis=1)
 
 
 def _innovations(y: np.ndarray, force: float) -> np.ndarray:

@@ -16,7 +16,7 @@ WAIT_S, NOISE_PA, RAMP_PA_S = 3e-4, 2e3, 2.5e7
 
 
 def _log(rng: np.random.Generator, wait_s: float) -> tuple[Log, np.ndarray]:
-    """Pressures that go up and down quickly, told by frames that wait; and as they were."""
+    """Pressures that go up and down quickly, logged in frames that wait, and without waiting."""
     t = np.arange(6000) * 0.01
     stamps = t + wait_s * rng.exponential(1.0, len(t))
 
@@ -73,7 +73,7 @@ def test_what_is_far_off_for_a_moment_does_not_make_all_noisier() -> None:
     assert sizes[1] < 2.5 * sizes[0]
 
 
-def test_the_noise_that_made_the_residual_is_found() -> None:
+def test_the_noise_that_made_the_residual_is_estimated() -> None:
     """Force, slope and accelerometer of a car that rolls and stands: where each tells, sizes and times come back."""
     rng, n = np.random.default_rng(7), 60000
     step = 0.02
@@ -96,11 +96,11 @@ def test_the_noise_that_made_the_residual_is_found() -> None:
     fresh[0] = 1.0
     present = {"wheel.mean": rolling * (1.0 - restart), "ax": np.ones(n)}
     frame = SampleMasks(fresh, restart, rolling, 20.0 * rolling, np.zeros(n), step, present, ("wheel.mean", "ax"))
-    found = estimate(tracks, frame, first_guess(tracks, frame))
-    for (size, tau_s), known in zip(found.disturbances, true.values(), strict=False):
+    noise = estimate(tracks, frame, first_guess(tracks, frame))
+    for (size, tau_s), known in zip(noise.disturbances, true.values(), strict=False):
         assert size == pytest.approx(known[0], rel=0.25)
         assert tau_s == pytest.approx(known[1], rel=0.4)
-    assert found.tracks["ax"].a == pytest.approx(0.015, rel=0.05)
+    assert noise.tracks["ax"].a == pytest.approx(0.015, rel=0.05)
 
 
 def test_a_coloured_error_of_the_ground_speed_is_none_of_the_wheels() -> None:
@@ -144,7 +144,7 @@ def test_a_little_colour_is_not_lost_in_much_white_noise(seed: int) -> None:
     assert track.c == pytest.approx(size, rel=0.4)
 
 
-def test_no_noise_nearby_is_likelier_than_the_one_found() -> None:
+def test_no_noise_nearby_is_likelier_than_the_estimate() -> None:
     """The search ends at the least cost: every number of the moving car a little off, either way, is no better."""
     rng, n, step = np.random.default_rng(11), 6000, 0.02
     keep = np.exp(-step / 1.0)
@@ -154,15 +154,15 @@ def test_no_noise_nearby_is_likelier_than_the_one_found() -> None:
     fresh = (np.arange(n) == 0) * 1.0
     ones, zeros = np.ones(n), np.zeros(n)
     frame = SampleMasks(fresh, zeros, ones, 20.0 * ones, zeros, step, dict.fromkeys(tracks, ones), tuple(tracks))
-    found = estimate(tracks, frame, first_guess(tracks, frame))
-    best = whiten(tracks, frame, found)[1]
+    noise = estimate(tracks, frame, first_guess(tracks, frame))
+    best = whiten(tracks, frame, noise)[1]
     for change in (0.9, 1.1):
-        for name, track in found.tracks.items():
-            off = replace(found, tracks={**found.tracks, name: replace(track, a=track.a * change)})
+        for name, track in noise.tracks.items():
+            off = replace(noise, tracks={**noise.tracks, name: replace(track, a=track.a * change)})
             assert whiten(tracks, frame, off)[1] < best
-        (size, tau_s), *others = found.disturbances
+        (size, tau_s), *others = noise.disturbances
         for first in ((size * change, tau_s), (size, tau_s * change)):
-            assert whiten(tracks, frame, replace(found, disturbances=(first, *others)))[1] < best + 0.2
+            assert whiten(tracks, frame, replace(noise, disturbances=(first, *others)))[1] < best + 0.2
 
 
 @pytest.mark.parametrize(("act", "tracks"), [
@@ -170,7 +170,7 @@ def test_no_noise_nearby_is_likelier_than_the_one_found() -> None:
     (WHEELS[2:], {"mean", "left-right rear"}),
 ])  # fmt: skip
 def test_motors_of_one_axle_tell_a_torque_and_a_difference_once(act, tracks):
-    """What front and rear differed by counted the mean twice, and two zeros were told with no noise at all."""
+    """What front and rear differed by counted the mean twice, and two zeros were reported with no noise at all."""
     t = np.arange(1000) * 0.01
     channels = {f"wheel_speed_{w}_rad_s": np.full(len(t), 60.0) for w in WHEELS}
     for name in ("motor_torque", "motor_torque_demand"):

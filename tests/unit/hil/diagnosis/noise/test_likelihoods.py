@@ -1,10 +1,15 @@
-"""Likelihoods over lanes are those of the filters that whiten, lane by lane."""
+"""Likelihoods of many noises are those of the filters that whiten, noise by noise."""
 
 import numpy as np
 import pytest
 
-from hil.diagnosis.noise.batched import channel_likelihoods, information_matrix, longitudinal_likelihoods
-from hil.diagnosis.noise.innovations import channel_innovations, longitudinal_innovations
+from hil.diagnosis.noise.estimate import information_matrix
+from hil.diagnosis.noise.innovations import (
+    channel_innovations,
+    channel_likelihoods,
+    longitudinal_innovations,
+    longitudinal_likelihoods,
+)
 
 STEP_S, SAMPLES, LANES = 0.02, 400, 5
 
@@ -21,12 +26,12 @@ def test_one_track() -> None:
     fresh, known = _marks(rng)
     y = rng.standard_normal(SAMPLES)
     y[100] = 40.0  # beyond what is squared
-    white, keep, colour = 0.1 + rng.random((SAMPLES, LANES)), rng.uniform(0.5, 0.99, LANES), rng.random(LANES)
+    white, phi, colour = 0.1 + rng.random((SAMPLES, LANES)), rng.uniform(0.5, 0.99, LANES), rng.random(LANES)
     off, size = np.zeros((SAMPLES, LANES)), np.ones((SAMPLES, LANES))
-    each = channel_likelihoods(y, fresh, known, white, keep, colour, off, size)
+    each = channel_likelihoods(y[:, None], np.ones(SAMPLES), fresh, known, white, phi, colour, off, size)
     out = np.empty((SAMPLES, 1))
     for k in range(LANES):
-        alone = channel_innovations(y[:, None], np.ones(SAMPLES), fresh, known * white[:, k], keep[k], colour[k], out)
+        alone = channel_innovations(y[:, None], np.ones(SAMPLES), fresh, known * white[:, k], phi[k], colour[k], out)
         assert each[k] == pytest.approx(alone, rel=1e-9)
         assert off[:, k] / np.sqrt(size[:, k]) == pytest.approx(out[:, 0], rel=1e-9)
 
@@ -39,21 +44,23 @@ def test_the_moving_car() -> None:
     y, known = rng.standard_normal((SAMPLES, 3)), (rng.random((SAMPLES, 3)) < 0.8) * 1.0
     y[100, 1] = 40.0
     white, share = 0.01 + rng.random((SAMPLES, 3)), rng.random(SAMPLES)
-    keep, colour = rng.uniform(0.5, 0.99, (4, LANES)), rng.random((4, LANES))
+    phi, colour = rng.uniform(0.5, 0.99, (4, LANES)), rng.random((4, LANES))
     sensor = rng.random((3, LANES))
-    off, size = np.zeros((SAMPLES, 3, LANES)), np.ones((SAMPLES, 3, LANES))
-    each = longitudinal_likelihoods(
-        y, fresh, restart, rolling, known, white, share, STEP_S, keep, colour, sensor, off, size
-    )
+    off, size = np.zeros((3, SAMPLES, LANES)), np.ones((3, SAMPLES, LANES))
     tracks = tuple(np.ascontiguousarray(y[:, m : m + 1]) for m in range(3))
+    ones = np.ones(SAMPLES)
+    each = longitudinal_likelihoods(
+        tracks, ones, fresh, restart, rolling, known, white, share, STEP_S, phi, colour, sensor, off, size
+    )
     out = tuple(np.empty((SAMPLES, 1)) for _ in tracks)
     for k in range(LANES):
         alone = longitudinal_innovations(
-            tracks, np.ones(SAMPLES), fresh, restart, rolling, known * (white + sensor[:, k]), share, STEP_S,
-            np.stack((keep[:, k], colour[:, k]), axis=1), out,
+            tracks, ones, fresh, restart, rolling, known * (white + sensor[:, k]), share, STEP_S,
+            phi[:, k : k + 1].copy(), colour[:, k : k + 1].copy(), out,
         )  # fmt: skip
         assert each[k] == pytest.approx(alone, rel=1e-9)
-        assert off[:, :, k] / np.sqrt(size[:, :, k]) == pytest.approx(np.hstack(out), rel=1e-9)
+        normalised = off[:, :, k] / np.sqrt(size[:, :, k])
+        assert np.allclose(normalised.T, np.hstack(out), rtol=1e-9, atol=0.0)
 
 
 def test_information_is_what_innovations_and_variances_change() -> None:
@@ -63,7 +70,7 @@ def test_information_is_what_innovations_and_variances_change() -> None:
     off = np.stack([rng.standard_normal(count)] * 2, axis=1)
     size = np.ones((count, 2)) * np.exp([0.0, step])
     assert information_matrix(off, size, 6.0)[0, 0] / step**2 == pytest.approx(count / 2, rel=1e-3)
-    off[:, 1] += step  # a mean is told by all samples, by one far off in part
+    off[:, 1] += step  # a mean shifts all samples, one far off counts less
     off[0, 0] += 60.0
     off[0, 1] += 60.0
     assert information_matrix(off, np.ones((count, 2)), 6.0)[0, 0] / step**2 == pytest.approx(count - 0.9, abs=0.02)
