@@ -75,8 +75,8 @@ LATENCY_S: Final = 4e-3
 LINE: Final = "line_lag_s"
 """Lag of the pads behind the pressure sensors, as one pole; a set states its tolerance alone."""
 LINE_S: Final = 8e-3
-"""Default half-width of the line lag, s: 5 to 20 ms of a line (`plant.effects.hydraulics.pressure_location`), which many sets
-count into their dead time."""
+"""Default half-width of the line lag, s: 5 to 20 ms of a line, which many sets count into their dead time
+(`plant.effects.hydraulics.pressure_location`)."""
 
 WIDE: Final = {
     "vehicle_mass_kg": 0.1,

@@ -144,8 +144,8 @@ def test_the_curvature_of_a_tyre_ends_where_its_equation_does() -> None:
     """Beyond a curvature factor of 1 the plant's tyre is that of 1: no sensitivity leads a fit back from there."""
     car = load_vehicle(SIX)
     (curve,) = (one for one in car.nuisances if one.name == "tyre_curve")
-    world = nominal(car).with_nuisances([curve], np.array([curve.upper]))
-    assert float(world.p[P.tyre_lex] * world.p[P.tyre_pex1]) == pytest.approx(1.0)
+    at_limit = nominal(car).with_nuisances([curve], np.array([curve.upper]))
+    assert float(at_limit.p[P.tyre_lex] * at_limit.p[P.tyre_pex1]) == pytest.approx(1.0)
     assert curve.upper < curve.bound
 
 
