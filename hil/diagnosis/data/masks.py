@@ -62,7 +62,8 @@ def after_wheel_lock(
     """(rows,) of 10 ms from where a wheel that rolled locks or spins, to the end of its segment.
 
     When the wheel grips again decides how a sliding car yaws and stops: two simulations that differ by a thousandth end
-    half a turn apart, so residuals from there on carry no information (docs/decisions/replay-and-comparison.md).
+    half a turn away from each other. Residuals from there on carry no information
+    (docs/decisions/replay-and-comparison.md).
 
     Parameters
     ----------

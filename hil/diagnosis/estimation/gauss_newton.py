@@ -102,7 +102,7 @@ def with_term(parameters: ParameterSet, term: Term) -> ParameterSet:
 
 @dataclass(eq=False)
 class _Whitened:
-    """Sensitivities to the nuisances whitened for one noise, (samples, nuisances), and their products."""
+    """Jacobian of the nuisances whitened for one noise, (samples, nuisances), and its products."""
 
     noise: Noise | None = None
     columns: Floats = field(default_factory=lambda: np.empty((0, 0), np.float32))
@@ -114,30 +114,30 @@ class Fitter:
 
     def __init__(
         self,
-        rig: Simulator,
-        frame: SampleMasks,
+        simulator: Simulator,
+        masks: SampleMasks,
         base: ParameterSet,
         nuisances: Sequence[Nuisance],
         nuisance_columns: Tracks,
     ) -> None:
-        self.simulator, self.masks, self.base = rig, frame, base
+        self.simulator, self.masks, self.base = simulator, masks, base
         self.nuisances, self.nuisance_jacobian = tuple(nuisances), nuisance_columns
         self.bound = np.array([nuisance.bound for nuisance in self.nuisances])
         self.upper = np.array([nuisance.upper for nuisance in self.nuisances])
         self.lower = np.array([nuisance.lower for nuisance in self.nuisances])
         self._counted = np.array([nuisance.kind is not NuisanceKind.SIDE_TO_SIDE for nuisance in self.nuisances])
         self._limits = [k for k, nuisance in enumerate(self.nuisances) if nuisance.name in _LIMITS]
-        self.radius = float(rig.vehicle.parameters.wheel.rolling_radius_m)
-        self._measured = rig.measured()
+        self.radius = float(simulator.vehicle.parameters.wheel.rolling_radius_m)
+        self._measured = simulator.measured()
         self._whitened = _Whitened()
 
     def copy(self) -> "Fitter":
-        """A fitter whose Jacobian may be updated apart from this one."""
+        """A fitter whose Jacobian may be updated independently of this one."""
         columns = {name: values.copy() for name, values in self.nuisance_jacobian.items()}
         return Fitter(self.simulator, self.masks, self.base, self.nuisances, columns)
 
     def with_simulator(self, simulator: Simulator) -> "Fitter":
-        """This fitter on another simulator of the same dataset; both share the sensitivities to the nuisances."""
+        """This fitter on another simulator of the same dataset; both share the Jacobian of the nuisances."""
         other = copy(self)
         other.simulator = simulator
         return other

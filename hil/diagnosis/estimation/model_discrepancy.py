@@ -1,6 +1,6 @@
 """Model discrepancy: how much more of a candidate the plant's own form error explains than noise does.
 
-Takes a candidate; gives the variance its gain in chi-squared is divided by. Two vehicle models written apart differ in
+Takes a candidate; gives the variance its gain in chi-squared is divided by. Independent vehicle models differ in
 form, and some effects imitate such differences. ``model_discrepancy.toml`` holds the root mean square of estimate over
 standard deviation of each effect parameter, by kind of location (car, axle, side, wheel), on drives of the reference
 car with nothing hidden (``brakebench trials --own-error``); 1 is a perfect model. Nonparametric terms are measured

@@ -9,7 +9,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.estimation.gauss_newton import BIASED_BIRGE_RATIO, Fitter, Model, Term, same_terms, with_term
+from hil.diagnosis.estimation.gauss_newton import (
+    BIASED_BIRGE_RATIO,
+    Fitter,
+    Model,
+    Term,
+    Tracks,
+    same_terms,
+    with_term,
+)
 from hil.diagnosis.estimation.information import finite_difference_jacobian
 from hil.diagnosis.noise.model import Noise, SampleMasks
 from hil.diagnosis.simulation.parameter_set import ParameterSet
@@ -38,44 +46,46 @@ class NuisanceFit:
     """
 
     def __init__(
-        self, rig: Simulator, frame: SampleMasks, vehicle: Vehicle, base: ParameterSet, relinearise: bool
+        self, simulator: Simulator, masks: SampleMasks, vehicle: Vehicle, base: ParameterSet, relinearise: bool
     ) -> None:
-        self._frame, self._base, self._relinearise = frame, base, relinearise
-        told = all(drive.log.disc_temperature_k is not None for drive in rig.dataset.recordings)
-        self.nuisances = (*vehicle.nuisances, *recording_nuisances(told, vehicle.node_latency_s))
+        self._masks, self._base, self._relinearise = masks, base, relinearise
+        recordings = simulator.dataset.recordings
+        measured = all(recording.log.disc_temperature_k is not None for recording in recordings)
+        self.nuisances = (*vehicle.nuisances, *recording_nuisances(measured, vehicle.node_latency_s))
         self._steps: Floats = np.full(len(self.nuisances), _COARSE)
-        self.fitter = Fitter(rig, frame, base, self.nuisances, {})
+        self.fitter = Fitter(simulator, masks, base, self.nuisances, {})
         self._taken: deque[tuple[Floats, tuple[Term, ...], Fitter]] = deque(maxlen=_REMEMBERED)
         self.relinearise(np.zeros(len(self.nuisances)))
 
     def relinearise(self, z: Floats, terms: Sequence[Term] = ()) -> None:
-        """Take the sensitivities where the numbers are ``z`` standard deviations off, beside these effects.
+        """Take the Jacobian at ``z`` prior standard deviations, given these terms.
 
-        Inputs are denoised at that car, too (`Simulator.denoised`), and it is the baseline of the fits to come.
+        Inputs are denoised there, too (`Simulator.denoised`), and it is the baseline of the fits to come.
         """
+        at = self._parameter_set(z, terms)
+        simulator = self.fitter.simulator.denoised(at).with_baseline(at)
+        upper = np.array([nuisance.upper for nuisance in self.nuisances])
+        steps = np.where(z + self._steps > upper, -self._steps, self._steps)
+        channels, moves = simulator.run(at), np.diag(steps)
 
-        def world(of: Floats) -> ParameterSet:
-            found = self._base.with_nuisances(self.nuisances, of)
-            for term in terms:
-                found = with_term(found, term)
-            return found
+        def jacobian(moved: Sequence[Floats], by: Sequence[float]) -> Tracks:
+            stepped = [self._parameter_set(z + move, terms) for move in moved]
+            return finite_difference_jacobian(simulator, self._masks, channels, stepped, by)
 
-        simulator = self.fitter.simulator.denoised(world(z)).with_baseline(world(z))
-        highest = np.array([nuisance.upper for nuisance in self.nuisances])
-        steps = np.where(z + self._steps > highest, -self._steps, self._steps)
-        base, own = simulator.run(world(z)), np.diag(steps)
-        tracks = finite_difference_jacobian(
-            simulator, self._frame, base, [world(z + step) for step in own], steps.tolist()
-        )
+        columns = jacobian(list(moves), steps.tolist())
         for k, nuisance in enumerate(self.nuisances):
             if nuisance.name in _KINKED:  # the mean of both sides
-                other = finite_difference_jacobian(
-                    simulator, self._frame, base, [world(z - own[k])], [-float(steps[k])]
-                )
-                for name, columns in tracks.items():
-                    columns[:, k] = 0.5 * (columns[:, k] + other[name][:, 0])
-        self.fitter = Fitter(simulator, self._frame, self._base, self.nuisances, tracks)
+                other = jacobian([-moves[k]], [-float(steps[k])])
+                for name, values in columns.items():
+                    values[:, k] = 0.5 * (values[:, k] + other[name][:, 0])
+        self.fitter = Fitter(simulator, self._masks, self._base, self.nuisances, columns)
         self._taken.append((z, tuple(terms), self.fitter))
+
+    def _parameter_set(self, z: Floats, terms: Sequence[Term]) -> ParameterSet:
+        parameters = self._base.with_nuisances(self.nuisances, z)
+        for term in terms:
+            parameters = with_term(parameters, term)
+        return parameters
 
     def relinearise_cached(self, z: Floats, terms: Sequence[Term]) -> None:
         """As `relinearise`, or a remembered Jacobian of a model that was alike."""

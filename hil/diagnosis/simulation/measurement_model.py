@@ -220,7 +220,7 @@ def without_fading_motors(recording: Recording, parameters: ParameterSet) -> Sta
 def characteristic_speed(one: Stack, other: Stack, parameters: ParameterSet) -> float:
     """Characteristic speed of `powers`, m/s: how lateral acceleration goes with a small difference of the speed.
 
-    ``one`` and ``other`` are plant columns of the same car at speeds a little apart; infinite where it does not turn.
+    ``one`` and ``other`` are plant columns of one car at slightly different speeds; infinite where it runs straight.
     """
     wheel = one["wheel"].mean(axis=1)
     v = wheel * float(parameters.p[P.wheel_rolling_radius_m])
