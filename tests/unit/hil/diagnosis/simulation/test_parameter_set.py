@@ -27,9 +27,9 @@ def test_every_number_of_the_vehicle_moves_without_a_corner(vehicle):
     base = nominal(vehicle)
     for nuisance in vehicle.nuisances:
         for at, step in zip(nuisance.at, nuisance.step, strict=True):
-            worlds = [base.with_nuisances([nuisance], np.array([z])) for z in nuisance.bound * STEPS]
+            parameter_sets = [base.with_nuisances([nuisance], np.array([z])) for z in nuisance.bound * STEPS]
             told = nuisance.kind in ("sensor", "scatter", "line")
-            values = np.array([(world.theta if told else world.p)[at] for world in worlds])
+            values = np.array([(parameters.theta if told else parameters.p)[at] for parameters in parameter_sets])
             moved = np.diff(values) * np.sign(step)
             assert (moved > 0.0).all(), nuisance.name
             assert moved.max() < 30.0 * moved.min(), nuisance.name  # from a fifth to five times
