@@ -96,12 +96,12 @@ def test_two_replays_tell_where_the_spots_stand(rolled: np.ndarray, stand: float
 
 @pytest.mark.parametrize("much", [[1.0], [1.0] * 4, [1.0] * 8, [1.0, 0.5, 0.5, 0.2], [1.0, 0.3, 0.3, 0.3]])
 def test_angles_that_noise_chooses_explain_no_more_than_their_price(much: list[float]) -> None:
-    """As seldom as noise of one degree of freedom explains what is asked of a cause."""
-    shown, asked = np.array(much), 12.0
+    """As seldom as noise of one degree of freedom reaches the detection threshold."""
+    shown, threshold = np.array(much), 12.0
     drawn = np.random.default_rng(5).rayleigh(size=(400_000, len(shown)))
     gains = (drawn @ shown) ** 2 / np.sum(shown**2)
-    seldom = np.mean(gains > asked + phase_penalty(shown[:, None], (0,)))
-    assert seldom < 2.0 * chi2.sf(asked, 1)
+    seldom = np.mean(gains > threshold + phase_penalty(shown[:, None], (0,)))
+    assert seldom < 2.0 * chi2.sf(threshold, 1)
 
 
 def test_angles_where_spots_do_not_show_cost_nothing() -> None:

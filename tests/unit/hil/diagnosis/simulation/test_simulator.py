@@ -53,7 +53,7 @@ def _with(parameters: ParameterSet, effect: str, number: str, value: float | np.
 
 
 def test_a_motor_at_its_limit_does_not_answer_an_error_of_the_speed(simulator):
-    """A limit that followed the simulated speed measured more of mass, drag and grade than the motion of the car did."""
+    """A limit that followed the simulated speed had more information on mass, drag and grade than the motion."""
     level = nominal(simulator.vehicle)
     flat, steep = (simulator.run(parameters) for parameters in (level, _with(level, "road_grade", "grade", 0.03)))
     assert np.abs(steep["wheel"] - flat["wheel"]).max() > 1.0
