@@ -40,7 +40,7 @@ class GroupScore:
 
 
 class GroupScoreTest:
-    """Sensitivities to all laws at one model, simulated once from the fitter's baseline; wheel by wheel for the law that
+    """Sensitivities to all laws at one model, simulated once from the fitter's baseline; by wheel for the law that
     leads."""
 
     def __init__(self, fitter: Fitter, world: ParameterSet) -> None:

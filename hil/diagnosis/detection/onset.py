@@ -94,7 +94,7 @@ def _about(fitter: Fitter, block: int) -> list[OnsetTime]:
 def _begun(
     fitter: Fitter, model: Model, noise: Noise, k: int, moments: list[OnsetTime], value: float
 ) -> tuple[Model, Fitter]:
-    """The model with a cause that begins at the best of these times, or near it; the fitter with the first as baseline."""
+    """The model with a cause that begins at the best of these times, or near it; the fitter with its baseline."""
     fitter = fitter.at_baseline(replace(model, terms=_since(model, k, value, moments[0])))
     seen: list[Model] = []
     for finer in (*_FINER, None):
