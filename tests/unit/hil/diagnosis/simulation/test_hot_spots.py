@@ -45,10 +45,10 @@ def _turned(simulator: Simulator, by_rad: float = 0.0) -> Simulator:
     return replace(simulator, hot_spot_angles=angles)
 
 
-def _spotted(world: ParameterSet, amplitude: float) -> ParameterSet:
-    theta = world.theta.copy()
+def _spotted(parameters: ParameterSet, amplitude: float) -> ParameterSet:
+    theta = parameters.theta.copy()
     theta[THETA.slice("hot_spot", "amplitude")] = amplitude
-    return replace(world, theta=theta)
+    return replace(parameters, theta=theta)
 
 
 @pytest.fixture(scope="module")
@@ -63,45 +63,45 @@ def rolled() -> np.ndarray:
 def test_spots_are_turned_to_where_the_wheels_show_them(rolled: np.ndarray) -> None:
     """Of a car whose spots stand elsewhere the amplitude is seen once they are turned, and was not before."""
     made = _stop(rolled)
-    world = nominal(made.vehicle)
+    parameters = nominal(made.vehicle)
     made = _turned(made, QUARTER_RAD)
-    spots = made.states(_spotted(world, AMPLITUDE), SOURCE["wheel"]) - made.states(world, SOURCE["wheel"])
+    spots = made.states(_spotted(parameters, AMPLITUDE), SOURCE["wheel"]) - made.states(parameters, SOURCE["wheel"])
     seen = rolled[: len(spots)] + spots
 
-    def told(simulator: Simulator) -> float:
+    def amplitude(simulator: Simulator) -> float:
         """The amplitude that explains most, by one linear step, of the samples that are compared."""
         compared = simulator.dataset.recordings[0].moving > 0.5
-        bare = simulator.run(world)["wheel"]
+        bare = simulator.run(parameters)["wheel"]
         left = np.diff((simulator.measured()["wheel"] - bare)[compared], axis=0).ravel()
-        shown = np.diff((simulator.run(_spotted(world, 0.01))["wheel"] - bare)[compared], axis=0).ravel() / 0.01
+        shown = np.diff((simulator.run(_spotted(parameters, 0.01))["wheel"] - bare)[compared], axis=0).ravel() / 0.01
         return float(left @ shown / (shown @ shown))
 
     simulator = _stop(seen)
-    before = told(_turned(simulator))
-    simulator = simulator.with_hot_spot_phase(world)
+    before = amplitude(_turned(simulator))
+    simulator = simulator.with_hot_spot_phase(parameters)
     assert before != pytest.approx(AMPLITUDE, rel=0.2)
-    assert told(simulator) == pytest.approx(AMPLITUDE, rel=0.2)
+    assert amplitude(simulator) == pytest.approx(AMPLITUDE, rel=0.2)
 
 
 @pytest.mark.parametrize("stand", [-0.3, -0.05, 0.0, 0.2, 0.31])
 def test_two_replays_tell_where_the_spots_stand(rolled: np.ndarray, stand: float) -> None:
-    (drive,) = _stop(rolled).dataset.recordings
+    (recording,) = _stop(rolled).dataset.recordings
     rng = np.random.default_rng(3)
-    shown = [rng.normal(size=(drive.samples, 4)) for _ in range(2)]
+    shown = [rng.normal(size=(recording.samples, 4)) for _ in range(2)]
     left = 7.0 * (np.cos(ORDER * stand) * shown[0] + np.sin(ORDER * stand) * shown[1])
-    found, much = fit_phase(drive, left, shown)
-    assert found[0] == pytest.approx(stand)
-    assert np.all(much > 0.0)
+    angles, visibility = fit_phase(recording, left, shown)
+    assert angles[0] == pytest.approx(stand)
+    assert np.all(visibility > 0.0)
 
 
 @pytest.mark.parametrize("much", [[1.0], [1.0] * 4, [1.0] * 8, [1.0, 0.5, 0.5, 0.2], [1.0, 0.3, 0.3, 0.3]])
 def test_angles_that_noise_chooses_explain_no_more_than_their_price(much: list[float]) -> None:
-    """As seldom as noise of one degree of freedom explains what is asked of a cause."""
-    shown, asked = np.array(much), 12.0
+    """As seldom as noise of one degree of freedom reaches the detection threshold."""
+    shown, threshold = np.array(much), 12.0
     drawn = np.random.default_rng(5).rayleigh(size=(400_000, len(shown)))
     gains = (drawn @ shown) ** 2 / np.sum(shown**2)
-    seldom = np.mean(gains > asked + phase_penalty(shown[:, None], (0,)))
-    assert seldom < 2.0 * chi2.sf(asked, 1)
+    seldom = np.mean(gains > threshold + phase_penalty(shown[:, None], (0,)))
+    assert seldom < 2.0 * chi2.sf(threshold, 1)
 
 
 def test_angles_where_spots_do_not_show_cost_nothing() -> None:
@@ -112,11 +112,11 @@ def test_angles_where_spots_do_not_show_cost_nothing() -> None:
 
 
 def test_angles_are_those_of_the_measured_wheels(rolled: np.ndarray) -> None:
-    (drive,) = _stop(np.full((600, 4), 30.0)).dataset.recordings
-    turned = wheel_angles(drive)
+    (recording,) = _stop(np.full((600, 4), 30.0)).dataset.recordings
+    turned = wheel_angles(recording)
     assert turned[0] == pytest.approx(0.0)
     assert turned[100] == pytest.approx(30.0)
-    assert len(turned) == len(drive.inputs)
+    assert len(turned) == len(recording.inputs)
 
 
 def test_parts_have_all_rows_once() -> None:
@@ -128,21 +128,22 @@ def test_parts_have_all_rows_once() -> None:
 def test_spots_are_turned_for_the_sign_they_have(rolled: np.ndarray, sign: float) -> None:
     """Of a car handed in with spots: less than none is the same spots half the way to the next."""
     made = _turned(_stop(rolled))
-    world = _spotted(nominal(made.vehicle), AMPLITUDE)
-    seen = made.states(world, SOURCE["wheel"])
+    parameters = _spotted(nominal(made.vehicle), AMPLITUDE)
+    seen = made.states(parameters, SOURCE["wheel"])
     simulator = _stop(seen)
-    told = _spotted(world, sign * AMPLITUDE)
-    simulator = simulator.with_hot_spot_phase(told)
+    nominal_parameters = _spotted(parameters, sign * AMPLITUDE)
+    simulator = simulator.with_hot_spot_phase(nominal_parameters)
     compared = simulator.dataset.recordings[0].moving > 0.5
     left, bare = (
-        simulator.measured()["wheel"] - simulator.run(one)["wheel"] for one in (told, nominal(simulator.vehicle))
+        simulator.measured()["wheel"] - simulator.run(one)["wheel"]
+        for one in (nominal_parameters, nominal(simulator.vehicle))
     )
     assert np.diff(left[compared], axis=0).std() < 0.4 * np.diff(bare[compared], axis=0).std()
 
 
 def test_only_a_world_with_spots_asks_for_angles(rolled: np.ndarray) -> None:
-    world = nominal(paper_car())
-    assert not has_hot_spots(world)
-    assert has_hot_spots(with_spots(world))
-    assert not has_hot_spots(without_spots(with_spots(world)))
+    parameters = nominal(paper_car())
+    assert not has_hot_spots(parameters)
+    assert has_hot_spots(with_spots(parameters))
+    assert not has_hot_spots(without_spots(with_spots(parameters)))
     assert pytest.approx(0.25 * 2.0 * np.pi / ORDER) == QUARTER_RAD

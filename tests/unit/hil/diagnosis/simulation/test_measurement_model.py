@@ -28,12 +28,12 @@ def test_a_parabola_is_shifted_exactly(rows, a, b):
 
 def test_a_wheel_that_swings_at_25_hz_keeps_its_swing_between_samples():
     at = np.arange(60.0)
-    asked = np.arange(10.0, 50.0) + 0.3
+    places = np.arange(10.0, 50.0) + 0.3
     swing = 2.0 * np.pi * 25.0 * 0.01
-    told = at_samples(np.sin(swing * at), asked)
-    true = np.sin(swing * asked)
-    straight = np.interp(asked, at, np.sin(swing * at))
-    assert np.abs(told - true).max() < 0.5 * np.abs(straight - true).max()
+    between = at_samples(np.sin(swing * at), places)
+    true = np.sin(swing * places)
+    straight = np.interp(places, at, np.sin(swing * at))
+    assert np.abs(between - true).max() < 0.5 * np.abs(straight - true).max()
 
 
 def test_places_outside_are_the_ends():

@@ -28,9 +28,9 @@ def test_every_number_of_the_vehicle_moves_without_a_corner(vehicle):
     base = nominal(vehicle)
     for nuisance in vehicle.nuisances:
         for at, step in zip(nuisance.at, nuisance.step, strict=True):
-            worlds = [base.with_nuisances([nuisance], np.array([z])) for z in nuisance.bound * STEPS]
-            told = nuisance.kind in ("sensor", "side_to_side", "line_lag")
-            values = np.array([(world.theta if told else world.p)[at] for world in worlds])
+            parameter_sets = [base.with_nuisances([nuisance], np.array([z])) for z in nuisance.bound * STEPS]
+            in_theta = nuisance.kind in ("sensor", "side_to_side", "line_lag")
+            values = np.array([(parameters.theta if in_theta else parameters.p)[at] for parameters in parameter_sets])
             moved = np.diff(values) * np.sign(step)
             assert (moved > 0.0).all(), nuisance.name
             assert moved.max() < 30.0 * moved.min(), nuisance.name  # from a fifth to five times
@@ -69,7 +69,7 @@ def test_what_single_wheels_are_off_was_there_before_a_cause_of_the_same_kind():
 
 
 def test_an_inertial_unit_has_zeros_across():
-    """0.012 m/s2, a tenth of a degree, were told as a cause."""
+    """0.012 m/s2, a tenth of a degree, were named as a cause."""
     nuisances = recording_nuisances(True, LATENCY_S)
     base = nominal(paper_car())
     z = np.array([1.0 if one.kind == "sensor" else 0.0 for one in nuisances])

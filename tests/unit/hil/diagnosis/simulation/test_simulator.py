@@ -1,4 +1,4 @@
-"""Replays: what answers the speed is taken at the measured one, and what cannot differ is not simulated again."""
+"""The simulator: what answers the speed is taken at the measured one; what cannot differ is not simulated again."""
 
 from dataclasses import replace
 
@@ -43,20 +43,20 @@ def simulator() -> Simulator:
 
 
 def late(node: str, by_s: float) -> tuple[float, ...]:
-    """Latencies of a world in which one node is late."""
+    """Latencies of a parameter set in which one node is late."""
     return tuple(by_s if name == node else 0.0 for name in LATENCY_NODES)
 
 
-def _with(world: ParameterSet, effect: str, number: str, value: float | np.ndarray) -> ParameterSet:
-    theta = world.theta.copy()
+def _with(parameters: ParameterSet, effect: str, number: str, value: float | np.ndarray) -> ParameterSet:
+    theta = parameters.theta.copy()
     theta[THETA.slice(effect, number)] = value
-    return replace(world, theta=theta)
+    return replace(parameters, theta=theta)
 
 
 def test_a_motor_at_its_limit_does_not_answer_an_error_of_the_speed(simulator):
-    """A limit that followed the simulated speed told more of mass, drag and grade than the motion of the car did."""
+    """A limit that followed the simulated speed had more information on mass, drag and grade than the motion."""
     level = nominal(simulator.vehicle)
-    flat, steep = (simulator.run(world) for world in (level, _with(level, "road_grade", "grade", 0.03)))
+    flat, steep = (simulator.run(parameters) for parameters in (level, _with(level, "road_grade", "grade", 0.03)))
     assert np.abs(steep["wheel"] - flat["wheel"]).max() > 1.0
     assert np.abs(flat["motor"]).max() > 100.0
     assert np.array_equal(steep["motor"], flat["motor"])
@@ -67,18 +67,18 @@ def test_a_motor_that_pulls_away_is_not_compared_before_the_wheels_turn():
     t = np.arange(1500) * 0.01
     pulls = t > 5.0
     speed = np.clip(t - 5.2, 0.0, None)
-    asked = {f"motor_torque_demand_{w}_nm": 200.0 * pulls for w in WHEELS}
-    told = {f"motor_torque_{w}_nm": 200.0 * pulls for w in WHEELS}
+    demanded = {f"motor_torque_demand_{w}_nm": 200.0 * pulls for w in WHEELS}
+    measured = {f"motor_torque_{w}_nm": 200.0 * pulls for w in WHEELS}
     turning = {f"wheel_speed_{w}_rad_s": speed / 0.308 for w in WHEELS}
     pressed = {f"pressure_{w}_pa": 5e5 * ~pulls for w in WHEELS}
-    case = prepare([make_log("log", t, turning | asked | told | pressed)], 0.308)
+    dataset = prepare([make_log("log", t, turning | demanded | measured | pressed)], 0.308)
     car = paper_car()
-    (drive,) = Simulator(case, car).prepared(nominal(car)).dataset.recordings
-    at = np.arange(len(drive.measured["motor"])) * 0.01 * drive.stride
+    (recording,) = Simulator(dataset, car).prepared(nominal(car)).dataset.recordings
+    at = np.arange(len(recording.measured["motor"])) * 0.01 * recording.stride
     rests = (at > 5.1) & (at < 5.4)
     assert rests.any()
-    assert np.isnan(drive.measured["motor"][rests]).all()
-    assert np.isfinite(drive.measured["motor"][(at > 7.0) & (at < 14.0)]).all()
+    assert np.isnan(recording.measured["motor"][rests]).all()
+    assert np.isfinite(recording.measured["motor"][(at > 7.0) & (at < 14.0)]).all()
 
 
 def test_motors_of_which_nobody_says_how_hot_they_get_are_not_derated():
@@ -98,7 +98,7 @@ def test_motors_of_which_nobody_says_how_hot_they_get_are_not_derated():
     ("pad_mu_gain", "gain", 0.1), ("iwm_gain", "gain", 0.1), ("ehb_dead_time", "time_s", 0.01),
     ("road_grade", "grade", 0.01), ("imu_bias", "ax_mps2", 0.1), ("pressure_offset", "offset_pa", 1e4),
 ])  # fmt: skip
-def test_a_kept_world_changes_no_result(simulator, effect, number, value):
+def test_a_baseline_changes_no_result(simulator, effect, number, value):
     level = nominal(simulator.vehicle)
     changed = _with(level, effect, number, value)
     fresh = Simulator(simulator.dataset, simulator.vehicle).run(changed)
@@ -134,7 +134,7 @@ def test_a_standing_car_is_replayed_for_what_acts_on_it(effect, number, value, a
     {"latency_s": late("imu", 0.004)}, {"latency_s": late("pressure", 0.004)}, {"latency_s": late("demand", 0.004)},
     {"window_rows2": 4.0}, {"tooth_share": 0.2},
 ])  # fmt: skip
-def test_what_a_kept_world_was_told_is_not_told_of_other_frames_or_teeth(simulator, change):
+def test_channels_of_a_baseline_are_not_those_of_other_frames_or_teeth(simulator, change):
     level = nominal(simulator.vehicle)
     changed = replace(level, **change)
     fresh = Simulator(simulator.dataset, simulator.vehicle).run(changed)
@@ -151,30 +151,32 @@ def test_until_a_cause_begins_what_single_wheels_are_off_is_there(simulator):
     unlike = _with(level, "pad_mu_gain", "gain", np.array([0.01, -0.03, 0.02, 0.0]))
     weak = _with(unlike, "pad_mu_gain", "gain", np.array([-0.3, -0.03, 0.02, 0.0]))
     begun = weak.with_onset("pad_mu_gain", 0, 21.0, before=unlike)
-    alone, always, within = (simulator.run(world)["wheel"] for world in (unlike, weak, begun))
+    alone, always, within = (simulator.run(parameters)["wheel"] for parameters in (unlike, weak, begun))
     assert np.abs(within - alone)[:1049].max() == 0.0
     assert np.abs(within - alone)[1075:1140].max() > 0.5
     assert np.abs(alone - always)[:1049].max() > 0.5
 
 
-def test_a_sensor_that_tells_too_much_does_not_press_the_pads_at_the_start():
+def test_a_sensor_that_shows_too_much_does_not_press_the_pads_at_the_start():
     """The offset is in the first sample as in all others: no pressure that was never there has to be let off."""
     log, offset = _log(), 1e5
-    told = {f"pressure_{w}_pa": log.channels[f"pressure_{w}_pa"] + offset for w in WHEELS}
-    simulator = Simulator(prepare([make_log("log", log.t_s, {**log.channels, **told})], 0.308), paper_car())
+    measured = {f"pressure_{w}_pa": log.channels[f"pressure_{w}_pa"] + offset for w in WHEELS}
+    simulator = Simulator(prepare([make_log("log", log.t_s, {**log.channels, **measured})], 0.308), paper_car())
     pressure = simulator.run(_with(nominal(simulator.vehicle), "pressure_offset", "offset_pa", offset))["pressure"]
     assert pressure[:100] == pytest.approx(offset, abs=1.0)
 
 
-def test_a_ground_speed_that_tells_too_much_starts_a_car_as_slow_as_it_was():
-    """No wheel tells how fast it was: what is told at the start is what is told."""
+def test_a_ground_speed_that_is_too_high_starts_a_car_as_slow_as_it_was():
+    """No wheel speed is logged: the channel starts as measured."""
     log = _log()
     ground = log.channels["wheel_speed_fl_rad_s"] * 0.308
     channels = {name: values for name, values in log.channels.items() if not name.startswith("wheel_speed")}
     simulator = Simulator(prepare([make_log("log", log.t_s, {**channels, "speed_mps": ground})], 0.308), paper_car())
     level = nominal(simulator.vehicle)
     simulator = simulator.with_baseline(level)
-    right, wrong = (simulator.run(world)["gps"] for world in (level, _with(level, "speed_scale", "gain", 0.05)))
+    right, wrong = (
+        simulator.run(parameters)["gps"] for parameters in (level, _with(level, "speed_scale", "gain", 0.05))
+    )
     assert wrong[:20] == pytest.approx(right[:20], rel=1e-3)
     assert np.abs(wrong - right).max() > 0.05  # the drag of a slower car is less
 
@@ -228,7 +230,7 @@ def _middle(simulator: Simulator) -> np.ndarray:
     return 0.5 * (torque[:-1] + torque[1:]) + inputs[:-1, INPUT.at.motor_torque_bend_nm]
 
 
-def test_what_drives_the_car_has_the_steps_of_the_world_that_made_it():
+def test_denoised_inputs_have_the_steps_of_the_parameters_that_made_them():
     """Measured torques smoothed have none; with a lag of the motors that is not theirs they have them wrong."""
     log, true = _driven(0.02)
     vehicle = paper_car()
@@ -243,14 +245,14 @@ def test_what_drives_the_car_has_the_steps_of_the_world_that_made_it():
 
 
 @pytest.mark.parametrize("late_by", ["latency", "stamp", "clock", "scale"])
-def test_what_drives_the_car_is_what_happened_however_the_torque_is_told(late_by):
-    """What was told is taken back before the simulated torque is set beside it."""
+def test_denoised_inputs_are_the_true_ones_however_the_torque_is_measured(late_by):
+    """What the sensor adds is taken back before the simulated torque is compared."""
     log, _ = _driven(0.008)
     vehicle = paper_car()
     t, changed = log.t_s, dict(log.channels)
     true = changed["motor_torque_fl_nm"]
     level = nominal(vehicle)
-    world = {
+    parameters = {
         "latency": replace(level, latency_s=late("motor", 0.006)),
         "stamp": _with(level, "timestamp_offset", "delay_s", MOTOR_NODE * 0.006),
         "clock": _with(level, "clock_drift", "share", MOTOR_NODE * 5e-4),
@@ -260,7 +262,9 @@ def test_what_drives_the_car_is_what_happened_however_the_torque_is_told(late_by
     seen = 0.8 * true if late_by == "scale" else np.interp(taken_s, t, true)
     changed |= {f"motor_torque_{w}_nm": seen for w in WHEELS}
     simulator = (
-        Simulator(prepare([replace(log, channels=changed)], 0.308), vehicle).prepared(world).with_baseline(world)
+        Simulator(prepare([replace(log, channels=changed)], 0.308), vehicle)
+        .prepared(parameters)
+        .with_baseline(parameters)
     )
     driving = simulator._baseline.replays[0].inputs[:, INPUT.at.motor_torque_nm]
     assert np.abs(seen - true)[20:-20].max() > 20.0
@@ -268,8 +272,8 @@ def test_what_drives_the_car_is_what_happened_however_the_torque_is_told(late_by
     assert np.sqrt(np.mean((driving - true[: len(driving)])[20:-20] ** 2)) < 0.5
 
 
-@pytest.mark.parametrize("told", ["latency", "stamp"])
-def test_a_torque_told_half_a_row_late_is_the_one_between_two_rows(told):
+@pytest.mark.parametrize("late_by", ["latency", "stamp"])
+def test_a_torque_measured_half_a_row_late_is_the_one_between_two_rows(late_by):
     """It lags its demand, so a straight line comes later.
 
     Of what is left, 0.7 N m where a ramp ends, 0.5 is what drives the car: smoothed, not the measured torque itself.
@@ -279,27 +283,27 @@ def test_a_torque_told_half_a_row_late_is_the_one_between_two_rows(told):
     level = nominal(vehicle)
     level.p[P.motor_time_constant_s] = 0.008
     simulator = Simulator(prepare([log], 0.308), vehicle).prepared(level)
-    drive = simulator.dataset.recordings[0]
-    world = (
+    recording = simulator.dataset.recordings[0]
+    parameters = (
         replace(level, latency_s=late("motor", 0.005))
-        if told == "latency"
+        if late_by == "latency"
         else _with(level, "timestamp_offset", "delay_s", MOTOR_NODE * 0.005)
     )
-    happened = {"motor": drive.inputs[:, INPUT.slice("motor_torque_nm")]}
-    seen = simulator.measurement_model.measure_rows(happened, drive, world)["motor"][1:, 0]
-    straight = 0.5 * (happened["motor"][:-1, 0] + happened["motor"][1:, 0])
+    true_torque = {"motor": recording.inputs[:, INPUT.slice("motor_torque_nm")]}
+    seen = simulator.measurement_model.measure_rows(true_torque, recording, parameters)["motor"][1:, 0]
+    straight = 0.5 * (true_torque["motor"][:-1, 0] + true_torque["motor"][1:, 0])
     far, near = (np.abs(values - true[: len(values)])[20:-20].max() for values in (straight, seen))
     assert near < 0.8 < 2.0 < far
 
 
 def test_a_yaw_rate_comes_later_than_the_accelerations(simulator):
     """A gyroscope has a filter of its own."""
-    drive = simulator.dataset.recordings[0]
-    ramp = np.arange(len(drive.inputs), dtype=float)[:, None]
+    recording = simulator.dataset.recordings[0]
+    ramp = np.arange(len(recording.inputs), dtype=float)[:, None]
     level = nominal(simulator.vehicle)
     in_time, later = (
-        simulator.measurement_model.measure_rows({"ay": ramp, "yaw": ramp}, drive, world)
-        for world in (level, replace(level, latency_s=late("yaw_rate", 0.5 * ROW_S)))
+        simulator.measurement_model.measure_rows({"ay": ramp, "yaw": ramp}, recording, parameters)
+        for parameters in (level, replace(level, latency_s=late("yaw_rate", 0.5 * ROW_S)))
     )
     assert later["yaw"][5:-5] == pytest.approx(in_time["yaw"][5:-5] - 0.5)
     assert np.array_equal(later["ay"], in_time["ay"])
@@ -348,12 +352,12 @@ def test_no_damping_of_a_standing_wheel_makes_the_steps_swing_by_themselves(rows
     speed = np.clip(20.0 - 2.5 * np.clip(t - 1.0, 0.0, None), 0.0, None)
     channels = {f"wheel_speed_{w}_rad_s": speed / 0.308 for w in WHEELS} | {"ax_mps2": np.gradient(speed, t)}
     channels |= {f"pressure_{w}_pa": 15e5 * (t > 1.0) for w in WHEELS}
-    case = prepare([make_log("log", t, channels)], 0.308)
+    dataset = prepare([make_log("log", t, channels)], 0.308)
     (damping,) = [one for one in paper_car().nuisances if one.name == "wheel_brake_windup_time_s"]
     assert damping.bound == 3.0
     monkeypatch.setattr(
         "hil.diagnosis.simulation.simulator.rows_per_step", lambda recording: np.full(len(recording.inputs), rows)
     )
-    simulator = Simulator(case, paper_car())
-    world = nominal(simulator.vehicle).with_nuisances([damping], np.array([damping.bound]))
-    assert np.abs(simulator.run(world)["wheel"][-200:]).max() < 1e-4
+    simulator = Simulator(dataset, paper_car())
+    parameters = nominal(simulator.vehicle).with_nuisances([damping], np.array([damping.bound]))
+    assert np.abs(simulator.run(parameters)["wheel"][-200:]).max() < 1e-4

@@ -1,4 +1,4 @@
-"""How finely a drive is stepped through: a stop, a pressure that holds the car, a start."""
+"""How finely a recording is stepped through: a stop, a pressure that holds the car, a start."""
 
 import numpy as np
 
@@ -18,8 +18,8 @@ def _paces():
     channels = {f"wheel_speed_{w}_rad_s": speed / 0.308 for w in WHEELS}
     channels |= {f"pressure_{w}_pa": 15e5 * braking for w in WHEELS}
     channels |= {f"pressure_demand_{w}_pa": 15e5 * braking for w in WHEELS}
-    (drive,) = prepare([make_log("log", t, channels)], 0.308).recordings
-    return rows_per_step(drive)
+    (recording,) = prepare([make_log("log", t, channels)], 0.308).recordings
+    return rows_per_step(recording)
 
 
 def test_steps_are_short_where_something_is_quick_and_long_elsewhere():
