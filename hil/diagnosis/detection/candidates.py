@@ -128,7 +128,7 @@ class CandidateSet:
 
 def _with_penalty(candidate: Candidate, simulator: Simulator) -> Candidate:
     """The data chose the phase angles of hot spots."""
-    if candidate.effect.name != "hot_spot":
+    if not candidate.effect.free_phase:
         return candidate
     return replace(candidate, selection_penalty=phase_penalty(simulator.hot_spot_visibility, candidate.members()))
 

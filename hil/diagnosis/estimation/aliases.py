@@ -15,12 +15,10 @@ from hil.diagnosis.data.log import Floats
 from hil.diagnosis.estimation.gauss_newton import Model, Term
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.vehicle.priors import Nuisance, NuisanceKind
+from plant.effects.effect import NODE_LATENCY
 from plant.injection.apply import Q
 from plant.injection.theta import THETA
 from plant.vectors import OUTPUT, PARAMETER
-
-_STAMPS = "timestamp_offset"
-"""Effect on the time stamps of a node, which is an offset of its latency."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ def alias_of(term: Term, nuisances: Sequence[Nuisance], parameters: ParameterSet
     """Alias of a term, given the parameter set without it; None where it is no or more than one parameter."""
     if term.onset is not None:
         return None
-    if term.candidate.effect.name == _STAMPS:
+    if NODE_LATENCY in term.candidate.parameter.aliases:
         late = (k for k, one in enumerate(nuisances) if one.name == f"late_{term.candidate.location}")
         return next((Alias(k, nuisances[k].at[0], 1.0, True) for k in late), None)
     if term.candidate.location != "car":

@@ -11,15 +11,6 @@ from hil.diagnosis.simulation.parameter_set import ParameterSet
 from plant.effects.effect import NODES, Effect, Parameter, Scope
 from plant.injection.theta import THETA
 
-_SHARE = 0.05
-"""Step of a finite difference, as a share of the typical value of a parameter."""
-_SHARES = {
-    ("sus_compliance", "compliance_m_n"): 0.5, ("regen_fadeout", "speed_mps"): 0.6,
-    ("pressure_hysteresis", "half_width_pa"): 0.5, ("stuck_corner", "held_pa"): 0.5,
-}  # fmt: skip
-"""The same where `_SHARE` would mislead: stiffer hubs would swing too fast for the simulation's steps, motors are not
-compared just above the speed where they fade, a hysteresis narrower than the noise of the measured pressures follows
-that noise, and a held pressure does nothing below the threshold."""
 LOCATIONS: Mapping[Scope, Mapping[str, tuple[int, ...]]] = {
     Scope.CAR: {"car": (0,)},
     Scope.AXLE: {"car": (0, 1), "front": (0,), "rear": (1,)},
@@ -34,8 +25,6 @@ _KINDS = {
     "front": "axle", "rear": "axle", "left": "side", "right": "side",
     "fl": "wheel", "fr": "wheel", "rl": "wheel", "rr": "wheel",
 }  # fmt: skip
-_MOTOR = "motor."
-"""Injection points of the motors."""
 PRIOR_SD_IN_TYPICAL_SIZES = 1.5
 """Prior standard deviation of a value, in sizes typical of real cars: no value is preferred within these."""
 
@@ -60,9 +49,8 @@ class Column:
 
     @property
     def step(self) -> float:
-        """A small share of the typical value, on the side that is allowed."""
-        share = _SHARES.get((self.effect.name, self.parameter.name), _SHARE)
-        return self.parameter.typical * share if self.parameter.typical else 0.3 * share * self.parameter.high
+        """Of a finite difference, in the parameter's unit."""
+        return self.parameter.step
 
     def stepped(self, parameters: ParameterSet) -> ParameterSet:
         """The parameter set with this entry one step off."""
@@ -141,7 +129,7 @@ def candidates(
     listed = []
     for effect in dict.fromkeys(column.effect for column in of):
         groups = LOCATIONS[effect.scope]
-        if effect.scope is Scope.WHEEL and all(joint.startswith(_MOTOR) for joint in effect.injection_points):
+        if effect.scope is Scope.WHEEL and effect.subsystem == "motors":
             groups = {location: members for location, members in groups.items() if not {*members} & {*undriven}}
         if effect.scope is Scope.NODE:
             groups = {node: members for node, members in groups.items() if node not in quiet}

@@ -45,8 +45,6 @@ STRAIGHT_STOP = "straight_stop"
 FOLDER = "discriminating_manoeuvres"
 _MAX_DURATION_S, _SETTLE_S = 90.0, 0.4
 _MIN_SNR = 1.0
-_SIGN_ALONG_ROAD = ("road_grade.grade", "headwind.wind_mps")
-"""Parameters that change sign when the same stretch is driven back."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +92,7 @@ def discriminating_manoeuvres(effects: Sequence[str], most: int = MAX_RECOMMENDA
         Fewer than two effects, or an unknown one.
     """
     items = _items(effects)
-    both = any(f"{c.effect.name}.{c.parameter.name}" in _SIGN_ALONG_ROAD for c in items)
+    both = any(c.parameter.sign_along_road for c in items)
     straight = _separation(STRAIGHT_STOP, items, both)
     recommended = []
     for name in _library():
@@ -109,7 +107,7 @@ def discriminating_manoeuvres(effects: Sequence[str], most: int = MAX_RECOMMENDA
 def separation(scenario: str, effects: Sequence[str]) -> float:
     """Smallest separation within the group in one scenario of the library, or in `STRAIGHT_STOP`."""
     items = _items(effects)
-    both = any(f"{c.effect.name}.{c.parameter.name}" in _SIGN_ALONG_ROAD for c in items)
+    both = any(c.parameter.sign_along_road for c in items)
     return _separation(scenario, items, both)
 
 

@@ -11,16 +11,14 @@ import numpy as np
 from hil.diagnosis.data.dataset import ROW_S, Recording
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.simulation import excitation
-from hil.diagnosis.simulation.excitation import Excitation
 from hil.diagnosis.simulation.sensors import SENSORS
 from hil.diagnosis.vehicle.extension_file import Extension
 from hil.diagnosis.vehicle.priors import LATENCY_NODES, Nuisance, NuisanceKind, factor_of
 from hil.diagnosis.vehicle.spec import Vehicle
+from plant.excitation import Excitation
 from plant.injection.bank import NO_TERMS
 from plant.injection.theta import THETA
 from plant.vectors import PARAMETER
-
-_SIGN_ALONG_ROAD = (("road_grade", "grade"), ("headwind", "wind_mps"))
 
 
 @dataclass(frozen=True)
@@ -77,7 +75,7 @@ class ParameterSet:
             earlier, own = thetas[0][1].copy(), THETA.slice(onset.effect, "onset_s")
             earlier[_strengths(onset.effect)], earlier[own] = onset.before, THETA.neutral()[own]
             thetas = [(0, earlier), (int(onset.since_s / ROW_S), thetas[0][1]), *thetas[1:]]
-        return [(row, _along(one, recording.log.direction)) for row, one in thetas]
+        return [(row, one if recording.log.direction > 0 else THETA.driven_back(one)) for row, one in thetas]
 
     def with_onset(self, effect: str, number: int, since_s: float, before: "ParameterSet") -> "ParameterSet":
         """With an effect that acts from a time on in recording ``number``; until then, with strengths of ``before``."""
@@ -141,16 +139,6 @@ def _strengths(effect: str) -> list[int]:
     """Indices in theta of the strengths of an effect."""
     slices = (THETA.slice(effect, parameter.name) for parameter in THETA.effect(effect).strengths)
     return [at for own in slices for at in range(own.start, own.stop)]
-
-
-def _along(theta: Floats, direction: int) -> Floats:
-    """Theta when driving along the road (+1) or back (-1)."""
-    if direction > 0:
-        return theta
-    turned = theta.copy()
-    for effect, parameter in _SIGN_ALONG_ROAD:
-        turned[THETA.slice(effect, parameter)] *= -1.0
-    return turned
 
 
 def excitation_that_separates(one: ParameterSet, other: ParameterSet, recording: Recording) -> Excitation:

@@ -11,7 +11,7 @@ from scipy.signal import savgol_filter
 from hil.diagnosis.data.dataset import ROW_S, Dataset, Recording
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.parallel import parallel_map, thread_each
-from hil.diagnosis.simulation.excitation import Excitation, segment_excitations
+from hil.diagnosis.simulation.excitation import segment_excitations
 from hil.diagnosis.simulation.hot_spots import (
     QUARTER_RAD,
     fit_phase,

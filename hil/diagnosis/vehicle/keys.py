@@ -112,17 +112,6 @@ UNLIMITED: Final = {
 }  # fmt: skip
 """Limits out of reach, for those that a set does not state: another car's limits would be wrong."""
 
-OF_SECTION: Final = {
-    "ehb": (
-        "ehb_dead_time", "ehb_bandwidth", "ehb_rate_limit", "ehb_deadband", "fluid_temp", "accumulator", "air_in_line",
-        "blend_sync",
-    ),
-    "motor": ("motor_tau", "regen_fadeout", "iwm_derating", "iwm_field", "cogging", "current_torque"),
-    "battery": ("battery_soc",),
-    "tyre": ("slip_stiffness", "tyre_relaxation", "load_sensitivity", "tyre_temperature", "low_speed", "mu_road"),
-}  # fmt: skip
-"""Effects on a section of the vehicle set: undetectable where the set does not state the section."""
-
 _SECTIONS: Final = (
     "friction_brake", "vehicle", "suspension", "wheel", "tyre", "ehb", "pad", "motor", "battery", "sensor",
 )  # fmt: skip

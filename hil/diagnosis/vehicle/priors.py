@@ -230,14 +230,14 @@ def _brake_gain_share(p: Floats, tolerance: Mapping[str, float], k: int, axle: s
     return float(gain / (brake_gain * temperature / epsilon))
 
 
+_SIDE = NuisanceKind.SIDE_TO_SIDE
 _SIDE_TO_SIDE = (
-    ("pressure_offset", "offset_pa", 7e3), ("pressure_gain", "gain", 0.005), ("iwm_gain", "gain", 0.005),
-    ("iwm_gain", "unseen", 0.005), ("pad_mu_gain", "gain", 0.01), ("tyre_radius", "gain", 0.0012),
+    ("pressure_offset", "offset_pa"), ("pressure_gain", "gain"), ("iwm_gain", "gain"), ("iwm_gain", "unseen"),
+    ("pad_mu_gain", "gain"), ("tyre_radius", "gain"),
 )  # fmt: skip
-"""Effect, parameter and prior sd by wheel: zero and gain of a pressure sensor; torque of a motor beside its demand and
-beside its measured value; friction of the pads; radius of a wheel (docs/decisions/nuisance-parameters.md)."""
-_CLOCK_SHARE = 5e-5
-"""Prior sd of the rate of a node's clock: quartz is good to 20 to 100 ppm (plant/effects/sensing)."""
+"""Effect and parameter by wheel: zero and gain of a pressure sensor; torque of a motor beside its demand and beside its
+measured value; friction of the pads; radius of a wheel. Their prior sd is that from part to part
+(docs/decisions/nuisance-parameters.md)."""
 _STRAIGHT_AHEAD_RAD = 0.01
 """Prior sd of the steering wheel's angle straight ahead: half a degree. Workshop manuals let the sensor's zero be set
 within 3 to 5 degrees (Hyundai Motor, Grandeur 2006: within 5, nonlinear by 2.5)."""
@@ -249,13 +249,13 @@ def side_to_side_variation(p: Floats, motors: bool) -> list[Nuisance]:
     ``motors``: the motors' torques are compared with their demands.
     """
     wheels = [
-        _in_theta(f"{effect}.{parameter}_{wheel}", effect, parameter, sd, NuisanceKind.SIDE_TO_SIDE, k)
-        for effect, parameter, sd in _SIDE_TO_SIDE
+        _in_theta(f"{effect}.{parameter}_{wheel}", effect, parameter, _sd(effect, parameter), _SIDE, k)
+        for effect, parameter in _SIDE_TO_SIDE
         if motors or (effect, parameter) != ("iwm_gain", "gain")
         for k, wheel in enumerate(WHEELS)
     ]
     clocks = [
-        _in_theta(f"clock_drift.share_{node}", "clock_drift", "share", _CLOCK_SHARE, NuisanceKind.SIDE_TO_SIDE, k)
+        _in_theta(f"clock_drift.share_{node}", "clock_drift", "share", _sd("clock_drift", "share"), _SIDE, k)
         for k, node in enumerate(NODES)
         if node != "driver"
     ]
@@ -271,6 +271,11 @@ def line_lag(half_s: float) -> list[Nuisance]:
     return [_in_theta("line_lag", "pressure_location", "lag_s", step, NuisanceKind.LINE_LAG)]
 
 
+def _sd(effect: str, parameter: str) -> float:
+    """Standard deviation of an effect's parameter from part to part."""
+    return THETA.effect(effect).parameter(parameter).part_to_part
+
+
 def _in_theta(
     name: str, effect: str, parameter: str, step: float, kind: NuisanceKind = NuisanceKind.SENSOR, member: int = 0
 ) -> Nuisance:
@@ -282,7 +287,7 @@ LATENCY_NODES = ("imu", "pressure", "motor", "demand", "steering", "yaw_rate")
 they are logged; a yaw rate has a filter of its own and comes that much later than the accelerations."""
 _YAW_RATE_S = 6e-3
 """Half-width of the yaw rate's latency, s: the delay of a filter of 25 Hz."""
-ZERO_SD = {"ay_mps2": 0.01, "yaw_rate_rad_s": 5e-4}
+ZERO_SD = {name: _sd("imu_bias", name) for name in ("ay_mps2", "yaw_rate_rad_s")}
 """Prior sd of the zeros of an inertial unit: a roll of a tenth of a degree, and 0.03 deg/s."""
 DISC_MEASURED_SD_K, DISC_ASSUMED_SD_K = 5.0, 15.0
 """Prior sd of the discs' temperature at the start, K: of a thermocouple, and assumed."""

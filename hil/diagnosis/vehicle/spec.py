@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.diagnosis.data.log import MOTOR_DEMAND, Floats, Log
-from hil.diagnosis.vehicle.keys import LATENCY_S, OF_SECTION
+from hil.diagnosis.vehicle.keys import LATENCY_S
 from hil.diagnosis.vehicle.priors import BRAKE_K, CONSTANT_EPSILON_W, Nuisance
 from plant.friction import mu_equilibrium
+from plant.injection.theta import THETA
 from plant.parameters.plant import PlantParameters
 from plant.vectors import P
 
@@ -19,7 +20,7 @@ _TURNING = (
     "vehicle_yaw_inertia_kg_m2", "vehicle_steering_ratio", "tyre_lky", "vehicle_slip_angle_share_front",
     "vehicle_slip_angle_share_rear", "tyre_side_stiffness_load", "zero_steering",
 )  # fmt: skip
-_OF_STEERING = ("steer_lateral",)
+_STEERING = "steering.angle"
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class Vehicle:
     nuisances : uncertain parameters with their priors.
     pad_temperature_matters : False where the brake has one gain and no friction model.
     remarks : unknown keys and assumed values, for the report.
-    unstated : sections that the set does not state (keys of `hil.diagnosis.vehicle.keys.OF_SECTION`).
+    unstated : sections that the set does not state (`plant.effects.effect.Effect.baseline_section`).
     unlimited : limits that it does not state and that are out of reach.
     straight_line : lateral dynamics are off.
     suspension_stated : the set states every parameter of the suspension.
@@ -53,8 +54,11 @@ class Vehicle:
     @property
     def undiagnosable_effects(self) -> tuple[str, ...]:
         """Effects on unstated sections, and on the steering where the car has no lateral dynamics."""
-        unstated = tuple(effect for section in self.unstated for effect in OF_SECTION[section])
-        return (*unstated, *_OF_STEERING) if self.straight_line else unstated
+        return tuple(
+            effect.name
+            for effect in THETA.effects
+            if effect.baseline_section in self.unstated or (self.straight_line and _STEERING in effect.injection_points)
+        )
 
     def with_motor_limits_from(self, logs: Sequence[Log]) -> "Vehicle":
         """The same car with the largest demand of the logs as the motors' peak torque, if the set does not state it.
