@@ -34,6 +34,7 @@ from hil.diagnosis.simulation.replay import Replay, motor_bend, replayed
 from hil.diagnosis.simulation.sensors import before_sensors
 from hil.diagnosis.simulation.substeps import rows_per_step
 from hil.diagnosis.vehicle.spec import Vehicle
+from plant.excitation import Excitation
 from plant.injection.theta import THETA
 from plant.model import column_indices
 from plant.vectors import INPUT
