@@ -3,7 +3,7 @@
 import json
 import re
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +74,8 @@ def flat(content: Any, at: str = "") -> Iterator[tuple[str, str, Any]]:
         for k, value in enumerate(content):
             yield from flat(value, f"{at}/{k}")
     else:
-        yield at, at.rsplit("/", 1)[-1], content
+        key = at.rsplit("/", 1)[-1]
+        yield at, key, Path(content).stem if key == "scenario" else content
 
 
 def renamed(path: str) -> str:
@@ -84,7 +85,41 @@ def renamed(path: str) -> str:
     return path
 
 
-def recorded(case: str) -> dict[str, Any]:
-    """The stored record of a case, by the keys of now."""
+def family(path: str) -> str:
+    """Values that have one scale: the same entry of a list's members, and the points of a curve."""
+    return re.sub(r"/(y|low|high)$", "", re.sub(r"/\d+", "/#", path))
+
+
+def group(path: str) -> str:
+    """Part of the answer that a value belongs to, which has one numerical spread: ``/answer/held_out_error``."""
+    return "/".join(path.split("/")[:3])
+
+
+def scales(values: Mapping[str, Any]) -> dict[str, float]:
+    """Largest magnitude of each family."""
+    largest: dict[str, float] = {}
+    for path, value in values.items():
+        if isinstance(value, float):
+            largest[family(path)] = max(largest.get(family(path), 0.0), abs(value))
+    return largest
+
+
+def spread(runs: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """How far numbers of the same code go apart from build to build, as a share of their scale, largest of a group."""
+    largest: dict[str, float] = {}
+    scale = scales(runs[0])
+    for path, value in runs[0].items():
+        if isinstance(value, float) and scale[family(path)] > 0.0:
+            values = [float(run[path]) for run in runs]
+            share = (max(values) - min(values)) / scale[family(path)]
+            largest[group(path)] = max(largest.get(group(path), 0.0), share)
+    return largest
+
+
+def recorded(case: str) -> tuple[dict[str, Any], dict[str, float]]:
+    """The stored record of a case by the keys of now, and its spread by group."""
     content = json.loads((RECORDS / f"{case}.json").read_text(encoding="utf-8"))
-    return {renamed(path): value for path, value in content.items()}
+    values, spreads = content["values"], content["spread"]
+    return {renamed(path): value for path, value in values.items()}, {
+        group(renamed(f"{path}/")): share for path, share in spreads.items()
+    }

@@ -8,9 +8,10 @@ from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import SampleMasks
 from hil.diagnosis.result.cross_validation import folds, held_out_residual
-from hil.diagnosis.simulation.parameter_set import nominal, recording_nuisances
+from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import paper_car
+from hil.diagnosis.vehicle.priors import recording_nuisances
 
 
 class Watched(Fitter):
