@@ -5,7 +5,6 @@ import math
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -17,6 +16,13 @@ from ecu.parameters.ecu import EcuParameters
 from hil.faults.frames import FrameFaults
 from hil.faults.physical import ALL_WHEELS, FAULT_NAMES, WHEELS, FaultEvent
 from hil.scenario.effects import Effects, read_effects
+from hil.scenario.expectations import (
+    LONGEST_S,
+    Expectation,
+    SignalExpectation,
+    read_expectations,
+    read_signal_expectation,
+)
 from hil.scenario.parameters import load_set, override
 from hil.scenario.table import Files, ScenarioError, Table, as_number
 from hil.scenario.tyre_file import load_tir
@@ -25,42 +31,6 @@ from plant.parameters.plant import PlantParameters
 from plant.road import DRY, RoadSegment
 
 DEFAULT_SCENARIO = "stop72"
-LONGEST_S = 3600.0
-EXPECTABLE = (
-    "stop_distance_m",
-    "stop_time_s",
-    "mean_decel_mps2",
-    "energy_recuperated_j",
-    "frames_lost",
-    "frames_corrupt",
-    "overruns",
-)
-
-
-@dataclass(frozen=True, slots=True)
-class Expectation:
-    """What a result must lie between; ``name`` is a key of ``run --json``."""
-
-    name: str
-    minimum: float
-    maximum: float
-
-
-@dataclass(frozen=True, slots=True)
-class SignalExpectation:
-    """Limits of every sample of a signal, SI, between two times of the manoeuvre."""
-
-    signal: str
-    from_s: float
-    to_s: float
-    minimum: float
-    maximum: float
-
-    @property
-    def name(self) -> str:
-        """What is expected of what, for people."""
-        until = "the end" if self.to_s >= LONGEST_S else f"{self.to_s:g} s"
-        return f"{self.signal} from {self.from_s:g} s to {until}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,8 +120,8 @@ def load_scenario(name: str) -> Scenario:
         faults=tuple(event for table in top.tables("faults") for event in _faults(table)),
         frame_faults=tuple(_frame_faults(table) for table in top.tables("frame_faults")),
         effects=read_effects(top.table("effects").rest(), f"{source.name}: effects"),
-        expectations=tuple(_expectations(top.table("expect"))),
-        signal_expectations=tuple(_signal_expectation(table) for table in top.tables("expect_signal")),
+        expectations=tuple(read_expectations(top.table("expect"))),
+        signal_expectations=tuple(read_signal_expectation(table) for table in top.tables("expect_signal")),
     )
     top.done()
     return replace(scenario, sha256=hashlib.sha256(b"".join([text, *files.read])).hexdigest())
@@ -279,33 +249,3 @@ def _four(table: Table, low: float, high: float) -> tuple[Trace, Trace, Trace, T
     fl, fr, rl, rr = (table.trace(wheel, low, high) or everywhere for wheel in WHEELS)
     table.done()
     return fl, fr, rl, rr
-
-
-def _expectations(table: Table) -> Iterator[Expectation]:
-    for name in EXPECTABLE:
-        limits = table.table(name)
-        low, high = _limits(limits)
-        if math.isfinite(low) or math.isfinite(high):
-            yield Expectation(name, low, high)
-    table.done()
-
-
-def _limits(table: Table) -> tuple[float, float]:
-    low, high = table.number("min", -math.inf), table.number("max", math.inf)
-    table.done()
-    return low, high
-
-
-def _signal_expectation(table: Table) -> SignalExpectation:
-    """``signal`` is MESSAGE.SIGNAL of either bus; one of ``min`` and ``max`` at least."""
-    known = {f"{s.name}.{f.signal}" for bus in BusName for s in contract(bus).by_id.values() for f in s.fields}
-    name = table.text("signal")
-    if name not in known:
-        near = get_close_matches(name, sorted(known), 3) or ["MESSAGE.SIGNAL of brake.dbc or bench.dbc"]
-        raise ScenarioError(f"{table.at('signal')}: no signal {name!r}; did you mean {', '.join(near)}?")
-    from_s = table.number("from_s", 0.0, 0.0, LONGEST_S)
-    to_s = table.number("to_s", LONGEST_S, from_s, LONGEST_S)
-    low, high = _limits(table)
-    if low == -math.inf and high == math.inf:
-        raise ScenarioError(f"{table.at('min')}: expected min, max or both")
-    return SignalExpectation(name, from_s, to_s, low, high)

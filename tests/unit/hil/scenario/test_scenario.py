@@ -18,7 +18,8 @@ from hil.bench.virtual import simulate
 from hil.cli.main import main
 from hil.errors import BrakebenchError
 from hil.faults.physical import FAULT_NAMES, FaultEvent
-from hil.scenario.scenario import EXPECTABLE, load_scenario, scenario_names
+from hil.scenario.expectations import EXPECTABLE
+from hil.scenario.scenario import load_scenario, scenario_names
 from hil.scenario.table import ScenarioError
 from hil.scenario.waveforms import GENERATORS
 from plant.manoeuvre import value_at
