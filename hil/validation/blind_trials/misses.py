@@ -1,4 +1,4 @@
-"""The cases of a family that were answered wrong, one line each: what was hidden, and what was named."""
+"""The cases of a family that were answered wrong, one line each: what was hidden, and what was answered."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -36,11 +36,11 @@ def misses(family: str, records: Sequence[Record]) -> list[str]:
 
 def _line(record: Record) -> str:
     size = "" if record["size"] is None else f" at {record['size']:g}"
-    line = f"{record['index']}{size}: {_causes(record['hidden'])}; named {_named(record)}"
-    return f"{line}; then {_named(record['follow_up'])}" if "follow_up" in record else line
+    line = f"{record['index']}{size}: {_causes(record['hidden'])}; answered {_answered(record)}"
+    return f"{line}; then {_answered(record['follow_up'])}" if "follow_up" in record else line
 
 
-def _named(record: Record) -> str:
+def _answered(record: Record) -> str:
     if not record["causes"]:
         return str(record["verdict"]).replace("_", " ")
     rivals = f", or {', '.join(record['rivals'])}" if record["rivals"] else ""

@@ -40,13 +40,13 @@ def keep(folder, *families, count=2, state="abc"):
 def test_json_stands_alone_and_files_are_written(tmp_path, capsys):
     keep(tmp_path, "single")
     assert run("--family", "single", "--count", 2, "--out", tmp_path, "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["seed"] == 1
-    single = told["families"]["single"]
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["seed"] == 1
+    single = printed["families"]["single"]
     assert single["n"] == 8
     assert single["metrics"]["top1_snr8"]["value"] == 1.0
     assert single["detection_limits"] == {"road_grade": 8.0}
-    assert json.loads((tmp_path / "table.json").read_text()) == told
+    assert json.loads((tmp_path / "table.json").read_text()) == printed
     assert (tmp_path / "confusion.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -94,7 +94,7 @@ def test_the_text_says_what_was_asked_and_what_was_missed(tmp_path, capsys):
     assert "no case tells" in capsys.readouterr().out
 
 
-def test_cases_of_several_states_of_the_program_are_told(tmp_path, capsys):
+def test_cases_of_several_states_of_the_program_are_printed(tmp_path, capsys):
     keep(tmp_path, "null", count=2)
     keep(tmp_path, "twin", count=1, state="def")
     assert run("--family", "null", "--count", 2, "--out", tmp_path) == 0
@@ -105,13 +105,13 @@ def test_cases_of_several_states_of_the_program_are_told(tmp_path, capsys):
     assert "of several states of the program: def 1, abc 1" in capsys.readouterr().out
 
 
-def test_a_missed_case_is_told_with_its_number(tmp_path, capsys):
+def test_a_missed_case_is_printed_with_its_number(tmp_path, capsys):
     keep(tmp_path, "null", count=2)
     alarm = '"causes": [{"effect": "headwind", "location": "car", "parameters": {}}]'
     raised = (tmp_path / "cases.jsonl").read_text().replace('"causes": []', alarm, 1)
     (tmp_path / "cases.jsonl").write_text(raised)
     run("--family", "null", "--count", 2, "--out", tmp_path)
-    assert "  missed 0: road_grade@car 0.01; told headwind@car" in capsys.readouterr().out
+    assert "  missed 0: road_grade@car 0.01; answered headwind@car" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("count", ["0", "-3", "many"])

@@ -17,11 +17,11 @@ def _cause(effect: str, wheel: str, value: float, unit: str = "") -> dict[str, A
     }
 
 
-def _record(hidden: list[dict[str, Any]], told: list[dict[str, Any]], **more: Any) -> dict[str, Any]:
+def _record(hidden: list[dict[str, Any]], answered: list[dict[str, Any]], **more: Any) -> dict[str, Any]:
     return {
-        "index": 4, "size": None, "noise": "low", "reached": True, "hidden": hidden, "causes": told,
-        "rivals": [], "undetectable_effects": [], "named": [cause["effect"] for cause in told],
-        "verdict": "named" if told else "none",
+        "index": 4, "size": None, "noise": "low", "reached": True, "hidden": hidden, "causes": answered,
+        "rivals": [], "undetectable_effects": [], "named": [cause["effect"] for cause in answered],
+        "verdict": "named" if answered else "none",
     } | more  # fmt: skip
 
 
@@ -29,9 +29,9 @@ MASS, WIND = _cause("mass_offset", "car", 113.04, "kg"), _cause("headwind", "car
 FADE = _cause("pad_temp_fade", "front", 0.000336, "1/K")
 
 
-def test_an_alarm_says_what_was_told_where_nothing_is_hidden() -> None:
+def test_an_alarm_says_what_was_answered_where_nothing_is_hidden() -> None:
     assert misses("null", [_record([], []), _record([], [WIND])]) == [
-        "4: nothing hidden; told headwind@car -6.2 m/s"
+        "4: nothing hidden; answered headwind@car -6.2 m/s"
     ]  # fmt: skip
 
 
@@ -42,8 +42,8 @@ def test_a_single_cause_is_missed_by_another_name_or_none() -> None:
         _record([FADE], [WIND], size=8.0, rivals=["mass_offset"], verdict="cannot_tell_apart"),
     ]
     assert misses("single", records) == [
-        "4 at 15: mass_offset@car 113 kg; told none",
-        "4 at 8: pad_temp_fade@front 0.000336 1/K; told headwind@car -6.2 m/s, or mass_offset",
+        "4 at 15: mass_offset@car 113 kg; answered none",
+        "4 at 8: pad_temp_fade@front 0.000336 1/K; answered headwind@car -6.2 m/s, or mass_offset",
     ]
 
 
@@ -52,11 +52,13 @@ def test_what_may_be_missed_is_left_out() -> None:
     assert misses("single", [small, bounded]) == []
 
 
-def test_two_are_missed_when_one_is_missing_or_a_third_is_told() -> None:
+def test_two_are_missed_when_one_is_missing_or_a_third_is_named() -> None:
     whole = _record([MASS, WIND], [WIND, MASS])
     half, more = _record([MASS, WIND], [MASS]), _record([MASS, WIND], [MASS, WIND, FADE])
     assert len(misses("two", [whole, half, more])) == 2
-    assert misses("two", [half]) == ["4: mass_offset@car 113 kg and headwind@car -6.2 m/s; told mass_offset@car 113 kg"]
+    assert misses("two", [half]) == [
+        "4: mass_offset@car 113 kg and headwind@car -6.2 m/s; answered mass_offset@car 113 kg"
+    ]
 
 
 def test_a_confounded_case_is_missed_before_or_after_what_decides() -> None:
@@ -64,7 +66,7 @@ def test_a_confounded_case_is_missed_before_or_after_what_decides() -> None:
     assert misses("confounded", [_record([MASS], [], follow_up=then)]) == []
     assert misses("confounded", [_record([MASS], [MASS], follow_up=then)])
     assert misses("confounded", [_record([MASS], [], follow_up=_record([], []))]) == [
-        "4: mass_offset@car 113 kg; told none; then none"
+        "4: mass_offset@car 113 kg; answered none; then none"
     ]
 
 
@@ -73,9 +75,9 @@ def test_abstaining_is_no_miss_of_a_twin_and_a_wrong_side_is() -> None:
     assert len(misses("twin", [_record([MASS], [WIND])])) == 1
 
 
-def test_a_verdict_without_causes_is_told_in_words() -> None:
+def test_a_verdict_without_causes_is_put_in_words() -> None:
     line = misses("single", [_record([MASS], [], size=15.0, verdict="not_testable")])
-    assert line == ["4 at 15: mass_offset@car 113 kg; told not testable"]
+    assert line == ["4 at 15: mass_offset@car 113 kg; answered not testable"]
 
 
 @pytest.mark.parametrize("family", FAMILIES)
