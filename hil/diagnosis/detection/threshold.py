@@ -12,7 +12,8 @@ shortlisted), ``UNMEASURED_RATIO``, ``UNSURE`` and ``FEW`` beside ``model_discre
 sd of a value by the form of its equation, in the Occam factor of a shape), ``HUBER``
 (`hil.diagnosis.noise.innovations`) and the prior sds and bounds of the nuisance parameters
 (`hil.diagnosis.vehicle.priors`). ``BASIS_SIZE`` (`hil.diagnosis.detection.nonparametric`) is the degrees of freedom of
-a nonparametric term's threshold.
+a nonparametric term's threshold. The comparison of sensors has its own page,
+`hil.diagnosis.sensor_consistency.threshold`.
 """
 
 from dataclasses import dataclass, replace

@@ -12,6 +12,7 @@ from hil.diagnosis.sensor_consistency.kalman import StateSpace, log_likelihood
 from hil.diagnosis.sensor_consistency.longitudinal import first_order_lag
 from hil.diagnosis.sensor_consistency.model import Parameter, SensorModel
 from hil.diagnosis.sensor_consistency.motion import Motion
+from hil.diagnosis.sensor_consistency.threshold import MIN_STOPS
 
 _NOISE: Final[Mapping[str, Parameter]] = {
     "speed_mps": Parameter(0.03, 1e-4, 1.0, 0.3, True, 2.0),
@@ -37,7 +38,6 @@ APPLIED_PA = 2e4
 """Pressure from which the brake counts as applied."""
 _STOP_PA, _STOP_S = 2e5, 0.8
 """A stop reaches this pressure and lasts longer than this."""
-MIN_STOPS = 3
 
 
 class BrakingModel(SensorModel):

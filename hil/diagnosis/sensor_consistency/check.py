@@ -17,7 +17,7 @@ from hil.diagnosis.data.log import (
     Floats,
     Log,
 )
-from hil.diagnosis.sensor_consistency.braking import MIN_STOPS, BrakingModel
+from hil.diagnosis.sensor_consistency.braking import BrakingModel
 from hil.diagnosis.sensor_consistency.coverage import missing, needs
 from hil.diagnosis.sensor_consistency.held_out import HeldOutError, held_out_errors
 from hil.diagnosis.sensor_consistency.labels import Cause, causes_of, simulated_effects
@@ -26,17 +26,12 @@ from hil.diagnosis.sensor_consistency.longitudinal import SLIP, LongitudinalMode
 from hil.diagnosis.sensor_consistency.motion import Motion, measured_channels, motion_of
 from hil.diagnosis.sensor_consistency.selection import Progress, SelectionResult, select_parameters
 from hil.diagnosis.sensor_consistency.stops import estimates, fit_stops, nominal_braking, relative_sigma
-from hil.diagnosis.sensor_consistency.wheel_radius import SPREAD, WheelRadiusModel
+from hil.diagnosis.sensor_consistency.threshold import DIVE, MIN_STOPS, ROLL, SPREAD, TRACK
+from hil.diagnosis.sensor_consistency.wheel_radius import WheelRadiusModel
 from hil.diagnosis.vehicle.extension_file import load_channels, write_channels
 from hil.diagnosis.vehicle.spec import Vehicle
 from plant.injection.theta import THETA
 
-_ROLL = 0.15
-"""Scale error of a lateral accelerometer by the body's roll, standard deviation (effects, 56)."""
-_DIVE = 0.02
-"""Likewise of a longitudinal one by dive, which is 1 to 1.5 deg/g (effects, 8)."""
-_TRACK = 0.03
-"""Relative standard deviation of the track width."""
 _PROPELLED_MPS2, _PROPELLED_S = 0.7, 5.0
 """Acceleration above which a car counts as propelled, and the time for which an unknown propulsion may last."""
 _FLAT_MPS2 = 0.03
@@ -157,7 +152,7 @@ def _fit_models(
         progress("accelerometer against the wheels")
         radius = 0.0 if motion.has("speed_mps") else relative_sigma(vehicle, "wheel_rolling_radius_m")
         tolerance = {
-            "gain": float(np.hypot(_DIVE, radius)),
+            "gain": float(np.hypot(DIVE, radius)),
             "filter_s": 1.0 / (2.0 * np.pi * vehicle.parameters.sensor.imu_cutoff_hz),
         }
         results["along"] = select_parameters(
@@ -170,7 +165,7 @@ def _fit_models(
         progress("yaw rate and lateral acceleration against the wheels")
         lateral = LateralModel(motion, track)
         results["turning"] = select_parameters(
-            lateral, motion.segment_id, nominal.get("turning", {}), {"yaw_gain": _TRACK, "ay_gain": _ROLL}, progress,
+            lateral, motion.segment_id, nominal.get("turning", {}), {"yaw_gain": TRACK, "ay_gain": ROLL}, progress,
             nuisances=lateral.nuisances,
         )  # fmt: skip
         fitted = results["turning"].parameters

@@ -7,19 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from hil.diagnosis.sensor_consistency.selection import RARE, SelectionResult
+from hil.diagnosis.sensor_consistency.selection import SelectionResult
+from hil.diagnosis.sensor_consistency.threshold import IMU_SCALE, INDISTINGUISHABLE, MAX_SENSOR_SCALE, RARE
 from plant.effects.effect import Scope
 from plant.injection.theta import THETA
 
 GRAVITY_MPS2 = 9.80665
-INDISTINGUISHABLE = 4.6
-"""Difference in -2 log likelihood (a Bayes factor of ten) below which two explanations are not distinguished."""
 DATABASE_FACTORS = (
     -1.0, 3.6, 1.0 / 3.6, GRAVITY_MPS2, 1.0 / GRAVITY_MPS2, -GRAVITY_MPS2, 0.1, 10.0, 256.0, 1.0 / 256.0,
 )  # fmt: skip
 """Factors by which a signal database, not a sensor, is wrong: sign, km/h, g, a decimal, a byte (effects, 69)."""
-_IMU_SCALE, _MAX_SENSOR_SCALE = 0.04, 0.2
-"""Typical scale error of an accelerometer, and the largest that still counts as one of the sensor."""
 
 
 @dataclass(frozen=True)
@@ -210,9 +207,9 @@ def _scale(
 ) -> tuple[list[Label], str, float | None]:
     channel = {"gain": "ax_mps2", "ay_gain": "ay_mps2", "yaw_gain": "yaw_rate_rad_s"}[parameter]
     factor = next((one for one in DATABASE_FACTORS if interval[0] <= one - 1.0 <= interval[1]), None)
-    if factor is not None or abs(value) > _MAX_SENSOR_SCALE or parameter != "gain":
+    if factor is not None or abs(value) > MAX_SENSOR_SCALE or parameter != "gain":
         return [Label("wrong_scale", "factor", "imu", 1.0, 2.0)], channel, factor
-    labels = [Label("imu_gain", "gain", "imu", 1.0, _IMU_SCALE)]
+    labels = [Label("imu_gain", "gain", "imu", 1.0, IMU_SCALE)]
     if not to_ground:  # without a ground speed the wheels' radius looks the same
         labels.append(Label("tyre_radius", "gain", "car", 1.0, 0.015))
     return labels, channel, None

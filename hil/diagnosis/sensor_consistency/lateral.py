@@ -9,7 +9,7 @@ from hil.diagnosis.data.log import Floats
 from hil.diagnosis.sensor_consistency.kalman import StateSpace, log_likelihood
 from hil.diagnosis.sensor_consistency.model import Parameter, SensorModel
 from hil.diagnosis.sensor_consistency.motion import Motion
-from hil.diagnosis.sensor_consistency.wheel_radius import SPREAD
+from hil.diagnosis.sensor_consistency.threshold import SPREAD
 
 _NOISE: Final[Mapping[str, Parameter]] = {
     "turn_rad_s": Parameter(0.05, 1e-3, 2.0, 0.3, True, 2.0),

@@ -9,7 +9,7 @@ from hil.diagnosis.result.page_parts import EXTENDED, NOMINAL, binned_curve, com
 from hil.diagnosis.sensor_consistency.braking import APPLIED_PA, BrakingModel
 from hil.diagnosis.sensor_consistency.check import Consistency
 from hil.diagnosis.sensor_consistency.held_out import HeldOutError
-from hil.diagnosis.sensor_consistency.selection import THRESHOLD
+from hil.diagnosis.sensor_consistency.threshold import THRESHOLD
 from hil.report.report import Cell, Chart, Curve, Number, Panel, Report, Section, Table, Trace, Verdict
 from hil.report.units import BAR, Display, Unit
 

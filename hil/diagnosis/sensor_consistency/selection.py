@@ -10,15 +10,8 @@ from hil.diagnosis.data.log import Floats
 from hil.diagnosis.parallel import thread_map
 from hil.diagnosis.sensor_consistency.likelihood import Fit, Values, fit, standard_deviations, typical_noise
 from hil.diagnosis.sensor_consistency.model import SensorModel
+from hil.diagnosis.sensor_consistency.threshold import ALPHA, CONVERGE_SHARE, RARE, THRESHOLD
 
-THRESHOLD = 20.0
-"""Detection threshold, of the gain in -2 log likelihood: noise passes it once in 100,000 tests of a true model."""
-_CONVERGE_SHARE = 0.5
-"""Share of the threshold from which a fit of a few iterations is converged: it may gain more then."""
-ALPHA = 0.003
-"""Probability at which a parameter of nominal value is called significant, two-sided."""
-RARE = 0.01
-"""Relative likelihood below which a rival is not reported."""
 _START_OFFSETS: Mapping[str, Sequence[float]] = {
     "gain": (0.0, -0.5, 0.5, -2.0), "filter_s": (0.02, 0.1, 0.5, 2.0),
     "yaw_gain": (0.0, -2.0), "ay_gain": (0.0, -2.0),
@@ -181,7 +174,7 @@ def _converge(result: SelectionResult, name: str, start: Fit) -> Fit:
 def _accept(result: SelectionResult, tried: Mapping[str, Fit]) -> tuple[SelectionStep, Fit, Values] | None:
     """The significant parameter with the largest gain, its fit and standard deviations; None if none is above."""
     cost = result.final.cost
-    promising = [n for n in tried if cost - tried[n].cost >= _CONVERGE_SHARE * THRESHOLD]
+    promising = [n for n in tried if cost - tried[n].cost >= CONVERGE_SHARE * THRESHOLD]
     lowest = min((tried[n].cost for n in promising), default=0.0)
     near = [n for n in promising if tried[n].cost < lowest + THRESHOLD]  # their order may change on convergence
     converged = dict(zip(near, thread_map(lambda n: _converge(result, n, tried[n]), near), strict=True))

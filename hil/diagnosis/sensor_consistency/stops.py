@@ -7,7 +7,8 @@ import numpy as np
 
 from hil.diagnosis.sensor_consistency.braking import BrakingModel
 from hil.diagnosis.sensor_consistency.likelihood import Fit, Values, fit, standard_deviations, typical_noise
-from hil.diagnosis.sensor_consistency.selection import THRESHOLD, Progress, SelectionResult, SelectionStep
+from hil.diagnosis.sensor_consistency.selection import Progress, SelectionResult, SelectionStep
+from hil.diagnosis.sensor_consistency.threshold import THRESHOLD
 from hil.diagnosis.vehicle.priors import NuisanceKind
 from hil.diagnosis.vehicle.spec import Vehicle, rest_friction
 from plant.vectors import PARAMETER, P

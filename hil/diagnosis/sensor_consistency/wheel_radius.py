@@ -10,8 +10,6 @@ from hil.diagnosis.sensor_consistency.kalman import StateSpace, log_likelihood
 from hil.diagnosis.sensor_consistency.model import Parameter, SensorModel
 from hil.diagnosis.sensor_consistency.motion import Motion
 
-SPREAD = 0.002
-"""Spread of rolling radii between wheels that no tolerance states, relative: 0.12 % on comma2k19 (effects, 13)."""
 _NOISE: Final[Mapping[str, Parameter]] = {
     "slip": Parameter(0.002, 1e-5, 0.2, 0.3, True, 2.0),
     "slip_s": Parameter(0.5, 0.05, 20.0, 0.3, True, 1.0),

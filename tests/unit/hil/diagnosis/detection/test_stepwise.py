@@ -40,6 +40,7 @@ class _Driven:
         nuisance_fit = NuisanceFit(simulator, masks, vehicle, base, relinearise=True)
         self.fitter = nuisance_fit.fitter
         self.bare, self.noise = nuisance_fit.fit(*self.fitter.start())
+        self.fitter = self.fitter.with_simulator(nuisance_fit.fitter.simulator)  # inputs denoised where the fit ended
 
     def candidate(self, name: str) -> Candidate:
         return next(one for one in self.candidates.candidates if one.name == name)
