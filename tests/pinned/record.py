@@ -22,7 +22,7 @@ if "--host" not in sys.argv:
     os.environ |= PROCESSOR
 sys.path.insert(0, str(Path(__file__).parent.parent / "support"))
 
-from pinned import CASES, RECORDS, answer, flat, spread  # noqa: E402
+from pinned import CASES, RECORDS, answer, flat, spread  # noqa: E402 - after the environment and the path are set
 
 
 def _answer(case: str) -> dict[str, Any]:
