@@ -1,7 +1,7 @@
 """Files that appear whole or not at all."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -9,16 +9,24 @@ from hil.log.frames import LogError
 
 
 @contextmanager
-def atomic_write(path: Path, overwrite: bool = False) -> Iterator[Path]:
+def atomic_write(path: Path, overwrite: bool = False, read: Iterable[Path] = ()) -> Iterator[Path]:
     """Yield a temporary path beside ``path``; put it in place when the block ends without an error.
+
+    Parameters
+    ----------
+    overwrite : an existing file may be replaced.
+    read : files that are read meanwhile and are never replaced, under whatever name or link.
 
     Raises
     ------
     LogError
         When ``path`` exists and may not be replaced, or cannot be written.
     """
-    if path.exists() and not overwrite:
-        raise LogError(path, "exists already; use --force to replace it, or give another name")
+    if path.exists():
+        if any(other.exists() and path.samefile(other) for other in read):
+            raise LogError(path, "is read by this command too; give another name for the output")
+        if not overwrite:
+            raise LogError(path, "exists already; use --force to replace it, or give another name")
     # The suffix stays: writers choose their format by it.
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntFlag
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -15,21 +15,21 @@ MAX_STANDARD_ID = 0x7FF
 MAX_EXTENDED_ID = 0x1FFFFFFF
 FD_CODES = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)  # data bytes by length code
 FD_LENGTHS = frozenset(FD_CODES)
-FIRST_REJECTED = 10  # how many rejected pieces are shown
 
 
 class FrameFlag(IntFlag):
-    """What a frame is beside a plain classical data frame."""
+    """What a frame is beside a plain classical data frame that was received."""
 
     REMOTE = 1
     ERROR = 2
     FD = 4
     BIT_RATE_SWITCH = 8
     ERROR_STATE = 16
+    SENT = 32  # by the recorder itself (Tx)
 
 
 class LogError(BrakebenchError):
-    """A log that cannot be read: which file, where in it (byte offset, where known), and why."""
+    """A log that cannot be read or written: which file, where in it (byte offset, where known), and why."""
 
     def __init__(self, path: Path | str, problem: str, offset: int | None = None) -> None:
         where = "" if offset is None else f" at byte {offset}"
@@ -45,10 +45,10 @@ class FrameTable:
     Attributes
     ----------
     channels : channel names; ``channel`` indexes them.
-    time_ns : int64 (n,), the log's own time stamps, ns.
+    time_ns : int64 (n,), the log's own time stamps, ns; since 1970 where the log has a start time.
     channel : int32 (n,).
     can_id : uint32 (n,), without flag bits; for an error frame the error class.
-    extended : bool (n,), 29-bit identifier.
+    extended : bool (n,), 29-bit identifier; False for an error frame.
     length : uint8 (n,), data bytes; of a remote frame the requested number.
     data : uint8 (n, 8), or (n, 64) where a CAN FD frame is longer than 8 bytes; zero behind ``length``.
     flags : uint8 (n,), bits of `FrameFlag`.
@@ -87,7 +87,7 @@ class FrameTable:
         if not parts:
             return cls.empty(channels=names)
         width = max(part.data.shape[1] for part in parts)
-        data = [np.pad(part.data, ((0, 0), (0, width - part.data.shape[1]))) for part in parts]
+        data = [part.widened(width).data for part in parts]
         return cls(
             names,
             np.concatenate([part.time_ns for part in parts]),
@@ -112,6 +112,40 @@ class FrameTable:
             self.flags[rows],
         )
 
+    def widened(self, width: int) -> Self:
+        """Return the table with at least ``width`` columns of data."""
+        missing = width - self.data.shape[1]
+        if missing <= 0:
+            return self
+        data = np.pad(self.data, ((0, 0), (0, missing)))
+        return type(self)(
+            self.channels, self.time_ns, self.channel, self.can_id, self.extended, self.length, data, self.flags
+        )
+
+    def to_arrow(self) -> Any:
+        """Return a pyarrow.Table: time (timestamp[ns]), channel, id, extended, length, flags, data (binary).
+
+        ``.to_pandas()`` of it is the data frame.
+        """
+        import pyarrow as pa
+
+        width = self.data.shape[1]
+        shown = np.where(self.flags & FrameFlag.REMOTE, 0, self.length).astype(np.int64)
+        offsets = np.concatenate(([0], np.cumsum(shown))).astype(np.int32)
+        held = self.data[np.arange(width) < shown[:, None]]
+        data = pa.Array.from_buffers(pa.binary(), len(self), [None, pa.py_buffer(offsets), pa.py_buffer(held)])
+        return pa.table(
+            {
+                "time": pa.array(self.time_ns, pa.timestamp("ns")),
+                "channel": pa.DictionaryArray.from_arrays(self.channel, pa.array(list(self.channels), pa.string())),
+                "id": self.can_id,
+                "extended": self.extended,
+                "length": self.length,
+                "flags": self.flags,
+                "data": data,
+            }
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class Rejected:
@@ -123,7 +157,7 @@ class Rejected:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recording:
-    """What a log file held.
+    """What a log file held, all of it in memory.
 
     Attributes
     ----------
@@ -132,6 +166,8 @@ class Recording:
     rejected : lines (or objects) that should be a frame and are none.
     first_rejected : the first of them.
     truncated_at : byte offset from which the file is cut off, None where it is whole.
+    start_ns : start time that the log states, ns since 1970; None where it states none.
+    notes : what the reader should know (an assumed time zone, say).
     """
 
     path: Path
@@ -140,56 +176,54 @@ class Recording:
     rejected: int = 0
     first_rejected: tuple[Rejected, ...] = ()
     truncated_at: int | None = None
+    start_ns: int | None = None
+    notes: tuple[str, ...] = ()
 
 
-class FrameBuilder:
-    """Collects frames one at a time where a format leaves no other way.
+@dataclass(frozen=True, slots=True)
+class LogFacts:
+    """What a writer must know of all frames before it writes the first one.
 
-    What no CAN frame can be is rejected: identifiers out of range, wrong lengths, stamps that are no time.
+    Attributes
+    ----------
+    channels : channel names, in the numbering of the tables.
+    frames : number of frames.
+    start_ns : start time that the source states, None where it states none.
+    first_ns, least_ns, last_ns : stamp of the first frame, the least and the greatest stamp; 0 without a frame.
+    flags : bits of `FrameFlag` that any frame has.
+    errors : number of error frames.
+    finer_than_us : a stamp is no whole number of microseconds.
+    longest : most data bytes of a frame.
     """
 
-    def __init__(self) -> None:
-        self.rejected = 0
-        self.first_rejected: list[Rejected] = []
-        self._channels: dict[str, int] = {}
-        self._rows: list[tuple[int, int, int, bool, int, int]] = []
-        self._data: list[bytes] = []
+    channels: tuple[str, ...] = ()
+    frames: int = 0
+    start_ns: int | None = None
+    first_ns: int = 0
+    least_ns: int = 0
+    last_ns: int = 0
+    flags: FrameFlag = FrameFlag(0)
+    errors: int = 0
+    finer_than_us: bool = False
+    longest: int = 0
 
-    def add(
-        self, time_ns: int, channel: str, can_id: int, extended: bool, data: bytes, flags: FrameFlag, length: int
-    ) -> bool:
-        """Add a frame; False (and nothing added) where it can be none. ``length`` counts for remote frames only."""
-        remote = bool(flags & FrameFlag.REMOTE)
-        limit = MAX_EXTENDED_ID if extended or flags & FrameFlag.ERROR else MAX_STANDARD_ID
-        size = length if remote else len(data)
-        sound = size in FD_LENGTHS if flags & FrameFlag.FD else 0 <= size <= 8
-        if not (sound and 0 <= can_id <= limit and 0 <= time_ns < 2**63):
-            return False
-        number = self._channels.setdefault(channel, len(self._channels))
-        self._rows.append((time_ns, number, can_id, extended, size, int(flags)))
-        self._data.append(b"" if remote else data)
-        return True
-
-    def reject(self, offset: int, text: str) -> None:
-        """Count something that should be a frame and is none."""
-        self.rejected += 1
-        if len(self.first_rejected) < FIRST_REJECTED:
-            self.first_rejected.append(Rejected(offset, text[:80].encode("ascii", "backslashreplace").decode()))
-
-    def recording(self, path: Path, form: str, truncated_at: int | None = None) -> Recording:
-        """Return what was collected."""
-        width = 64 if any(len(d) > 8 for d in self._data) else 8
-        n = len(self._rows)
-        rows = np.array(self._rows, np.int64).reshape(n, 6)
-        data = np.frombuffer(b"".join(d.ljust(width, b"\0") for d in self._data), np.uint8).reshape(n, width)
-        frames = FrameTable(
-            tuple(self._channels),
-            rows[:, 0].copy(),
-            rows[:, 1].astype(np.int32),
-            rows[:, 2].astype(np.uint32),
-            rows[:, 3].astype(np.bool_),
-            rows[:, 4].astype(np.uint8),
-            data,
-            rows[:, 5].astype(np.uint8),
-        )
-        return Recording(path, form, frames, self.rejected, tuple(self.first_rejected), truncated_at)
+    @classmethod
+    def of(cls, tables: Iterable[FrameTable]) -> Self:
+        """Look through the frames of a log; what start time it states, its tables do not tell."""
+        channels: tuple[str, ...] = ()
+        frames = errors = longest = bits = 0
+        first = least = last = 0
+        fine = False
+        for table in tables:
+            channels = table.channels
+            if not len(table):
+                continue
+            low, high = int(table.time_ns.min()), int(table.time_ns.max())
+            first = first if frames else int(table.time_ns[0])
+            least, last = (min(least, low), max(last, high)) if frames else (low, high)
+            frames += len(table)
+            bits |= int(np.bitwise_or.reduce(table.flags))
+            errors += int(np.count_nonzero(table.flags & FrameFlag.ERROR))
+            longest = max(longest, int(table.length.max()))
+            fine = fine or bool((table.time_ns % 1000).any())
+        return cls(channels, frames, None, first, least, last, FrameFlag(bits), errors, fine, longest)

@@ -1,41 +1,110 @@
-"""Opens a log of any known format."""
+"""Opens a log of any known format: frames and signals as columns."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Self
 
-from hil.log.asc import read_asc
-from hil.log.blf import read_blf
-from hil.log.candump import read_candump
-from hil.log.flat import read_csv, read_parquet
-from hil.log.frames import LogError, Recording
-from hil.log.mdf import read_mdf
-from hil.log.trc import read_trc
+from dbc.database import Database
+from hil.log.account import Account
+from hil.log.builder import recording_of
+from hil.log.decode import DecodedLog, decode_log
+from hil.log.formats import BY_NAME, format_of
+from hil.log.frames import FrameTable, Recording
+from hil.log.source import DEFAULT, ReadOptions, Source
 
-READERS: dict[str, Callable[[Path], Recording]] = {
-    ".log": read_candump,
-    ".asc": read_asc,
-    ".blf": read_blf,
-    ".trc": read_trc,
-    ".mf4": read_mdf,
-    ".csv": read_csv,
-    ".parquet": read_parquet,
-}
+Progress = Callable[[float], None]
+"""Told the share of the log that has been read, 0 to 1, table by table."""
 
 
-def read_log(path: Path) -> Recording:
-    """Read a log file; its suffix names the format, any unknown suffix is taken for candump's.
+class Log:
+    """One log. ``tables`` reads it piece by piece in bounded memory, ``frames`` and ``signals`` as a whole.
+
+    Parameters
+    ----------
+    path : the file; ``-`` is standard input. A file packed with gzip is unpacked on the way.
+    form : name of the format; None tells it by the content.
+    options : how it is read.
+    limit_bytes : most bytes that are read; None reads all.
+
+    Attributes
+    ----------
+    account : what the last reading noticed beside the frames.
 
     Raises
     ------
     LogError
-        When it cannot be opened, or holds nothing of its format: with the file and, where known, the byte offset.
+        When it cannot be opened, or its format is none of the known ones.
     """
-    try:
-        recording = READERS.get(path.suffix.lower(), read_candump)(path)
-    except OSError as error:
-        raise LogError(path, f"cannot be opened: {error.strerror or error}; give a log file") from error
-    if recording.rejected and not len(recording.frames) and recording.truncated_at is None:
-        first = recording.first_rejected[0]
-        formats = ", ".join(READERS)
-        raise LogError(path, f"no {recording.format} log, got {first.text!r}; known suffixes: {formats}", first.offset)
-    return recording
+
+    def __init__(
+        self,
+        path: Path | str,
+        form: str | None = None,
+        options: ReadOptions = DEFAULT,
+        limit_bytes: int | None = None,
+    ) -> None:
+        self.source = Source(path, limit_bytes)
+        self.path = self.source.path
+        self.options = options
+        self.account = Account()
+        try:
+            self.format = format_of(self.source) if form is None else BY_NAME[form]
+        except BaseException:
+            self.source.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.source.close()
+
+    def tables(self, progress: Progress | None = None) -> Iterator[FrameTable]:
+        """Yield the frames from the begin on, in tables that share one channel numbering; `account` begins anew."""
+        self.account = Account()
+        self.source.rewind(self.account)
+        for table in self.format.read(self.source, self.account, self.options):
+            if progress is not None:
+                progress(self.source.done)
+            yield table
+        if self.account.local_start:
+            self.account.note(f"start time taken as {self.options.timezone} (the log names no zone)")
+
+    def recording(self) -> Recording:
+        """All frames, with the account."""
+        return recording_of(self.path, self.format.name, list(self.tables()), self.account)
+
+    def frames(self) -> FrameTable:
+        """All frames."""
+        return self.recording().frames
+
+    def signals(self, databases: Database | Mapping[str, Database] | None = None) -> DecodedLog:
+        """All signals; ``databases`` as in `hil.log.decode.decode_log`."""
+        return decode_log(self.recording(), databases)
+
+
+def open_log(
+    path: Path | str,
+    form: str | None = None,
+    options: ReadOptions = DEFAULT,
+    limit_bytes: int | None = None,
+) -> Log:
+    """Open a log; parameters and errors as of `Log`.
+
+    >>> with open_log("drive.blf") as log:  # doctest: +SKIP
+    ...     frames = log.frames().to_arrow().to_pandas()
+    ...     time_s, speed = log.signals(parse_database(Path("car.dbc").read_bytes())).series("WHEELS.FL")
+    """
+    return Log(path, form, options, limit_bytes)
+
+
+def read_log(path: Path, form: str | None = None) -> Recording:
+    """Read a whole log.
+
+    Raises
+    ------
+    LogError
+        When it cannot be opened, or holds nothing of its format.
+    """
+    with open_log(path, form) as log:
+        return log.recording()

@@ -1,0 +1,93 @@
+"""Text logs: blocks of whole lines, a compiled pass for the plain ones, a careful parser for all others."""
+
+from collections.abc import Iterator
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from hil.log.account import Account
+from hil.log.builder import FrameBuilder
+from hil.log.frames import FrameTable
+from hil.log.source import Source
+
+BLOCK_BYTES = 2 * 1024 * 1024
+MAX_LINE_BYTES = 4096
+FEW_BYTES = 200_000  # a log below this is read without the compiled pass, which costs half a second to load
+
+
+class LineParser(Protocol):
+    """A text format: two parsers of one grammar, which must agree on every line that both take."""
+
+    def take(self, buffer: npt.NDArray[np.uint8], begin: int, builder: FrameBuilder) -> int:
+        """Compiled: add the frames of the lines from ``begin`` on, all of which end with a line feed.
+
+        Returns the begin of the first line it leaves to `line`, the end of the buffer when it took all, or where
+        it stands when the builder is full.
+        """
+        ...
+
+    def line(self, line: bytes, offset: int, builder: FrameBuilder) -> bool:
+        """Add, pass over or reject one line (without its end).
+
+        Returns whether nothing can be missing at its end, had the log been cut off there.
+        """
+        ...
+
+
+def read_lines(source: Source, account: Account, parser: LineParser, fast: bool | None = None) -> Iterator[FrameTable]:
+    """Yield the frames of a text log; every line is taken by one of the parser's two ways.
+
+    Parameters
+    ----------
+    fast : False never uses the compiled pass, True always; None uses it for all but small logs.
+    """
+    builder = FrameBuilder(account)
+    for offset, block in _blocks(source, account):
+        end = block.rfind(b"\n") + 1
+        compiled = len(block) > FEW_BYTES or offset > 0 if fast is None else fast
+        buffer = np.frombuffer(block, np.uint8, end)
+        at = 0
+        while at < len(block):
+            if builder.full:
+                yield builder.take()
+            if compiled and at < end:
+                at = parser.take(buffer, at, builder)
+                if at >= len(block) or builder.full:
+                    continue
+            stop = block.find(b"\n", at)
+            whole = parser.line(block[at:] if stop < 0 else block[at:stop], offset + at, builder)
+            if stop < 0:
+                if not whole:
+                    account.cut_at(offset + at)
+                break
+            at = stop + 1
+    yield builder.take()
+
+
+def _blocks(source: Source, account: Account) -> Iterator[tuple[int, bytes]]:
+    """Yield (offset, whole lines); the last block may lack its line end. Overlong lines are rejected here."""
+    carry = b""
+    offset = 0  # of carry
+    overlong: int | None = None  # where a line began that has not ended yet
+    while chunk := source.read(BLOCK_BYTES):
+        block = carry + chunk if carry else chunk
+        if overlong is not None:
+            end = block.find(b"\n")
+            if end < 0:
+                offset += len(block)
+                carry = b""
+                continue
+            overlong = None
+            offset, block = offset + end + 1, block[end + 1 :]
+        end = block.rfind(b"\n") + 1
+        if end:
+            yield offset, block[:end]
+        offset, carry = offset + end, block[end:]
+        if len(carry) > MAX_LINE_BYTES:
+            account.reject(offset, carry[:MAX_LINE_BYTES])
+            overlong, offset, carry = offset, offset + len(carry), b""
+    if overlong is not None:
+        account.cut_at(overlong)
+    if carry:
+        yield offset, carry
