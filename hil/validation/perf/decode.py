@@ -125,7 +125,8 @@ def _frames_to_signals(frames: FrameTable) -> Row:
 def _python_can_signals(reader: Callable[[Path], Any], path: Path) -> int:
     loaded, columns, n = database(BusName.VEHICLE), {}, 0
     with reader(path) as messages:
-        for n, message in enumerate(messages, 1):
+        for message in messages:
+            n += 1
             values = loaded.decode_message(message.arbitration_id, message.data, decode_choices=False)
             for name, value in values.items():
                 columns.setdefault((message.arbitration_id, name), []).append(value)
@@ -218,9 +219,8 @@ def _mdfr_rate(path: Path) -> float:
 
 def _blf_raw(files: Files) -> list[Row]:
     path = files.many(".blf")
-    rows = [
-        _compared("blf to frames", partial(_frames, path), partial(_inflated, path), "bare inflate of its containers")
-    ]
+    ours = partial(_frames, path)
+    rows = [_compared("blf to frames", ours, partial(_inflated, path), "bare inflate of its containers")]
     try:
         import hilspy
     except ImportError:
@@ -231,7 +231,7 @@ def _blf_raw(files: Files) -> list[Row]:
         with hilspy.open(f"file://{path}", "raw") as messages:
             return sum(1 for _ in messages)
 
-    return [*rows, _compared("blf to frames, raw", partial(_frames, path), theirs, "hilspy, raw codec")]
+    return [*rows, _compared("blf to frames, raw", ours, theirs, "hilspy, raw codec")]
 
 
 def _inflate() -> Callable[[bytes], bytes]:
