@@ -153,7 +153,7 @@ def test_own_messages_that_nobody_receives_are_bounded(name, monkeypatch, caplog
     with can.Bus(name, interface="brakebench", receive_own_messages=True) as script:
         for number in range(5):
             script.send(message(number))
-        with caplog.at_level(logging.WARNING):
+        with caplog.at_level(logging.WARNING, "can.brakebench"):
             assert received(script, 3) == [(number, False) for number in range(3)]
         assert "2 own frames lost" in caplog.text
         assert script.recv(0.0) is None
