@@ -73,6 +73,6 @@ def parse_database(content: bytes | str, source: str = "database") -> Database:
     bit_rate = build.bit_rate()
     said = (*notes, *warnings.lines())
     if not messages:
-        why = said[-1] if said else "they hold only signals of no message"
+        why = said[0] if said else "they hold only signals of no message"
         raise DatabaseError(f"{source}: none of its {len(read.drafts)} messages can be used: {why}")
     return Database(source, messages, said, bit_rate)

@@ -15,7 +15,8 @@ Placed = tuple[int | None, Signal]  # a signal and its place in the text
 def message_problem(can_id: int, extended: bool, length: int) -> str | None:
     """Say why a message cannot come on a CAN bus, None where it can."""
     if not 0 <= can_id <= (0x1FFF_FFFF if extended else 0x7FF):
-        return f"identifier {can_id:#x} has more than {29 if extended else 11} bits"
+        advice = "" if extended else "; a 29-bit one has bit 31 set (2147483648 added)"
+        return f"identifier {can_id:#x} has more than {29 if extended else 11} bits{advice}"
     limit = MAX_TRANSPORT_BYTES if extended else MAX_FRAME_BYTES
     if length > limit:
         carrier = "J1939 transports" if extended else "a CAN FD frame has"

@@ -144,5 +144,7 @@ class Warnings:
 
 def shown(text: str) -> str:
     """Return a foreign text for a message: one line, of bounded length, without control characters."""
+    if len(text) <= MAX_SHOWN and text.isprintable():
+        return text
     cut = text[:MAX_SHOWN] + ("..." if len(text) > MAX_SHOWN else "")
     return "".join(c if c.isprintable() else "?" for c in cut)

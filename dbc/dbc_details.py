@@ -26,7 +26,7 @@ def number(text: str) -> float | None:
     """Return a decimal number (int where it is written as one that 64 bits hold), None where the text is none."""
     if len(text) > _MAX_NUMBER or not _DECIMAL.fullmatch(text):
         return None
-    return int(text) if len(text) < 20 and text.lstrip("+-").isdigit() else float(text)
+    return int(text) if len(text) <= 20 and text.lstrip("+-").isdigit() else float(text)
 
 
 @dataclass(slots=True)
@@ -60,6 +60,7 @@ class Details:
     comments: dict[Owner, str] = field(default_factory=dict)
     attributes: dict[Owner, dict[str, str]] = field(default_factory=dict)
     nodes: dict[str, str] = field(default_factory=dict)  # short name -> long name
+    long_names: dict[Owner, str] = field(default_factory=dict)
     defaults: dict[str, str] = field(default_factory=dict)
     enums: dict[str, list[str]] = field(default_factory=dict)
     senders: dict[int, str] = field(default_factory=dict)  # identifier -> first additional sender
@@ -142,6 +143,8 @@ class Details:
                 self.nodes[words[1]] = value
         elif kind != "EV_":
             owner = (int(words[1]), words[2] if kind == "SG_" else "") if kind in ("BO_", "SG_") else DATABASE
+            if kind and name == ("SystemSignalLongSymbol" if kind == "SG_" else "SystemMessageLongSymbol"):
+                self.long_names[owner] = value
             self.attributes.setdefault(owner, {})[name] = value
 
     def _definition(self, s: Statement, tokens: list[str]) -> None:

@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections import Counter
 
 from dbc.database_checks import Placed, merged, signal_problem, sound_signals
 from dbc.database_values import Message, Signal, Warnings, shown
@@ -12,6 +13,7 @@ from dbc.dbc_text import DbcText, Draft
 INDEPENDENT = "VECTOR__INDEPENDENT_SIG_MSG"  # Vector's home of signals that belong to no message
 NO_SENDER = "Vector__XXX"
 _ODD_LETTERS = re.compile(r"[^A-Za-z0-9_]")
+_ODD_IN_LONG_NAMES = re.compile(r"[^A-Za-z0-9_ ()/&%+-]")  # those are free text
 
 Selection = tuple[str | None, tuple[tuple[int, int], ...]]  # multiplexer (None: always there), its raw values
 
@@ -23,7 +25,8 @@ class DbcMessages:
         self._drafts = text.drafts
         self._details = text.details
         self._warnings = warnings
-        self._numbers: dict[str, float | None] = {}
+        self._numbers: dict[str, float | None] = {}  # by how they are written: a database repeats few
+        self._ranges: dict[tuple[str, str], tuple[float | None, float | None]] = {}  # sound ones, likewise
         self._odd_letters = False
 
     def bit_rate(self) -> int | None:
@@ -57,8 +60,9 @@ class DbcMessages:
         """Return a name of letters, digits and '_' alone."""
         return _ODD_LETTERS.sub("_", name)
 
-    def _name(self, name: str, position: int) -> str:
-        named = self._named(name)
+    def _name(self, name: str, long_name: str | None, position: int) -> str:
+        named = _ODD_IN_LONG_NAMES.sub("_", long_name) if long_name else self._named(name)
+        name = long_name or name
         if named != name and not self._odd_letters:
             self._odd_letters = True
             what = "letters outside ASCII" if not name.isascii() else "signs other than letters and digits"
@@ -69,7 +73,7 @@ class DbcMessages:
         text, details, owner = draft.text, self._details, (draft.key, "")
         can_id, extended = draft.can_id, draft.extended
         stated = details.attributes.get(owner, {})
-        name = self._name(stated.get("SystemMessageLongSymbol") or text.name, text.position)
+        name = self._name(text.name, details.long_names.get(owner), text.position)
         if name in names:
             other = f"{name}_{can_id:X}"
             while other in names:
@@ -87,7 +91,7 @@ class DbcMessages:
             name=name,
             can_id=can_id,
             extended=extended,
-            length=int(text.length),
+            length=draft.length,
             signals=sound_signals(shown(name), self._signals(draft, shown(name)), self._warnings),
             cycle_time_ms=cycle_ms if cycle_ms is not None and cycle_ms > 0 else None,
             sender=details.nodes.get(sender, sender),
@@ -98,10 +102,11 @@ class DbcMessages:
         )
 
     def _signals(self, draft: Draft, message: str) -> list[Placed]:
-        multiplexers = [s for s in draft.signals if s.marker is not None and s.marker.endswith("M")]
+        multiplexers = {s.name: s for s in draft.signals if s.marker is not None and s.marker.endswith("M")}
+        names = self._final_names(draft)
         found: list[Placed] = []
         for text in draft.signals:
-            signal = self._signal(draft, text, message, multiplexers)
+            signal = self._signal(draft, text, message, multiplexers, names)
             if signal is not None:
                 found.append((text.position, signal))
         return found
@@ -112,16 +117,16 @@ class DbcMessages:
         except KeyError:
             return self._numbers.setdefault(text, number(text))
 
-    def _signal(self, draft: Draft, text: SignalText, message: str, multiplexers: list[SignalText]) -> Signal | None:
+    def _signal(
+        self, draft: Draft, text: SignalText, message: str, multiplexers: dict[str, SignalText], names: dict[str, str]
+    ) -> Signal | None:
         at, short, marker, start_text, length_text, order, sign, factor_text, offset_text, *_, unit = text
         details, owner = self._details, (draft.key, short)
-        name = short if short.isascii() and short.isidentifier() else self._name(short, at)
-        if details.attributes:
-            name = self._long_name(owner, name, at)
+        name = names.get(short, short)
         start, length, big_endian = int(start_text), int(length_text), order == "0"
         value_type = details.value_types.get(owner, (0, 0))
         is_float = value_type[1] in (1, 2)
-        problem = signal_problem(start, length, big_endian, is_float, int(draft.text.length))
+        problem = signal_problem(start, length, big_endian, is_float, draft.length)
         factor, offset = self._number(factor_text), self._number(offset_text)
         if factor is None or offset is None or not math.isfinite(factor) or not math.isfinite(offset):
             problem = problem or f"factor {shown(factor_text)}, offset {shown(offset_text)}, expected finite numbers"
@@ -142,8 +147,10 @@ class DbcMessages:
                 return None
             multiplexer, ranges = selected
             if multiplexer:
-                multiplexer = self._long_name((draft.key, multiplexer), self._named(multiplexer), at)
-        minimum, maximum = self._limits(text, f"signal {message}.{shown(name)}")
+                multiplexer = names.get(multiplexer, multiplexer)
+        limits = self._ranges.get((text.minimum, text.maximum))
+        if limits is None:
+            limits = self._limits(text, f"signal {message}.{shown(name)}")
         return Signal(
             name,
             start,
@@ -154,42 +161,54 @@ class DbcMessages:
             factor,
             offset,
             unit,
-            minimum,
-            maximum,
+            limits[0],
+            limits[1],
             details.choices(owner) if details.values or details.types else {},
             multiplexer or None,
             ranges,
             details.comments.get(owner, ""),
         )
 
-    def _long_name(self, owner: tuple[int, str], name: str, position: int) -> str:
-        long = self._details.attributes.get(owner, {}).get("SystemSignalLongSymbol")
-        return self._name(long, position) if long else name
+    def _final_names(self, draft: Draft) -> dict[str, str]:
+        """Names by what the text calls a signal, where the two differ; no two signals come to one name."""
+        long_names, key = self._details.long_names, draft.key
+        odd = any(_ODD_LETTERS.search(s.name) for s in draft.signals)
+        if not odd and not long_names:
+            return {}
+        final: dict[str, str] = {}
+        uses: Counter[str] = Counter()
+        for signal in draft.signals:
+            if signal.name in final:
+                continue
+            name = self._name(signal.name, long_names.get((key, signal.name)), signal.position)
+            uses[name] += 1
+            final[signal.name] = name if uses[name] == 1 else f"{name}_{uses[name]}"
+        return final
 
     def _selected(
-        self, text: SignalText, rule: MuxRule | None, multiplexers: list[SignalText], where: str
+        self, text: SignalText, rule: MuxRule | None, multiplexers: dict[str, SignalText], where: str
     ) -> Selection | None:
         """What selects a signal; None, with a warning, where that is not said."""
         marker = text.marker or ""
         own = marker.strip("mM")
-        single = multiplexers[0].name if len(multiplexers) == 1 else None
+        single = next(iter(multiplexers)) if len(multiplexers) == 1 else None
         if rule is not None and rule.multiplexer != text.name:
             ranges = list(rule.ranges)
             if own and rule.multiplexer == single:
                 ranges.append((int(own), int(own)))
-            selector = next((s for s in multiplexers if s.name == rule.multiplexer), None)
+            selector = multiplexers.get(rule.multiplexer)
             if selector is not None and max(b for _, b in ranges) >> int(selector.length):
                 said = f"multiplexer {shown(rule.multiplexer)} has {selector.length} bits, fewer than its values need"
                 self._warnings.add(rule.position, f"{where}: {said}")
             return rule.multiplexer, merged(ranges)
         if not own:
             return None, ()
-        others = [s.name for s in multiplexers if s.name != text.name]
-        if len(others) == 1:
-            return others[0], ((int(own), int(own)),)
-        if len(multiplexers) == 1:  # the message's only multiplexer, m0M: nothing above it selects it
+        if single == text.name:  # the message's only multiplexer, m0M: nothing above it selects it
             return None, ()
-        why = "no signal of its message is a multiplexer" if not others else "no SG_MUL_VAL_ says by which multiplexer"
+        others = len(multiplexers) - (text.name in multiplexers)
+        if others == 1:
+            return next(name for name in multiplexers if name != text.name), ((int(own), int(own)),)
+        why = "no SG_MUL_VAL_ says by which multiplexer" if others else "no signal of its message is a multiplexer"
         self._warnings.add(text.position, f"{where}: selected by value {own[:20]}, but {why}; left out")
         return None
 
@@ -202,7 +221,9 @@ class DbcMessages:
         if low > high:
             self._warnings.add(text.position, f"{where}: minimum {low} above maximum {high}; range not used")
             return None, None
-        return (None, None) if low == high == 0 else (low, high)
+        limits = (None, None) if low == high == 0 else (low, high)
+        self._ranges[text.minimum, text.maximum] = limits
+        return limits
 
     def _unclaimed(self) -> None:
         """Report what is said of signals that do not exist."""

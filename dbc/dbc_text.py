@@ -22,14 +22,15 @@ _MARKER = re.compile(r"M|m[0-9]{1,20}M?", re.ASCII)
 class Draft:
     """A message and its signals as they stand in the text; ``problem`` says why it cannot be used."""
 
-    __slots__ = ("extended", "key", "problem", "signals", "text")
+    __slots__ = ("extended", "key", "length", "problem", "signals", "text")
 
     def __init__(self, text: MessageText) -> None:
         self.text = text
         self.key = int(text.key)
         self.extended = bool(self.key & 0x8000_0000)
         self.signals: list[SignalText] = []
-        self.problem = message_problem(self.can_id, self.extended, int(text.length))
+        self.length = int(text.length)
+        self.problem = message_problem(self.can_id, self.extended, self.length)
 
     @property
     def can_id(self) -> int:
@@ -87,11 +88,15 @@ class DbcText:
             return None
         name, marker = head[1], head[2]
         if marker is not None and not _MARKER.fullmatch(marker):
-            if marker[0] in "mM":
+            if marker == "m":
+                self._warnings.add(where, f"signal {shown(name)}: 'm' without a value is read as 'M', a multiplexer")
+                marker = "M"
+            elif marker[0] in "mM":
                 self._warnings.add(where, f"signal {shown(name)}: {shown(marker)!r} is no multiplexer mark; left out")
                 return None
-            self._warnings.add(where, f"signal {shown(name)}: {shown(marker)!r} behind its name is not used")
-            marker = None
+            else:
+                self._warnings.add(where, f"signal {shown(name)}: {shown(marker)!r} behind its name is not used")
+                marker = None
         missing: list[str] = []
         end, factor, offset = bits.end(), "1", "0"
         if found := _FACTOR.match(text, end):
