@@ -1,5 +1,6 @@
 """What a set of signals must hold to be decoded, whatever kind of file they come from."""
 
+import re
 from collections.abc import Iterable, Sequence
 
 from dbc.database_values import Signal, Warnings
@@ -9,7 +10,14 @@ MAX_TRANSPORT_BYTES = 1785  # J1939-21 transport protocol: 255 packets of 7
 MAX_SIGNAL_BITS = 64
 MAX_MUX_DEPTH = 16  # multiplexers above one signal; real ones have up to four
 
+_ODD_LETTERS = re.compile(r"[^A-Za-z0-9_ ()/&%+-]")
+
 Placed = tuple[int | None, Signal]  # a signal and its place in the text
+
+
+def printable_name(name: str) -> str:
+    """Return a name that is free text with what a table's head or a terminal could take amiss replaced by '_'."""
+    return _ODD_LETTERS.sub("_", name)
 
 
 def message_problem(can_id: int, extended: bool, length: int) -> str | None:

@@ -4,7 +4,7 @@ import math
 import re
 from collections import Counter
 
-from dbc.database_checks import Placed, merged, signal_problem, sound_signals
+from dbc.database_checks import Placed, merged, printable_name, signal_problem, sound_signals
 from dbc.database_values import Message, Signal, Warnings, shown
 from dbc.dbc_details import MuxRule, number
 from dbc.dbc_scan import SignalText
@@ -13,7 +13,6 @@ from dbc.dbc_text import DbcText, Draft
 INDEPENDENT = "VECTOR__INDEPENDENT_SIG_MSG"  # Vector's home of signals that belong to no message
 NO_SENDER = "Vector__XXX"
 _ODD_LETTERS = re.compile(r"[^A-Za-z0-9_]")
-_ODD_IN_LONG_NAMES = re.compile(r"[^A-Za-z0-9_ ()/&%+-]")  # those are free text
 
 Selection = tuple[str | None, tuple[tuple[int, int], ...]]  # multiplexer (None: always there), its raw values
 
@@ -61,7 +60,7 @@ class DbcMessages:
         return _ODD_LETTERS.sub("_", name)
 
     def _name(self, name: str, long_name: str | None, position: int) -> str:
-        named = _ODD_IN_LONG_NAMES.sub("_", long_name) if long_name else self._named(name)
+        named = printable_name(long_name) if long_name else self._named(name)
         name = long_name or name
         if named != name and not self._odd_letters:
             self._odd_letters = True
