@@ -25,6 +25,7 @@ _DEFINITION = re.compile(r"BO_\s++[0-9]++\s++[^\s:\"]++\s*+:|SG_\s++[^\s:\"]++\s
 
 _CLOSED = re.compile(r'"(?:[^"\\\n]++|\\"?+)*+"')
 _CLOSED_PLAIN = re.compile(r'"[^"\n]*+"(?=\s*+(?:[;,]|-?[0-9]|$))')
+_CLOSED_UNIT = re.compile(r'"[^"\n]*+"')
 _CLOSED_LATER = re.compile(r'"(?:[^"\\]++|\\"?+)*+"')
 _GOES_ON = re.compile(r"\s*+(?:[;,]|-?[0-9]|$)")
 
@@ -168,7 +169,9 @@ class Scanner:
     def _string(self, at: int) -> int:
         """Take the string that opens at a place; return the place behind it."""
         text = self._text
-        found = _CLOSED.match(text, at) or self._on_later_lines(at) or _CLOSED_PLAIN.match(text, at)
+        # A backslash may be meant as one, even before the quotation mark that closes.
+        plain = _CLOSED_UNIT if self._keyword in ("SG_", "BO_") else _CLOSED_PLAIN
+        found = _CLOSED.match(text, at) or self._on_later_lines(at) or plain.match(text, at)
         if found:
             end = found.end()
             content = text[at + 1 : end - 1]

@@ -108,7 +108,7 @@ class DbcText:
         elif text.find("(", end, end + 10) < 0:
             missing.append("factor 1, offset 0")
         else:
-            factor = text[end : end + 20]
+            factor = " ".join(text[end : end + 20].split())
         minimum = maximum = "0"
         if found := _RANGE.match(text, end):
             minimum, maximum = found[1].strip(), found[2].strip()
