@@ -68,7 +68,9 @@ def parse_foreign(content: bytes | str, source: str, format: str) -> Database:
         except Exception as error:  # it raises whatever its parsers trip over
             refused = f"cantools cannot read it ({_short(error)})"
             drafts, bit_rate = _by_canmatrix(text, format, f"{source}: {refused}", warnings), None
-            notes.append(f"{refused}; read by canmatrix, which may lose signals without a word")
+            empty = sum(not draft.signals for draft in drafts)
+            lost = f"which may lose signals unsaid: {empty} of its {len(drafts)} messages come without signals"
+            notes.append(f"{refused}; read by canmatrix, {lost}")
     messages = _messages(drafts, warnings)
     said = (*notes, *warnings.lines())
     if not messages:

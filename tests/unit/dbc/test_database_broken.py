@@ -195,7 +195,7 @@ def test_warnings_are_in_the_order_of_the_text_and_bounded():
     warnings = parse(text).warnings
     assert len(warnings) == MAX_WARNINGS + 1
     assert warnings[0].startswith("line 3: ")
-    assert warnings[1].startswith("line 4: ")
+    assert warnings[1].startswith("line 5: ")
     assert warnings[-1] == f"and {MAX_WARNINGS} further warnings"
 
 
