@@ -193,8 +193,11 @@ def _presence(message: Message, raw: dict[str, Values]) -> dict[str, npt.NDArray
             selected = None
             if signal.multiplexer is not None:
                 values = raw[signal.multiplexer]
-                low, high = (0, 2**64) if values.dtype == np.uint64 else (-(2**63), 2**63)
-                selected = np.isin(values, np.array([i for i in signal.mux_ids if low <= i < high], values.dtype))
+                selected = np.zeros(len(values), np.bool_)
+                limit = 2**64 if values.dtype == np.uint64 else 2**63
+                for first, last in signal.mux_ranges:
+                    if first < limit:
+                        selected |= (values >= first) & (values <= min(last, limit - 1))
                 parent = mask(by_name[signal.multiplexer])
                 selected = selected if parent is None else selected & parent
             found[signal.name] = selected
