@@ -81,11 +81,11 @@ def read_blf(source: Source, account: Account, options: ReadOptions) -> Iterator
             if isinstance(piece, FrameTable):
                 yield piece
                 continue
-            inflated += len(piece.content)
-            if inflated > FREE_BYTES + MAX_RATIO * (piece.offset + piece.packed_size):
+            if inflated + len(piece.content) > FREE_BYTES + MAX_RATIO * (piece.offset + piece.packed_size):
                 account.reject(piece.offset, f"container of {len(piece.content)} bytes: the file is a deflate bomb")
                 inner.drop()
                 continue
+            inflated += len(piece.content)
             for at in range(0, len(piece.content), BLOCK_BYTES):
                 inner.feed(piece.content[at : at + BLOCK_BYTES], piece.offset)
                 yield from inner.tables()

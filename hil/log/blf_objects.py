@@ -195,10 +195,18 @@ class ObjectStream:
             self._need = size + layout.LOOK + begin - at
             return at, None
         if not landed:  # its size is wrong, or bytes are missing
-            found = block.find(SIGNATURE, begin + OBJECT.size, end)
+            found = self._next_container(block, begin + OBJECT.size, end + 3)
             if found >= 0:
                 return found, Container(offset, block[body:found])
         return min(end, len(block)), Container(offset, block[body:end], not whole)
+
+    def _next_container(self, block: bytes, begin: int, end: int) -> int:
+        """Where the next container seems to begin, -1 for none; other objects may stand inside a stored one."""
+        while (found := block.find(SIGNATURE, begin, end)) >= 0:
+            if self._kind(block, found) == layout.LOG_CONTAINER:
+                return found
+            begin = found + len(SIGNATURE)
+        return -1
 
     def _step(self, block: bytes, at: int, final: bool) -> int:
         """Take one object, or count what stands there; returns where to go on."""
@@ -236,7 +244,7 @@ class ObjectStream:
             return at
         one = block[begin:end]
         if not landed:
-            found = block.find(SIGNATURE, begin + OBJECT.size, end)
+            found = block.find(SIGNATURE, begin + OBJECT.size, end + 3)
             if found >= 0:
                 self._reject(begin, f"object of type {kind} and {size} bytes: its size is wrong")
                 return found
@@ -249,10 +257,14 @@ class ObjectStream:
             self._passed[kind if kind < 256 else UNKNOWN] += 1
             return end
         used, taken = self._frame(one, header, kind)
-        found = one.find(SIGNATURE, header + used)
-        if found >= 0:
-            self._reject(begin, f"object of type {kind} and {size} bytes: its size is wrong")
-            return begin + found
+        if size > header + used:
+            if len(block) < end + 3 and not final:
+                self._need = end + 3 - at
+                return at
+            found = block.find(SIGNATURE, begin + header + used, end + 3)
+            if found >= 0:
+                self._reject(begin, f"object of type {kind} and {size} bytes: its size is wrong")
+                return found
         if taken is None:
             self._passed[REQUESTS] += 1
         elif not self._add(*taken):

@@ -136,7 +136,7 @@ def take_objects(  # type: ignore[no-untyped-def]
                 if size_all - end < _LOOK and not final:
                     return p, n
                 if size_all - end > _PADDING:
-                    found = _find(buffer, p + 16, end)
+                    found = _find(buffer, p + 16, min(end + 3, size_all))
                     if found >= 0:
                         if not may_reject:
                             return p, n
@@ -200,8 +200,10 @@ def take_objects(  # type: ignore[no-untyped-def]
             at += 44
             if fd & 0x80:
                 bits |= _FD | (_BRS if fd & 0x40 else 0) | (_ESI if fd & 0x20 else 0)
-        if body > used + 3:
-            found = _find(buffer, p + header + used, end)
+        if body > used:
+            if size_all < end + 3 and not final:
+                return p, n
+            found = _find(buffer, p + header + used, min(end + 3, size_all))
             if found >= 0:
                 if not may_reject:
                     return p, n
