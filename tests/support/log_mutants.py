@@ -1,4 +1,4 @@
-"""Damaged logs, and whether the two ways of reading a log agree on them."""
+"""Drawn and damaged logs, and whether the two ways of reading a log agree on them."""
 
 import random
 import re
@@ -79,3 +79,39 @@ def assert_possible(frames: FrameTable):
     assert np.isin(frames.length, [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64]).all()
     shown = np.where(remote, 0, frames.length)
     assert not frames.data[np.arange(frames.data.shape[1]) >= shown[:, None]].any()
+
+
+def rows(frames):
+    """(time_ns, channel name, id, extended, flags, length, data as hex) of each frame."""
+    return [
+        (
+            int(frames.time_ns[k]),
+            frames.channels[frames.channel[k]],
+            int(frames.can_id[k]),
+            bool(frames.extended[k]),
+            FrameFlag(int(frames.flags[k])),
+            int(frames.length[k]),
+            frames.data[k, : 0 if frames.flags[k] & FrameFlag.REMOTE else frames.length[k]].tobytes().hex(),
+        )
+        for k in range(len(frames))
+    ]
+
+
+def varied(n, seed=1, names=("can0", 'bus "a", front', "bremse ä")):
+    """Return frames of all kinds."""
+    rng = np.random.default_rng(seed)
+    table = FrameTable.empty(n, 64, names)
+    fd = FrameFlag.FD
+    kinds = np.array(
+        [0, fd, fd | FrameFlag.BIT_RATE_SWITCH, fd | FrameFlag.ERROR_STATE, FrameFlag.REMOTE, FrameFlag.ERROR]
+    )[rng.integers(0, 6, n)]
+    lengths = np.where(kinds & fd, np.array([0, 5, 8, 12, 24, 64])[rng.integers(0, 6, n)], rng.integers(0, 9, n))
+    table.time_ns[:] = rng.integers(-(10**12), 10**12, n) * rng.choice([1, 1_700_000], n)
+    table.channel[:] = rng.integers(0, len(names), n)
+    table.extended[:] = (rng.random(n) < 0.5) & (kinds & FrameFlag.ERROR == 0)
+    table.can_id[:] = np.where(table.extended, rng.integers(0, 1 << 29, n), rng.integers(0, 1 << 11, n))
+    table.length[:] = lengths
+    table.flags[:] = kinds | np.where(rng.random(n) < 0.3, FrameFlag.SENT, 0)
+    table.data[:] = rng.integers(0, 256, (n, 64))
+    table.data[np.arange(64) >= np.where(kinds & FrameFlag.REMOTE, 0, lengths)[:, None]] = 0
+    return table

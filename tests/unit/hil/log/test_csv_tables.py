@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from log_mutants import COLUMNS, assert_alike, mutant, read_both
+from log_mutants import COLUMNS, assert_alike, mutant, read_both, rows, varied
 
 from hil.log import builder as builder_module
 from hil.log import lines
 from hil.log.csv_tables import COLUMNS as HEADER
 from hil.log.csv_tables import nanoseconds, write_csv
-from hil.log.frames import FrameFlag, FrameTable, LogError, LogFacts
+from hil.log.frames import FrameFlag, LogError, LogFacts
 from hil.log.read import open_log
 
 DATA = Path(__file__).parents[3] / "data" / "logs"
@@ -34,21 +34,6 @@ def read(tmp_path):
         return careful
 
     return read
-
-
-def rows(frames):
-    return [
-        (
-            int(frames.time_ns[k]),
-            frames.channels[frames.channel[k]],
-            int(frames.can_id[k]),
-            bool(frames.extended[k]),
-            FrameFlag(int(frames.flags[k])),
-            int(frames.length[k]),
-            frames.data[k, : 0 if frames.flags[k] & FrameFlag.REMOTE else frames.length[k]].tobytes().hex(),
-        )
-        for k in range(len(frames))
-    ]
 
 
 FD, BRS, ESI = FrameFlag.FD, FrameFlag.BIT_RATE_SWITCH, FrameFlag.ERROR_STATE
@@ -257,22 +242,6 @@ def test_a_python_can_row_that_is_no_frame_is_rejected(read, line):
 )
 def test_stamps_are_read_exactly(text, unit, expected):
     assert nanoseconds(text, unit) == expected
-
-
-def varied(n, seed=1, names=("can0", 'bus "a", front', "bremse ä")):
-    rng = np.random.default_rng(seed)
-    table = FrameTable.empty(n, 64, names)
-    kinds = np.array([0, FD, FD | BRS, FD | ESI, FrameFlag.REMOTE, FrameFlag.ERROR])[rng.integers(0, 6, n)]
-    lengths = np.where(kinds & FD, np.array([0, 5, 8, 12, 24, 64])[rng.integers(0, 6, n)], rng.integers(0, 9, n))
-    table.time_ns[:] = rng.integers(-(10**12), 10**12, n) * rng.choice([1, 1_700_000], n)
-    table.channel[:] = rng.integers(0, len(names), n)
-    table.extended[:] = (rng.random(n) < 0.5) & (kinds & FrameFlag.ERROR == 0)
-    table.can_id[:] = np.where(table.extended, rng.integers(0, 1 << 29, n), rng.integers(0, 1 << 11, n))
-    table.length[:] = lengths
-    table.flags[:] = kinds | np.where(rng.random(n) < 0.3, FrameFlag.SENT, 0)
-    table.data[:] = rng.integers(0, 256, (n, 64))
-    table.data[np.arange(64) >= np.where(kinds & FrameFlag.REMOTE, 0, lengths)[:, None]] = 0
-    return table
 
 
 def written(tables):
