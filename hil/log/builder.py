@@ -100,6 +100,7 @@ class FrameBuilder:
         times, channels, ids, wide, lengths, payload, bits = self.columns
         times[row], channels[row], ids[row] = time_ns, self.channel(channel), can_id
         wide[row], lengths[row], bits[row] = extended and not error, size, int(flags)
+        payload[row] = 0  # a compiled pass may have begun this row before it left the frame to the careful parser
         if not remote and size:
             payload[row, :size] = np.frombuffer(data, np.uint8)
         self.n += 1
