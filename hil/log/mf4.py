@@ -4,18 +4,19 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from datetime import timedelta
 
-import numpy as np
-
 from hil.log.account import Account
 from hil.log.builder import ROWS
 from hil.log.frames import FrameTable, LogError
 from hil.log.mdf_blocks import DamagedError, DataGroup, Group, MdfFile
+from hil.log.mdf_frames import write_mf4
 from hil.log.mdf_merge import merged
 from hil.log.mdf_records import Channels
 from hil.log.mdf_sorted import Share, sorted_frames
 from hil.log.mdf_unsorted import unsorted_frames
 from hil.log.source import ReadOptions, Source
 from hil.log.wall_clock import EPOCH, wall_clock_ns
+
+__all__ = ["read_mf4", "write_mf4"]
 
 MERGED_ROWS = 4 * ROWS  # of all groups together
 HELD_BYTES = 64 << 20  # of records and values, of all groups together
