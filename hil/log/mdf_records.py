@@ -208,42 +208,37 @@ class Layout:
         n = len(records)
         remote = self.group.kind == "CAN_RemoteFrame"
         code, stated = self._column(records, "DLC"), self._column(records, "DataLength")
-        held = np.full(n, self.width, np.int64)
+        held: npt.NDArray[np.int64] | int = self.width
         content: Bytes | None = None
         if self.data is not None and not remote:
             if self.data.kind == VLSD:
                 assert store is not None
                 held, content = store.values(unsigned(records, self.data).astype(np.uint64))
                 good &= held >= 0
-                held = np.maximum(held, 0)
             else:
                 content = _data_bytes(records, self.data, self.width)
-        by_code = self._by_code(code, edl, good) if code is not None else None
-        if stated is not None and not (remote and by_code is not None):
-            good &= stated <= np.array(64, stated.dtype)
-            length = np.minimum(stated, np.array(64, stated.dtype)).astype(np.uint8)
-            if code is not None:  # a classical DLC of 9 to 15 that was entered as the length, too
-                classical = flags & FrameFlag.FD == 0
-                over = (length > 8) & (length < 16) & classical & (code == stated)
-                if edl is not None and over.any():
-                    length[over] = 8
-        elif by_code is not None and not (self.data is not None and self.data.kind == VLSD and not remote):
-            length = by_code
+        if stated is not None and not (remote and code is not None):
+            length = np.minimum(stated, np.array(255, stated.dtype)).astype(np.uint8)
+        elif code is not None and (remote or not isinstance(held, np.ndarray)):
+            length = self._by_code(code, edl, good)
         else:
-            length = np.minimum(held, 64).astype(np.uint8)
+            length = np.clip(held, 0, 64).astype(np.uint8) + np.zeros(n, np.uint8)
         longest = int(length.max()) if n else 0
         if longest > 8:
-            if edl is None and not remote:
-                flags |= (length > 8).view(np.uint8) << np.uint8(2)
             fd = (flags & FrameFlag.FD) != 0
+            if edl is None and not remote:
+                fd = length > 8
+                flags |= fd.view(np.uint8) << np.uint8(2)
+            elif code is not None and not remote:  # a classical DLC of 9 to 15 that was entered as the length, too
+                length[(length > 8) & (length < 16) & ~fd & (code == length)] = 8
             good &= np.where(fd, FD_LENGTH[length], length <= 8)
         if remote or content is None:
             if not remote:
                 good &= length == 0
             return length, np.zeros((n, 8), np.uint8)
-        good &= length <= held
-        wide = longest > 8
-        return length, _masked(content, length, wide)
+        if longest > self.width or isinstance(held, np.ndarray):
+            good &= length <= held
+        return length, _masked(content, length, longest > 8)
 
     def _by_code(
         self, code: npt.NDArray[np.unsignedinteger], edl: Mask | None, good: Mask
@@ -374,14 +369,12 @@ def _masked(content: Bytes, length: npt.NDArray[np.uint8], wide: bool) -> Bytes:
     n, width = content.shape
     size = 64 if wide else 8
     if width >= size:
-        data = np.empty((n, size), np.uint8)
-        data[:] = content[:, :size]
+        words = content[:, :size].view(np.uint64).copy()
     else:
-        data = np.zeros((n, size), np.uint8)
-        data[:, :width] = content
-    words = data.view(np.uint64)
+        words = np.zeros((n, size // 8), np.uint64)
+        words.view(np.uint8)[:, :width] = content
     if wide:
         words &= KEPT_64[np.minimum(length, 64)]
     elif n and int(length.min()) < 8:
-        words[:, 0] &= KEPT_8[length]
-    return data
+        words[:, 0] &= np.take(KEPT_8, length, mode="clip")
+    return words.view(np.uint8)
