@@ -4,6 +4,7 @@ import struct
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +29,7 @@ class Gap:
 
 @dataclass(slots=True)
 class _Link:
-    """A data block in a list: its address, the length that the list tells (None: not told), and whether it is the last."""
+    """A data block in a list: its address, the length that the list tells (None: it does not), whether it is the last."""
 
     address: int
     length: int | None
@@ -206,7 +207,7 @@ class DataStream:
             (length,) = struct.unpack("<Q", self.mdf.bytes_at(begin, 8))
             return [length or None] * n
         offsets = struct.unpack(f"<{n}Q", self.mdf.bytes_at(begin, 8 * n))
-        lengths = [b - a for a, b in zip(offsets, offsets[1:], strict=False)]
+        lengths = [b - a for a, b in pairwise(offsets)]
         return [*lengths, None] if all(a > 0 for a in lengths) else [None] * n
 
     def _visit(self, address: int) -> None:

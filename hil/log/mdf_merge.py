@@ -13,7 +13,7 @@ LEAST = -(2**63)
 
 
 def keys_of(table: FrameTable, after: int) -> Keys:
-    """What frames are merged by: the latest stamp of their group so far, so that a stamp that runs back stays in place."""
+    """What frames are merged by: the latest stamp of their group so far: one that runs back stays in place."""
     keys: Keys = np.maximum.accumulate(np.maximum(table.time_ns, after))
     return keys
 

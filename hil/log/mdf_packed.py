@@ -19,7 +19,7 @@ try:
     from isal import isal_zlib as _fast  # twice as fast
 
     inflater: Callable[[], Any] = _fast.decompressobj
-    INFLATE_ERRORS: tuple[type[Exception], ...] = (zlib.error, _fast.error)
+    INFLATE_ERRORS: Any = (zlib.error, _fast.error)
 except ImportError:
     inflater = zlib.decompressobj
     INFLATE_ERRORS = (zlib.error,)
@@ -125,7 +125,9 @@ class _Inflation:
                 return content
             if self.inflate.eof or not (self.rest or self.input_left):
                 what = "the file ends within a packed block" if self.stored.cut else "a packed block is too short"
-                raise DamagedError(self.stored.address, f"{what}: {self.left} of {self.stored.length} bytes are missing")
+                raise DamagedError(
+                    self.stored.address, f"{what}: {self.left} of {self.stored.length} bytes are missing"
+                )
 
 
 class _Deflated:
@@ -176,7 +178,7 @@ def _whole(mdf: MdfFile, stored: Stored) -> bytes:
 
 
 class _Transposed:
-    """Stored column by column: all first bytes of the records, all second ones, ...; what is left over stands behind."""
+    """Stored column by column: all first bytes of the records, all second ones, ...; what is left over comes last."""
 
     def __init__(self, mdf: MdfFile, stored: Stored) -> None:
         assert stored.columns

@@ -1,7 +1,7 @@
 """Records of an MDF 4 file to columns of frames: strided views of whole blocks of records, no loop over frames."""
 
 from fractions import Fraction
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,7 @@ from hil.log.mdf_blocks import KINDS, VIRTUAL, VIRTUAL_MASTER, VLSD, DamagedErro
 
 Bytes = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.bool_]
+Numbers = npt.NDArray[Any]  # of uint8, uint16, uint32 or uint64
 MAX_CHANNEL = 255
 KIND_FLAGS = dict(zip(KINDS, (FrameFlag(0), FrameFlag.REMOTE, FrameFlag.ERROR), strict=True))
 CLASSICAL_OF_CODE = np.minimum(np.arange(16), 8).astype(np.uint8)
@@ -102,7 +103,9 @@ class Layout:
         if self.data is not None and self.data.kind == VLSD:
             self.width = 64
 
-    def frames(self, records: Bytes, store: ValueStore | None, times: Bytes | None, offset_of: "OffsetOf") -> FrameTable:
+    def frames(
+        self, records: Bytes, store: ValueStore | None, times: Bytes | None, offset_of: "OffsetOf"
+    ) -> FrameTable:
         """Frames of records (n, size), with bus channel numbers in place of the channels; what is none is rejected.
 
         Parameters
@@ -166,17 +169,17 @@ class Layout:
         byte = self.group.data_bytes + bit // 8
         if bit < 0 or byte >= records.shape[1]:  # all invalid; or the bits are kept apart
             return np.full(len(records), bit >= 0)
-        return (records[:, byte] >> (bit % 8)) & 1 == 0
+        valid: Mask = (records[:, byte] >> np.uint8(bit % 8)) & np.uint8(1) == 0
+        return valid
 
-    def _column(self, records: Bytes, name: str) -> npt.NDArray[np.unsignedinteger] | None:
+    def _column(self, records: Bytes, name: str) -> Numbers | None:
         """Unsigned values of a member, in the narrowest type that holds its bytes; None where it is missing."""
         member = self.members.get(name)
         if member is None:
             return None
         if member.kind == VIRTUAL or not member.bits:
-            raw: npt.NDArray[np.unsignedinteger] = np.zeros(len(records), np.uint64)
-            if member.kind == VIRTUAL:
-                raw = raw + np.arange(self.rows, self.rows + len(records), dtype=np.uint64)
+            first = self.rows if member.kind == VIRTUAL else 0
+            raw: Numbers = np.arange(first, first + len(records), dtype=np.uint64) * np.uint64(member.kind == VIRTUAL)
         else:
             raw = unsigned(records, member)
         if member.factor != 1 or member.offset:
@@ -240,9 +243,7 @@ class Layout:
             good &= length <= held
         return length, _masked(content, length, longest > 8)
 
-    def _by_code(
-        self, code: npt.NDArray[np.unsignedinteger], edl: Mask | None, good: Mask
-    ) -> npt.NDArray[np.uint8]:
+    def _by_code(self, code: Numbers, edl: Mask | None, good: Mask) -> npt.NDArray[np.uint8]:
         good &= code < np.array(16, code.dtype)
         narrow = (code & np.array(15, code.dtype)).astype(np.uint8)
         if edl is None:
@@ -329,7 +330,7 @@ def _fits(member: Member, size: int, data: bool) -> bool:
     return member.factor.denominator == 1 and member.offset.denominator == 1 and 0 <= member.factor < 2**32
 
 
-def unsigned(records: Bytes, member: Member) -> npt.NDArray[np.unsignedinteger]:
+def unsigned(records: Bytes, member: Member) -> Numbers:
     """Raw bits of a member, (n,), in the narrowest of uint8, uint16, uint32, uint64 that holds the bytes it touches."""
     touched = (member.bit + member.bits + 7) // 8
     big = member.data_type in (1, 3, 5)
@@ -341,7 +342,7 @@ def unsigned(records: Bytes, member: Member) -> npt.NDArray[np.unsignedinteger]:
     return value
 
 
-def _word(records: Bytes, first: int, n: int, big: bool) -> npt.NDArray[np.unsignedinteger]:
+def _word(records: Bytes, first: int, n: int, big: bool) -> Numbers:
     """``n`` bytes of every record as one number; parts of 4, 2 and 1 bytes where 1, 2, 4 or 8 do not fit."""
     if n == 1:
         return records[:, first]

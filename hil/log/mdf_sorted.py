@@ -50,7 +50,7 @@ class RecordStream:
         """Next records (n, stride), in a buffer that the next call writes over; None at the end."""
         stream, stride = self.stream, self.stride
         size = len(self.buffer) if most is None else min(len(self.buffer), most * stride)
-        view = memoryview(self.buffer)[:size]
+        view = self.buffer.data[:size]
         have = 0
         while True:
             begin = stream.position - have
@@ -95,7 +95,12 @@ class RecordStream:
 
 
 def sorted_frames(
-    mdf: MdfFile, data: DataGroup, group: Group, share: Share, account: Account, master_of: tuple[DataGroup, Group] | None
+    mdf: MdfFile,
+    data: DataGroup,
+    group: Group,
+    share: Share,
+    account: Account,
+    master_of: tuple[DataGroup, Group] | None,
 ) -> Iterator[FrameTable]:
     """Yield the frames of the only group of a data group.
 

@@ -1,4 +1,4 @@
-"""Frames of an unsorted data group of an MDF 4 file: records of several groups in one stream, in the order of writing."""
+"""Frames of an unsorted data group of an MDF 4 file: records of several groups in one stream, as they were written."""
 
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -85,7 +85,7 @@ class _StreamValues:
 
 def _pieces(content: Bytes, n: int) -> npt.NDArray[np.void]:
     """Pieces of ``n`` bytes that begin at every byte."""
-    return np.ndarray(max(0, len(content) - n + 1), f"V{n}", content, 0, 1)  # type: ignore[arg-type]
+    return np.ndarray(max(0, len(content) - n + 1), f"V{n}", content, 0, 1)
 
 
 class _Part:
@@ -194,7 +194,7 @@ class _Scanner:
         stream = self.stream
         while True:
             first = stream.position - have
-            got = stream.fill(memoryview(buffer)[have:])
+            got = stream.fill(buffer.data[have:])
             have += got
             n, at, why = scan(buffer, have, self.data.id_bytes, self.ids, self.sizes, numbers, begins)
             self._hand_out(buffer[:have], numbers[:n], begins[:n], first)

@@ -40,7 +40,7 @@ class Values:
             self.content = np.zeros(min(size, max(self.most, keep + n)) + PAD, np.uint8)
             self.content[:keep] = old
             self.begin, have = self.end - keep, keep
-        return memoryview(self.content)[have : have + n]
+        return self.content.data[have : have + n]
 
     def gap(self, n: int) -> None:
         """Go on behind ``n`` bytes that are not known; so are the values before."""
@@ -69,7 +69,7 @@ class Values:
 def numbers_at(content: Bytes, kind: str, at: npt.NDArray[np.int64]) -> npt.NDArray[np.unsignedinteger]:
     """Numbers at byte positions, which may be unaligned."""
     size = np.dtype(kind).itemsize
-    every: npt.NDArray[np.unsignedinteger] = np.ndarray(len(content) - size + 1, kind, content, 0, 1)  # type: ignore[arg-type]
+    every: npt.NDArray[np.unsignedinteger] = np.ndarray(len(content) - size + 1, kind, content, 0, 1)
     return every[at]
 
 

@@ -7,7 +7,7 @@ cut off later can be read up to there.
 import struct
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import IO
 from xml.sax.saxutils import escape
 
@@ -169,6 +169,7 @@ class MdfWriter:
             return self.add(b"CC", [0] * 4, struct.pack("<BBHHH4d", 1, 0, 0, 0, 2, 0.0, 0.0, *channel.linear))
         if channel.texts:
             values = list(channel.texts)
+            # no default: beside a conversion of numbers as default, asammdf 8.8 makes NaN of the named values
             refs = [*(self.text(text) for text in channel.texts.values()), 0]
             facts = struct.pack("<BBHHH2d", 7, 0, 0, len(refs), len(values), 0.0, 0.0)
             return self.add(b"CC", [0, 0, 0, 0, *refs], facts + struct.pack(f"<{len(values)}d", *values))
@@ -251,8 +252,3 @@ class GroupWriter:
         if self._lists:
             self._close_list()
         self.writer.patch(self.cycles_at, "<Q", self.cycles)
-
-
-def within(channel: Channel, offset: int) -> Channel:
-    """Return a channel that stands ``offset`` bytes farther behind."""
-    return replace(channel, byte=channel.byte + offset)

@@ -92,7 +92,9 @@ def _groups_of_frames(mdf: MdfFile, source: Source, account: Account) -> list[tu
 
 
 def _share(found: list[tuple[DataGroup, list[Group]]]) -> Share:
-    return Share(max(LEAST_ROWS, min(ROWS, MERGED_ROWS // len(found))), max(4096, min(16 << 20, HELD_BYTES // len(found))))
+    return Share(
+        max(LEAST_ROWS, min(ROWS, MERGED_ROWS // len(found))), max(4096, min(16 << 20, HELD_BYTES // len(found)))
+    )
 
 
 def _readers(
