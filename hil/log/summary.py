@@ -14,6 +14,7 @@ from hil.log.summary_state import CODES, Channel, Id, State, Whole, bin_edges
 FEW_FRAMES = 20_000  # a log of fewer is counted without the compiled pass, which takes half a second to load
 GAP = 2.5  # an interval longer than so many cycles is a gap
 CYCLIC_SHARE = 0.8  # of the intervals within half a median of the median: such an identifier is sent cyclically
+LEAST_SPAN_NS = 10_000_000  # shorter logs have no bus load
 _PS = 1_000_000_000_000
 
 BitRates = tuple[int | None, int | None]
@@ -27,7 +28,7 @@ class Cycle:
     Attributes
     ----------
     nominal_ns : what the database states, None where it states none.
-    p50_ns, p99_ns : half and 99 of 100 intervals are at most this long, within 0.4 %.
+    p50_ns, p99_ns : half and 99 of 100 intervals are at most this long, within 0.8 %: the roundest number near.
     gaps : intervals longer than 2.5 nominal cycles, or else 2.5 medians; None where the frames do not come cyclically.
     max_at_ns : stamp at which the longest interval begins.
     """
@@ -102,7 +103,7 @@ class ChannelSummary:
     bit_rate, data_bit_rate : bit/s, as given; None where unknown.
     load, worst_load : share of the time that the bus was busy, over all and in the worst second; every frame with all
         stuff bits it may need. None where the bit rate (or the data bit rate of CAN FD frames that switch to it) is
-        unknown.
+        unknown, and for logs too short to tell.
     bits_per_s, worst_bits_per_s : the same as bits, where ``load`` is None.
     worst_at_ns : where the worst second begins.
     """
@@ -252,7 +253,7 @@ class Statistics:
         rate, data_rate = self._bit_rates(name)
         known = rate is not None and (data_rate is not None or not of[Channel.SWITCHED])
         duration_ns = of[Channel.GREATEST] - of[Channel.LEAST]
-        mean = of[Channel.BUSY] / max(duration_ns, 1) if duration_ns > 0 else None
+        mean = of[Channel.BUSY] / duration_ns if duration_ns >= LEAST_SPAN_NS else None
         worst: float | None = float(of[Channel.WORST_BUSY])
         if duration_ns < 1_000_000_000:  # no whole second
             worst = None
@@ -276,6 +277,15 @@ class Statistics:
         )
 
 
+def _roundest(low: float, high: float) -> float:
+    """Return the number with the fewest digits from ``low`` to below ``high``: cycle times are made round."""
+    step = 10.0 ** np.floor(np.log10(high))
+    while np.ceil(low / step) * step >= high:
+        step /= 10
+    middle = float(np.round((low + high) / 2 / step) * step)
+    return middle if low <= middle < high else float(np.ceil(low / step) * step)
+
+
 def _cycle(one: list[int], histogram: npt.NDArray[np.uint32], nominal_ns: int | None) -> Cycle | None:
     n = one[Id.INTERVALS]
     if not n:
@@ -286,7 +296,7 @@ def _cycle(one: list[int], histogram: npt.NDArray[np.uint32], nominal_ns: int | 
 
     def percentile(share: float) -> float:
         place = int(np.searchsorted(sums, max(1, int(np.ceil(share * n)))))
-        return float(np.clip((edges[place] + edges[place + 1]) / 2, low, high))
+        return float(np.clip(_roundest(float(edges[place]), float(edges[place + 1])), low, high))
 
     def longer(limit_ns: float) -> int:
         first = int(np.searchsorted(edges[:-1], limit_ns))
