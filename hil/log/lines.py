@@ -56,6 +56,10 @@ def read_lines(source: Source, account: Account, parser: LineParser, fast: bool 
                 if at >= len(block) or builder.full:
                     continue
             stop = block.find(b"\n", at)
+            if stop - at > MAX_LINE_BYTES:
+                account.reject(offset + at, block[at : at + MAX_LINE_BYTES])
+                at = stop + 1
+                continue
             whole = parser.line(block[at:] if stop < 0 else block[at:stop], offset + at, builder)
             if stop < 0:
                 if not whole:
