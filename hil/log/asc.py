@@ -14,7 +14,7 @@ from hil.log.frames import FD_CODES, FrameFlag, FrameTable, LogFacts
 from hil.log.line_writer import header_start_ns, write_rows
 from hil.log.lines import read_lines
 from hil.log.source import ReadOptions, Source
-from hil.log.wall_clock import wall_clock_ns, wall_clock_of
+from hil.log.wall_clock import MAX_START_NS, wall_clock_ns, wall_clock_of
 from hil.log.write import numbered
 
 MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
@@ -69,7 +69,7 @@ class AscParser:
         """Add lines of the plain forms."""
         from hil.log.asc_pass import take_lines
 
-        if not (abs(self.start_ns) <= MAX_NS and abs(self.last_ns) <= MAX_NS):
+        if abs(self.last_ns) > MAX_NS:
             return begin
         state = np.array([self.last_ns, 0], np.int64)
         at = builder.fill(take_lines, buffer, begin, self.numbers, state, self.start_ns, self.relative, self.base)
@@ -129,7 +129,9 @@ class AscParser:
                 return None
             measured = words[1].lower() == b"start" and words[3:4] and words[3].lower() in (b"measurement", b"messung")
             if measured and self.trigger_ns is not None and self.trigger_ns != self.start_ns:
-                self._start(self.trigger_ns - self.last_ns)  # the measurement began with the trigger block
+                start_ns = self.trigger_ns - self.last_ns  # the measurement began with the trigger block
+                if abs(start_ns) <= MAX_START_NS:
+                    self._start(start_ns)
             self.account.passed_over["event"] += 1
             return False
         rest = words[3:] if fd else words[2:]
@@ -264,9 +266,10 @@ def _clock_ns(text: bytes, zone: tzinfo) -> int | None:
         hour = hour % 12 + (12 if half == "pm" else 0)
     try:
         clock = datetime(int(match[8]), month or 0, int(match[2]), hour, int(match[4]), int(match[5]))
-        return wall_clock_ns(clock, zone, int((match[6] or "").ljust(9, "0")))
+        start_ns = wall_clock_ns(clock, zone, int((match[6] or "").ljust(9, "0")))
     except (ValueError, OverflowError):
         return None
+    return start_ns if abs(start_ns) <= MAX_START_NS else None
 
 
 def write_asc(file: IO[bytes], tables: Iterable[FrameTable], facts: LogFacts, zone: tzinfo) -> None:

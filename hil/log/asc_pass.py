@@ -55,6 +55,9 @@ def take_lines(  # type: ignore[no-untyped-def]
     rows, width, size = times.shape[0], data.shape[1], buffer.shape[0]
     p, last = begin, state[0]
     while p < size and n < rows:
+        if buffer[p] == 10:
+            p += 1
+            continue
         start, taken = p, False
         while True:  # left by a break where the line is not taken
             bits, extended, can_id, count, request = 0, False, 0, 0, False

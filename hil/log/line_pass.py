@@ -23,7 +23,7 @@ _ERROR_SENT = _letters(" Tx   ErrorFrame\n")
 _CANFD = _letters(" CANFD ")
 _TRC_KINDS = _letters("DTFDFBFEBIRRER")
 _TRC_ERROR = _letters("        - ")
-_TRC_UNKNOWN = _letters(" -  5    08 00 00 00 00\n")
+_TRC_UNKNOWN = _letters(" -  5    08 00 00 00 00\r\n")
 _WORDS = np.frombuffer(b"remoteerror\0fd\0\0\0\0brs\0\0\0esi\0\0\0tx\0\0\0\0", np.uint8).reshape(6, 6)
 _WORD_LENGTHS = np.array([6, 5, 2, 3, 3, 2])
 
@@ -207,8 +207,8 @@ def trc_rows(out, columns, first, stop, numbers, start, before):  # type: ignore
                 out[at] = _BLANK
                 at += 1
             at = _bytes(out, at, data, row, count)
-        out[at] = _LINE_END
-        at += 1
+        out[at], out[at + 1] = 13, _LINE_END
+        at += 2
     return at
 
 
