@@ -135,6 +135,14 @@ def _bits(mask: int) -> Iterable[int]:
 
 def _report_overlaps(message: str, placed: list[Placed], warnings: Warnings) -> None:
     """Report signals that share a bit in one frame; branches of one multiplexer exclude each other."""
+    held = 0
+    for _, signal in placed:
+        mask = signal.mask()
+        if mask & held:
+            break
+        held |= mask
+    else:
+        return  # no two share a bit, multiplexed or not
     always = _Occupied()
     groups: dict[str, list[Placed]] = {}
     for position, signal in placed:

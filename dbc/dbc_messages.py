@@ -171,8 +171,7 @@ class DbcMessages:
     def _final_names(self, draft: Draft) -> dict[str, str]:
         """Names by what the text calls a signal, where the two differ; no two signals come to one name."""
         long_names, key = self._details.long_names, draft.key
-        odd = any(_ODD_LETTERS.search(s.name) for s in draft.signals)
-        if not odd and not long_names:
+        if not long_names and not _ODD_LETTERS.search("".join([s.name for s in draft.signals])):
             return {}
         final: dict[str, str] = {}
         uses: Counter[str] = Counter()

@@ -14,7 +14,7 @@ from dbc.database_values import Warnings, shown
 
 KEYWORDS = (
     "BA_DEF_DEF_REL_", "BA_DEF_DEF_", "BA_DEF_REL_", "BA_DEF_SGTYPE_", "BA_DEF_", "BA_REL_", "BA_SGTYPE_", "BA_",
-    "BO_TX_BU_", "BO_", "CAT_DEF_", "CAT_", "CM_", "ENVVAR_DATA_", "EV_DATA_", "FILTER", "NS_", "SGTYPE_VAL_",
+    "BO_TX_BU_", "BO_", "CAT_DEF_", "CAT_", "CM_", "ENVVAR_DATA_", "EV_DATA_", "NS_", "SGTYPE_VAL_",
     "SGTYPE_", "SG_MUL_VAL_", "SG_", "SIGTYPE_VALTYPE_", "SIG_GROUP_", "SIG_TYPE_REF_", "SIG_VALTYPE_", "VAL_TABLE_",
     "VAL_",
 )  # fmt: skip

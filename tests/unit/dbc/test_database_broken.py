@@ -81,6 +81,7 @@ TEXTS = [
     ('BO_ 1 M: 8 A SG_ S : 0|8@1+ (1,0) [0|0] "" B SG_ T : 8|8@1+ (1,0) [0|0] "" B', {1: "S T"}, None),
     ('BO_ 1 M: 8 SG_ S : 0|8@1+ (1,0) [0|0] "" B', {1: "S"}, None),
     ("BO_ 1 M : 8\n  A\nBO_ 2 N:8 A", {1: "", 2: ""}, None),
+    ('BO_ 1 M: 8 FILTER\n SG_ S : 0|8@1+ (1,0) [0|0] "" FILTER\n' + GOOD, {1: "OK S"}, None),
     ("BO_ 1 M: 8\nBO_ 2 N: 8", {1: "", 2: ""}, None),
     ("BO_\n1\nM:\n8\nA\n" + GOOD, {1: "OK"}, None),
     ("BO_ 1 M: 8 A\r\n" + GOOD + "\r\n", {1: "OK"}, None),
