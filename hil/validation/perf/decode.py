@@ -154,7 +154,7 @@ def _csv_to_signals(files: Files) -> Row:
         for i in range(len(few)):
             writer.on_message_received(
                 can.Message(
-                    timestamp=few.time_ns[i] / 1e9,
+                    timestamp=float(few.time_ns[i]) / 1e9,
                     arbitration_id=int(few.can_id[i]),
                     is_extended_id=False,
                     data=few.data[i, : few.length[i]].tobytes(),
