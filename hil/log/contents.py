@@ -2,7 +2,6 @@
 
 from collections import Counter
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from hil.log.integrity import Integrity, IntegrityCounter, has_profile_layout
 from hil.log.summary import BitRates, Statistics, Summary
 
 NO_FRAMES = SignalCount(0)
+MAX_PROTECTED = 65_535  # identifiers, over all channels
 
 
 @dataclass(slots=True)
@@ -77,7 +77,7 @@ class Contents:
     signals: dict[str, SignalSummary] = field(default_factory=dict)
     several_channels: bool = False
     _statistics: Statistics | None = None
-    _protected: dict[tuple[str, int, bool], tuple[str, IntegrityCounter]] = field(default_factory=dict)
+    _protected: dict[int, tuple[str, IntegrityCounter]] = field(default_factory=dict)
     _channels_of: dict[str, set[int]] = field(default_factory=dict)
     _by_group: dict[int, dict[int, Message]] = field(default_factory=dict)
     _names: tuple[str, ...] = ()
@@ -98,7 +98,10 @@ class Contents:
         for name, count in chunk.messages.items():
             self.messages[name] = self.messages[name] + count if name in self.messages else count
             came_on = self._channels_of.setdefault(name, set())
-            came_on.update(np.unique(table.channel[chunk.rows[name]]).tolist())
+            if len(table.channels) == 1:
+                came_on.add(0)
+            else:
+                came_on.update(np.flatnonzero(np.bincount(table.channel[chunk.rows[name]])).tolist())
             self.several_channels |= len(came_on) > 1
         for name, column in chunk.columns.items():
             message, _, signal = name.rpartition(".")
@@ -116,30 +119,30 @@ class Contents:
         return getattr(self.databases.of(channel), "bit_rate", None), None
 
     def _know_channels(self, channels: tuple[str, ...]) -> None:
-        for channel in channels[len(self._names) :]:
+        for number, channel in enumerate(channels[len(self._names) :], len(self._names)):
             for (can_id, extended), message in self.databases.of(channel).messages.items():
                 data_id = _data_id(self.databases, channel, message)
-                if data_id is not None and has_profile_layout(message):
+                if data_id is not None and has_profile_layout(message) and len(self._protected) < MAX_PROTECTED:
                     counter = IntegrityCounter(data_id, message.length, self.legacy)
-                    self._protected[channel, can_id, extended] = message.name, counter
+                    self._protected[number << 32 | extended << 31 | can_id] = message.name, counter
         self._names = channels
 
     def _check_protection(self, table: FrameTable) -> None:
         if not self._protected:
             return
-        plain = (table.flags & (FrameFlag.REMOTE | FrameFlag.ERROR)) == 0
-        ids = np.array(sorted({can_id for _, can_id, _ in self._protected}), np.uint32)
-        rows = np.flatnonzero(plain & np.isin(table.can_id, ids))
+        known = np.array(sorted(self._protected), np.int64)
+        rows = np.flatnonzero((table.flags & (FrameFlag.REMOTE | FrameFlag.ERROR)) == 0)
         key = table.channel[rows].astype(np.int64) << 32 | table.can_id[rows]
         key |= table.extended[rows].astype(np.int64) << 31
-        order = np.argsort(key, kind="stable")
-        rows, key = rows[order], key[order]
-        bounds = [0, *(np.flatnonzero(np.diff(key)) + 1).tolist(), len(key)]
-        for a, b in pairwise(bounds) if len(key) else ():
-            one = int(key[a])
-            found = self._protected.get((table.channels[one >> 32], one & 0x1FFF_FFFF, bool(one >> 31 & 1)))
-            if found is not None:
-                found[1].add(table.data[rows[a:b]], table.length[rows[a:b]])
+        place = np.minimum(np.searchsorted(known, key), len(known) - 1)
+        mine = known[place] == key
+        rows, number = rows[mine], place[mine].astype(np.uint16)  # small numbers are sorted ten times as fast
+        order = np.argsort(number, kind="stable")
+        rows = rows[order]
+        bounds = np.concatenate(([0], np.cumsum(np.bincount(number, minlength=len(known)))))
+        for k in np.flatnonzero(np.diff(bounds)).tolist():
+            some = rows[bounds[k] : bounds[k + 1]]
+            self._protected[int(known[k])][1].add(table.data[some], table.length[some])
 
     def summary(self) -> Summary:
         """Summary of the frames so far; cycle times stated by the databases are the nominal ones."""

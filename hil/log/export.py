@@ -22,7 +22,7 @@ from hil.log.frames import LogError
 from hil.log.value_names import value_names
 
 SUFFIXES = (".parquet", ".csv")
-CELLS_PER_BATCH = 4_000_000
+CELLS_PER_BATCH = 1_000_000
 
 
 def export(log: DecodedLog, path: Path, overwrite: bool = False, read: Iterable[Path] = ()) -> None:

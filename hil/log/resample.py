@@ -72,7 +72,7 @@ def _hold(block: Block, held: dict[str, Values]) -> None:
 def _rows(
     block: Block | None, fields: Sequence[Field], held: dict[str, Values], begin_ns: int, step_ns: int, a: int, b: int
 ) -> Iterator[Block]:
-    size = max(1024, 4_000_000 // max(1, len(fields)))
+    size = max(1024, 1_000_000 // max(1, len(fields)))
     for begin in range(a, b, size):
         end = min(b, begin + size)
         times = begin_ns + step_ns * np.arange(begin, end, dtype=np.int64)

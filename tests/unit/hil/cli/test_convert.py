@@ -23,7 +23,7 @@ def log(tmp_path):
 
 def test_text_counts_both_sides_and_the_exit_code_tells_what_is_missing(log, tmp_path, capsys):
     assert run(log, tmp_path / "b.log") == 1
-    out = capsys.readouterr().out
+    out = " ".join(capsys.readouterr().out.split())
     assert "2 frames read, 2 written, equal" in out
     assert "2 pieces of" in out
     assert "at byte 20: bad" in out
