@@ -27,7 +27,7 @@ FAST_INTERFACES = 256
 def read_pcap(source: Source, account: Account, options: ReadOptions) -> Iterator[FrameTable]:
     """Yield the CAN frames of a pcap file.
 
-    A record that is damaged is rejected, and reading goes on with the next two records in a row that look sound.
+    A record that is damaged is rejected, and reading goes on with the next that looks sound.
     The channel is can0; in a Linux cooked capture of version 2 it is if{n}, after the interface's index.
 
     Raises
@@ -129,7 +129,7 @@ class _Records:
         before = HEADER.get(self.link)
         if before is None:
             return captured > 0 or not strict
-        if captured < before + 8:
+        if captured < max(before, 8):
             return False
         if before:
             at = 16 if self.link == COOKED_2 else 30
@@ -138,7 +138,7 @@ class _Records:
                 return protocol != b"\x00\x0e" or bool(captured <= before + XL_BYTES)
         elif head[20:21] >= b"\x80":
             return bool(captured <= XL_BYTES)
-        return bool(captured <= before + FRAME_BYTES)
+        return bool(before + 8 <= captured <= before + FRAME_BYTES)
 
     def _advance(self) -> bool:
         return self.window.advance(_MAX_RECORD + 32 + FRAME_BYTES, self._candidates, self._followed)
@@ -150,9 +150,16 @@ class _Records:
         return np.flatnonzero((captured <= size) & (size <= _MAX_RECORD) & (captured > 0) & (fraction < limit))
 
     def _followed(self, at: int) -> bool:
+        """Whether a record begins at a place of the window: a frame of the usual form, or two records in a row."""
         data = self.window.data
         head = data[at : at + 16 + FRAME_BYTES]
         if not self._sound(head):
             return False
-        end = at + 16 + int(struct.unpack_from(self.order + "I", head, 8)[0])
+        captured, size = struct.unpack_from(self.order + "2I", head, 8)
+        end = at + 16 + captured
+        before = HEADER.get(self.link, 0)
+        if self.link in HEADER and captured == size and captured - before in (16, FRAME_BYTES) and end <= len(data):
+            frame = data[at + 16 + before : end]
+            if frame[4] <= len(frame) - 8 and not frame[6]:
+                return True
         return end == len(data) or self._sound(data[end : end + 16 + FRAME_BYTES])

@@ -214,6 +214,12 @@ def test_rubbish_between_records(read):
     assert account.first_rejected[0].offset == len(part)
 
 
+def test_good_frames_between_damaged_ones(read):
+    head, good = pcap(), pcap(can(1, b"1234"))[24:]
+    frames, account = read(head + (good.replace(b"\x10", b"\xff", 1) + good) * 50)
+    assert (len(frames), account.rejected) == (50, 50)
+
+
 def test_no_capture(tmp_path, read):
     with pytest.raises(LogError, match="no pcap file"):
         read(b"\xd4\xc3\xb2\xa1rubbish")
