@@ -131,6 +131,11 @@ class MdfFile:
     size : bytes of it that count.
     account : where damaged blocks are counted as rejected.
 
+    Raises
+    ------
+    DamagedError
+        When the file has not even an identification.
+
     Attributes
     ----------
     unfinalised : flags of what the writer left open; 0 for a finalised file.
@@ -154,7 +159,6 @@ class MdfFile:
         self.finalised = not head.startswith(b"UnFin")
         (version,) = struct.unpack_from("<H", head, 28)
         self.version = version or 400
-        self.major = self.version // 100
         self.unfinalised = 0 if self.finalised else struct.unpack_from("<H", head, 60)[0]
         self.start_ns = 0
         self.local_start = False

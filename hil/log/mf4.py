@@ -37,12 +37,12 @@ def read_mf4(source: Source, account: Account, options: ReadOptions) -> Iterator
         size = source.limit_bytes
         account.note(f"only the first {size} bytes are read")
         account.cut_at(size)
-    mdf = MdfFile(file, size, account)
     try:
+        mdf = MdfFile(file, size, account)
         mdf.describe()
     except DamagedError as error:
         raise LogError(source.path, f"no header of MDF 4: {error.problem}", error.offset) from error
-    if mdf.major != 4:
+    if mdf.version // 100 != 4:
         raise LogError(source.path, f"MDF version {mdf.version / 100:.2f}; 4.00 to 4.20 are read: convert it to MDF 4")
     _start(mdf, account, options)
     found = _groups_of_frames(mdf, source, account)
