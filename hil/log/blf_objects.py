@@ -63,7 +63,7 @@ class ObjectStream:
         self._more: list[bytes] = []  # blocks behind the tail
         self._position = 0  # in the stream, of the tail
         self.end = 0
-        self._need = 0  # bytes from the tail on that let it go on
+        self._need = 0  # fewest bytes from the tail on that may let it go on
         self._lost = False  # the next object is being searched, its lack is counted already
         self._origins: list[tuple[int, int]] = []  # stream position, file offset
         least, most = -(2**63) - start_ns, 2**63 - 1 - start_ns
@@ -109,8 +109,6 @@ class ObjectStream:
         buffer = np.frombuffer(block, np.uint8)
         at = 0
         while at < size and not self._need:
-            if self.builder.full:
-                yield self.builder.take()
             if self._lost:
                 at = self._search(block, at, final)
                 continue
@@ -121,6 +119,8 @@ class ObjectStream:
                 continue
             if self.outer:
                 yield None
+            if self.builder.full:
+                yield self.builder.take()
             if compiled:
                 before, at = at, self._pass(buffer, at, final)
                 if at > before or self._lost or self.builder.full:
@@ -192,7 +192,7 @@ class ObjectStream:
         whole = end <= len(block)
         landed = self._landed(block, end, final) if whole else None
         if landed is None and not final:
-            self._need = size + layout.LOOK + begin - at
+            self._need = max(end, len(block) + 1) - at
             return at, None
         if not landed:  # its size is wrong, or bytes are missing
             found = self._next_container(block, begin + OBJECT.size, end + 3)
@@ -213,7 +213,7 @@ class ObjectStream:
         begin, left = self._begin(block, at), len(block) - at
         if begin < 0:
             if left < layout.LOOK and not final:
-                self._need = layout.LOOK
+                self._need = left + 1
                 return at
             if left > layout.MAX_PADDING:
                 self._reject(at, f"bytes that are no object: {block[at : at + layout.LOOK]!r}")
@@ -240,7 +240,7 @@ class ObjectStream:
         end: int = begin + size
         landed = end <= len(block) if frame else self._landed(block, end, final) if end <= len(block) else None
         if not final and (end > len(block) or landed is None):
-            self._need = begin - at + size + layout.LOOK
+            self._need = max(end, len(block) + 1) - at
             return at
         one = block[begin:end]
         if not landed:
