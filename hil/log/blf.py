@@ -36,7 +36,7 @@ def read_blf(source: Source, account: Account, options: ReadOptions) -> Iterator
         expected = f"expected LOGG and a header of {layout.FILE_HEADER_SIZE} bytes, got {head[:16]!r}"
         raise LogError(source.path, f"no BLF file: {expected}; give a BLF file", 0)
     fields = layout.FILE_HEADER.unpack(head)
-    header_size, stated = fields[1], fields[7]
+    header_size, level, stated = fields[1], fields[4], fields[7]
     if not layout.FILE_HEADER.size <= header_size <= 1024:
         header_size = layout.FILE_HEADER_SIZE
     account.start_ns = layout.start_ns(fields[11:19], options.timezone)
@@ -46,7 +46,7 @@ def read_blf(source: Source, account: Account, options: ReadOptions) -> Iterator
     fast = True if options.fast is None and source.size > FEW_BYTES else options.fast
     outer = ObjectStream(builder, account.start_ns or 0, fast, outer=True)
     inner = ObjectStream(builder, account.start_ns or 0, fast)
-    for piece in Inflater().ahead(_file(source, outer, begin)):
+    for piece in Inflater(level).ahead(_file(source, outer, begin)):
         if isinstance(piece, FrameTable):
             yield piece
             continue

@@ -40,9 +40,15 @@ class Content:
 
 
 class Inflater:
-    """Inflates containers one after the other, and refuses them from where the file is a deflate bomb."""
+    """Inflates containers one after the other, and refuses them from where the file is a deflate bomb.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    level : compression level in the file's header; 0 says that containers of vblf are not compressed.
+    """
+
+    def __init__(self, level: int) -> None:
+        self._level = level
         self._inflated = 0
         self._wasted = 0  # bytes beyond what their containers stated
 
@@ -58,7 +64,7 @@ class Inflater:
             for piece in pieces:
                 if isinstance(piece, Container):
                     group.append(piece)
-                    size += piece.content_size + len(piece.body)
+                    size += (piece.content_size or 4 * len(piece.body)) + len(piece.body)
                     if size < GROUP_BYTES:
                         continue
                 jobs.append(pool.submit(self._contents, group))
@@ -74,10 +80,13 @@ class Inflater:
         return [self._content(container) for container in group]
 
     def _content(self, container: Container) -> Content:
-        offset, body, size = container.offset, container.body, container.content_size
+        offset, body, stated = container.offset, container.body, container.content_size
         if len(body) < layout.CONTAINER.size:
             return Content(offset, b"", "container without its header", container.cut)
         method, _ = layout.CONTAINER.unpack_from(body)
+        size = layout.MAX_CONTAINER if stated is None else stated
+        if stated is None and self._level == 0:
+            method, size = layout.STORED, len(body) - layout.CONTAINER.size
         if size > layout.MAX_CONTAINER:
             return Content(offset, b"", f"container of {size} bytes; at most {layout.MAX_CONTAINER} are read")
         left = FREE_BYTES + MAX_RATIO * (offset + len(body)) - self._inflated

@@ -25,17 +25,27 @@ REQUESTS, UNKNOWN = 256, 257  # where requests to send, and objects of types fro
 
 @dataclass(frozen=True, slots=True)
 class Container:
-    """A container in a file: its offset, its bytes behind the object header, and whether the file ends inside it."""
+    """A container in a file.
+
+    Attributes
+    ----------
+    offset : of it in the file.
+    header_size : as it states it; 16, but 32 as vblf writes it, which then states no size of the content.
+    body : its bytes from the first 16 on.
+    cut : the file ends inside it.
+    """
 
     offset: int
+    header_size: int
     body: bytes
     cut: bool = False
 
     @property
-    def content_size(self) -> int:
-        """Bytes of its content, as it states them."""
-        whole = len(self.body) >= layout.CONTAINER.size
-        return int(layout.CONTAINER.unpack_from(self.body)[1]) if whole else 0
+    def content_size(self) -> int | None:
+        """Bytes of its content as it states them; None where it does not."""
+        if self.header_size == layout.TIME_HEADER_SIZE or len(self.body) < layout.CONTAINER.size:
+            return None
+        return int(layout.CONTAINER.unpack_from(self.body)[1])
 
 
 class ObjectStream:
@@ -188,7 +198,7 @@ class ObjectStream:
         _, header, _, size, _ = OBJECT.unpack_from(block, begin)
         if not 16 <= header <= size <= layout.MAX_CONTAINER + 65_536:
             return None
-        end, offset, body = begin + size, self._offset(begin), begin + header
+        end, offset, body = begin + size, self._offset(begin), begin + OBJECT.size
         whole = end <= len(block)
         landed = self._landed(block, end, final) if whole else None
         if landed is None and not final:
@@ -197,8 +207,8 @@ class ObjectStream:
         if not landed:  # its size is wrong, or bytes are missing
             found = self._next_container(block, begin + OBJECT.size, end + 3)
             if found >= 0:
-                return found, Container(offset, block[body:found])
-        return min(end, len(block)), Container(offset, block[body:end], not whole)
+                return found, Container(offset, header, block[body:found])
+        return min(end, len(block)), Container(offset, header, block[body:end], not whole)
 
     def _next_container(self, block: bytes, begin: int, end: int) -> int:
         """Where the next container seems to begin, -1 for none; other objects may stand inside a stored one."""

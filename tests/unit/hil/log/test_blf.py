@@ -88,7 +88,8 @@ EIGHT, SOME = bytes(range(1, 9)), bytes(range(1, 65))
         (error_ext(flags=0x4000), ("can0", 0x123, False, 0, b"", F.ERROR | F.SENT)),
         (error_64(data=EIGHT), ("can0", 0x123, False, 8, EIGHT, F.ERROR)),
         (error_64(data=SOME[:12], dlc=9, kinds=0xC0), ("can0", 0x123, False, 12, SOME[:12], F.ERROR | F.FD | BRS)),
-        (error_64(0x80001234, flags=0x4000, kinds=0xA0), ("can0", 0x1234, False, 0, b"", F.ERROR | F.FD | ESI | F.SENT)),
+        (error_64(0x80001234, flags=0x4000, kinds=0xA0),
+         ("can0", 0x1234, False, 0, b"", F.ERROR | F.FD | ESI | F.SENT)),
     ],
 )  # fmt: skip
 def test_each_kind_of_frame(log_of, given, expected):
