@@ -51,7 +51,7 @@ def drawn(n, seed=3, wide=True):
         rows.append(
             (START + int(rng.integers(-(10**9), 10**12)), int(rng.integers(5)), can_id, extended, length, data, flags)
         )
-    return table_of(rows, ("can0", "can1", "can7", "can99", "can3"))
+    return table_of(rows, ("can0", "can1", "can7", "can254", "can3"))
 
 
 def written(path, tables, zone=UTC, **facts):
