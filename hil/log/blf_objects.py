@@ -25,17 +25,27 @@ REQUESTS, UNKNOWN = 256, 257  # where requests to send, and objects of types fro
 
 @dataclass(frozen=True, slots=True)
 class Container:
-    """A container in a file: its offset, its bytes behind the object header, and whether the file ends inside it."""
+    """A container in a file.
+
+    Attributes
+    ----------
+    offset : of it in the file.
+    header_size : as it states it; 16, but 32 as vblf writes it, which then states no size of the content.
+    body : its bytes from the first 16 on.
+    cut : the file ends inside it.
+    """
 
     offset: int
+    header_size: int
     body: bytes
     cut: bool = False
 
     @property
-    def content_size(self) -> int:
-        """Bytes of its content, as it states them."""
-        whole = len(self.body) >= layout.CONTAINER.size
-        return int(layout.CONTAINER.unpack_from(self.body)[1]) if whole else 0
+    def content_size(self) -> int | None:
+        """Bytes of its content as it states them; None where it does not."""
+        if self.header_size == layout.TIME_HEADER_SIZE or len(self.body) < layout.CONTAINER.size:
+            return None
+        return int(layout.CONTAINER.unpack_from(self.body)[1])
 
 
 class ObjectStream:
@@ -63,7 +73,7 @@ class ObjectStream:
         self._more: list[bytes] = []  # blocks behind the tail
         self._position = 0  # in the stream, of the tail
         self.end = 0
-        self._need = 0  # bytes from the tail on that let it go on
+        self._need = 0  # fewest bytes from the tail on that may let it go on
         self._lost = False  # the next object is being searched, its lack is counted already
         self._origins: list[tuple[int, int]] = []  # stream position, file offset
         least, most = -(2**63) - start_ns, 2**63 - 1 - start_ns
@@ -109,8 +119,6 @@ class ObjectStream:
         buffer = np.frombuffer(block, np.uint8)
         at = 0
         while at < size and not self._need:
-            if self.builder.full:
-                yield self.builder.take()
             if self._lost:
                 at = self._search(block, at, final)
                 continue
@@ -121,6 +129,8 @@ class ObjectStream:
                 continue
             if self.outer:
                 yield None
+            if self.builder.full:
+                yield self.builder.take()
             if compiled:
                 before, at = at, self._pass(buffer, at, final)
                 if at > before or self._lost or self.builder.full:
@@ -188,17 +198,17 @@ class ObjectStream:
         _, header, _, size, _ = OBJECT.unpack_from(block, begin)
         if not 16 <= header <= size <= layout.MAX_CONTAINER + 65_536:
             return None
-        end, offset, body = begin + size, self._offset(begin), begin + header
+        end, offset, body = begin + size, self._offset(begin), begin + OBJECT.size
         whole = end <= len(block)
         landed = self._landed(block, end, final) if whole else None
         if landed is None and not final:
-            self._need = size + layout.LOOK + begin - at
+            self._need = max(end, len(block) + 1) - at
             return at, None
         if not landed:  # its size is wrong, or bytes are missing
             found = self._next_container(block, begin + OBJECT.size, end + 3)
             if found >= 0:
-                return found, Container(offset, block[body:found])
-        return min(end, len(block)), Container(offset, block[body:end], not whole)
+                return found, Container(offset, header, block[body:found])
+        return min(end, len(block)), Container(offset, header, block[body:end], not whole)
 
     def _next_container(self, block: bytes, begin: int, end: int) -> int:
         """Where the next container seems to begin, -1 for none; other objects may stand inside a stored one."""
@@ -213,7 +223,7 @@ class ObjectStream:
         begin, left = self._begin(block, at), len(block) - at
         if begin < 0:
             if left < layout.LOOK and not final:
-                self._need = layout.LOOK
+                self._need = left + 1
                 return at
             if left > layout.MAX_PADDING:
                 self._reject(at, f"bytes that are no object: {block[at : at + layout.LOOK]!r}")
@@ -240,7 +250,7 @@ class ObjectStream:
         end: int = begin + size
         landed = end <= len(block) if frame else self._landed(block, end, final) if end <= len(block) else None
         if not final and (end > len(block) or landed is None):
-            self._need = begin - at + size + layout.LOOK
+            self._need = max(end, len(block) + 1) - at
             return at
         one = block[begin:end]
         if not landed:

@@ -91,6 +91,8 @@ def write_blf(file: IO[bytes], tables: Iterable[FrameTable], facts: LogFacts, zo
 def _start(time_ns: int, zone: tzinfo) -> int:
     """The start: the whole millisecond before, at a wall clock that is not shown twice when clocks are put back."""
     start_ns = time_ns // 1_000_000 * 1_000_000
+    if start_ns < -(2**63):
+        start_ns += 1_000_000
     for earlier in range(4):
         shown_once = start_ns - earlier * HOUR_NS
         if layout.start_ns(layout.system_time(shown_once, zone), zone) == shown_once:

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from blf_bytes import START_NS, classical, container, error, error_64, error_ext, fd, fd_64, file_of, marker, one
 
-from hil.log import blf
+from hil.log import blf_inflate
 from hil.log.frames import FrameFlag, LogError
 from hil.log.read import open_log
 from hil.log.source import ReadOptions
 
 DATA = Path(__file__).parents[3] / "data" / "logs"
 F = FrameFlag
+BRS, ESI = F.BIT_RATE_SWITCH, F.ERROR_STATE
 
 
 @pytest.fixture(params=[False, True], ids=["careful", "compiled"])
@@ -60,8 +61,8 @@ EIGHT, SOME = bytes(range(1, 9)), bytes(range(1, 65))
         (classical(data=EIGHT, dlc=3), ("can0", 0x123, False, 3, EIGHT[:3], F(0))),
         (classical(data=EIGHT, dlc=5, flags=0x80), ("can0", 0x123, False, 5, b"", F.REMOTE)),
         (classical(data=EIGHT, dlc=12, flags=0x81), ("can0", 0x123, False, 8, b"", F.REMOTE | F.SENT)),
-        (fd(data=SOME, dlc=15, kinds=3), ("can0", 0x123, False, 64, SOME, F.FD | F.BIT_RATE_SWITCH)),
-        (fd(data=SOME[:12], dlc=9, kinds=5, flags=1), ("can0", 0x123, False, 12, SOME[:12], F.FD | F.ERROR_STATE | F.SENT)),
+        (fd(data=SOME, dlc=15, kinds=3), ("can0", 0x123, False, 64, SOME, F.FD | BRS)),
+        (fd(data=SOME[:12], dlc=9, kinds=5, flags=1), ("can0", 0x123, False, 12, SOME[:12], F.FD | ESI | F.SENT)),
         (fd(data=SOME[:12], held=12), ("can0", 0x123, False, 12, SOME[:12], F.FD)),
         (fd(data=SOME[:12], held=4), ("can0", 0x123, False, 12, SOME[:4] + bytes(4) + bytes(4), F.FD)),
         (fd(data=SOME[:5], dlc=5, kinds=0), ("can0", 0x123, False, 5, SOME[:5], F(0))),
@@ -70,7 +71,7 @@ EIGHT, SOME = bytes(range(1, 9)), bytes(range(1, 65))
         (fd(data=b"", dlc=2, kinds=0, flags=0x80), ("can0", 0x123, False, 2, b"", F.REMOTE)),
         (fd(data=SOME[:10], dlc=9), ("can0", 0x123, False, 12, SOME[:10] + bytes(2), F.FD)),
         (fd_64(data=SOME[:12]), ("can0", 0x123, False, 12, SOME[:12], F.FD)),
-        (fd_64(0x80000001, SOME, dlc=15, kinds=0x7000), ("can0", 1, True, 64, SOME, F.FD | F.BIT_RATE_SWITCH | F.ERROR_STATE)),
+        (fd_64(0x80000001, SOME, dlc=15, kinds=0x7000), ("can0", 1, True, 64, SOME, F.FD | BRS | ESI)),
         (fd_64(data=SOME[:8], dlc=8, kinds=0), ("can0", 0x123, False, 8, SOME[:8], F(0))),
         (fd_64(data=SOME[:8], dlc=15, kinds=0), ("can0", 0x123, False, 8, SOME[:8], F(0))),
         (fd_64(data=b"", dlc=4, kinds=0x10), ("can0", 0x123, False, 4, b"", F.REMOTE)),
@@ -86,8 +87,9 @@ EIGHT, SOME = bytes(range(1, 9)), bytes(range(1, 65))
         (error_ext(0x9FFFFFFF, EIGHT, dlc=0x5D), ("can0", 0x1FFFFFFF, False, 8, EIGHT, F.ERROR)),
         (error_ext(flags=0x4000), ("can0", 0x123, False, 0, b"", F.ERROR | F.SENT)),
         (error_64(data=EIGHT), ("can0", 0x123, False, 8, EIGHT, F.ERROR)),
-        (error_64(data=SOME[:12], dlc=9, kinds=0xC0), ("can0", 0x123, False, 12, SOME[:12], F.ERROR | F.FD | F.BIT_RATE_SWITCH)),
-        (error_64(0x80001234, flags=0x4000, kinds=0xA0), ("can0", 0x1234, False, 0, b"", F.ERROR | F.FD | F.ERROR_STATE | F.SENT)),
+        (error_64(data=SOME[:12], dlc=9, kinds=0xC0), ("can0", 0x123, False, 12, SOME[:12], F.ERROR | F.FD | BRS)),
+        (error_64(0x80001234, flags=0x4000, kinds=0xA0),
+         ("can0", 0x1234, False, 0, b"", F.ERROR | F.FD | ESI | F.SENT)),
     ],
 )  # fmt: skip
 def test_each_kind_of_frame(log_of, given, expected):
@@ -168,7 +170,9 @@ def test_a_bad_object_is_one_rejected_piece_and_loses_no_frame(log_of, bad, copi
 
 
 def test_what_is_no_frame_is_counted_by_type(log_of):
-    content = marker() * 3 + classical() + one(72, bytes(40)) + one(300, bytes(8)) + one(256, bytes(8)) + one(3, bytes(8))
+    content = (
+        marker() * 3 + classical() + one(72, bytes(40)) + one(300, bytes(8)) + one(256, bytes(8)) + one(3, bytes(8))
+    )
     content += classical(flags=2) + fd_64(direction=2) + one(10, bytes(16))
     rows, account = log_of(file_of(container(content)))
     assert len(rows) == 1
@@ -183,7 +187,9 @@ def test_what_is_no_frame_is_counted_by_type(log_of):
 @pytest.mark.parametrize("method", [0, 2])
 def test_objects_cross_containers(log_of, size, method):
     objects = b"".join(
-        classical(can_id=i, data=bytes([i]), stamp=i) + fd_64(i, bytes(13)[: i % 8], dlc=i % 8, kinds=0) + bytes(i % 8 % 4)
+        classical(can_id=i, data=bytes([i]), stamp=i)
+        + fd_64(i, bytes(13)[: i % 8], dlc=i % 8, kinds=0)
+        + bytes(i % 8 % 4)
         for i in range(40)
     )
     pieces = [container(objects[at : at + size], method) for at in range(0, len(objects), size)]
@@ -248,9 +254,11 @@ def test_a_deflate_bomb_ends_at_the_stated_size(log_of, monkeypatch):
     bomb = container(bytes(20_000_000), size=1000)
     rows, account = log_of(file_of(container(classical()), bomb, container(classical())))
     assert (len(rows), account.rejected) == (2, 1)
-    monkeypatch.setattr(blf, "FREE_BYTES", 100_000)
-    monkeypatch.setattr(blf, "MAX_RATIO", 2)
-    rows, account = log_of(file_of(container(classical()), *[container(classical() * 20_000)] * 3, container(classical())))
+    monkeypatch.setattr(blf_inflate, "FREE_BYTES", 100_000)
+    monkeypatch.setattr(blf_inflate, "MAX_RATIO", 2)
+    rows, account = log_of(
+        file_of(container(classical()), *[container(classical() * 20_000)] * 3, container(classical()))
+    )
     assert account.rejected == 3
     assert len(rows) == 2
 
@@ -309,7 +317,9 @@ def test_start_time_is_a_wall_clock(log_of):
     assert account.notes == ["start time taken as Asia/Tokyo (the log names no zone)"]
 
 
-@pytest.mark.parametrize("start", [(0,) * 8, (2024, 13, 0, 1, 0, 0, 0, 0), (9999, 1, 0, 1, 0, 0, 0, 0), (1601, 1, 0, 1, 0, 0, 0, 0)])
+@pytest.mark.parametrize(
+    "start", [(0,) * 8, (2024, 13, 0, 1, 0, 0, 0, 0), (9999, 1, 0, 1, 0, 0, 0, 0), (1601, 1, 0, 1, 0, 0, 0, 0)]
+)
 def test_no_start_time(log_of, start):
     rows, account = log_of(file_of(classical(stamp=5), start=start))
     assert rows[0][0] == 5
@@ -335,7 +345,8 @@ CASES = {
     "channel-1.blf": [(10, 0x123, 2, 0)],
     "dlc-over-8.blf": [(10, 0x123, 8, 0), (20, 0x123, 8, 0), (30, 0xFF, 8, 2)],
     "error-frames.blf": [(10, 0x123, 2, 0), (20, 0, 0, 2), (30, 0x123, 8, 2), (40, 0, 0, 2)],
-    "nanoseconds.blf": [(456789, 0x123, 2, 0), (10457110, 0x123, 2, 0), (20457431, 0x123, 2, 0), (30457752, 0x123, 2, 0)],
+    "nanoseconds.blf": [(456789, 0x123, 2, 0), (10457110, 0x123, 2, 0), (20457431, 0x123, 2, 0),
+                        (30457752, 0x123, 2, 0)],
     "pre-trigger.blf": [(-2_000_000_000, 0x123, 2, 0), (-1_000_000, 0x123, 2, 0), (1_000_000, 0x123, 2, 0)],
     "wall-clock.blf": [(100_000_000, 0x123, 1, 0)],
 }  # fmt: skip
