@@ -54,20 +54,30 @@ class Assigner:
     ----------
     channels : names of all channels so far.
     unknown : identifiers that no database knows.
-    mixed : bool by slot, came on more than one channel.
+    several_channels : a message came on more than one channel.
     """
 
     lookup: Lookup
     channels: list[str] = field(default_factory=list)
     unknown: UnknownIds = field(default_factory=UnknownIds)
-    mixed: npt.NDArray[np.bool_] = field(init=False)
-    _first_channel: Ints = field(init=False)
+    _per_slot: Ints = field(init=False)
     _numbers: dict[str, int] = field(default_factory=dict)
     _hash: tuple[Ints, Ints] | None = None
 
     def __post_init__(self) -> None:
-        self.mixed = np.zeros(len(self.lookup.messages), np.bool_)
-        self._first_channel = np.full(len(self.lookup.messages), -1, np.int64)
+        self._per_slot = np.zeros((len(self.lookup.messages), 7), np.int64)
+        self._per_slot[:, 0], self._per_slot[:, 1] = self.lookup.lengths, self.lookup.longest
+        self._per_slot[:, 6] = -1
+
+    @property
+    def several_channels(self) -> bool:
+        """A message came on more than one channel."""
+        return bool((self._per_slot[:, 6] == -2).any())
+
+    def came_on(self, slot: int, channel: int) -> None:
+        """Take note of the channel (by number) that a message came on by other ways."""
+        first = self._per_slot[slot, 6]
+        self._per_slot[slot, 6] = channel if first in (-1, channel) else -2
 
     def numbers(self, channels: tuple[str, ...]) -> Ints:
         """Numbers of a table's channels among all channels."""
@@ -95,32 +105,37 @@ class Assigner:
         return way(table, words, networks, numbers)
 
     def _compiled(self, table: FrameTable, words: Words, networks: Ints, numbers: Ints) -> Assigned:
-        from hil.log.decode_pass import assign, fill_hash, scatter
+        from hil.log.decode_pass import assign_left, assign_standard, fill_hash, scatter
 
-        lookup, n, count = self.lookup, len(table), len(self.lookup.messages)
+        lookup, n, state = self.lookup, len(table), self._per_slot
         if self._hash is None:
             size = 1 << max(4, (2 * len(lookup.keys)).bit_length())
             self._hash = np.full(size, -1, np.int64), np.zeros(size, np.int64)
             fill_hash(lookup.keys, lookup.slots.astype(np.int64), SEED, *self._hash)
         self.unknown.hashed()
-        counts, short, longer = np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros(count, np.int64)
-        least = lookup.lengths.copy()
-        slots = np.empty(n, np.int32)
-        totals = np.zeros(7, np.int64)
-        totals[5] = self.unknown.kept
-        unknown = self.unknown.places, self.unknown.found, self.unknown.keys, self.unknown.counts
-        per_slot = lookup.lengths, lookup.longest, counts, least, short, longer, self._first_channel, self.mixed
+        state[:, 2:6] = 0
+        state[:, 3] = state[:, 0]
+        slots, left, totals = np.empty(n, np.int32), np.empty(n, np.int32), np.zeros(6, np.int64)
         frames = table.time_ns, table.channel, table.can_id, table.extended, table.length, table.flags
         columns = tuple(np.ascontiguousarray(column) for column in frames)
-        tables = lookup.dense, *self._hash, SEED, lookup.j1939
-        bad = assign(columns, (networks, numbers), tables, unknown, per_slot, slots, totals)
+        channels = networks, numbers
+        bad = assign_standard(columns, channels, lookup.dense, state, slots, left, totals)
         if bad >= 0:
             raise ValueError(_no_channel(table, bad))
-        errors, remotes, strangers, transports, further, self.unknown.kept, back = totals.tolist()
-        starts = np.concatenate(([0], np.cumsum(counts), [counts.sum() + transports])).astype(np.int64)
+        back, others = totals[:2].tolist()
+        totals[:] = [0, 0, 0, 0, 0, self.unknown.kept]
+        if others:
+            tables = *self._hash, SEED, lookup.j1939
+            unknown = self.unknown.places, self.unknown.found, self.unknown.keys, self.unknown.counts
+            assign_left(left[:others], columns, channels, tables, unknown, state, slots, totals)
+        errors, remotes, strangers, transports, further, self.unknown.kept = totals.tolist()
+        starts = np.zeros(len(state) + 2, np.int64)
+        np.cumsum(state[:, 2], out=starts[1:-1])
+        starts[-1] = starts[-2] + transports
         rows, first = np.empty(starts[-1], np.int64), np.empty(starts[-1], np.uint64)
         stride = len(words) // n if n else 1
         scatter(slots, words.view(np.int64), stride, starts[:-1].copy(), rows, first.view(np.int64))
+        least, short, longer = state[:, 3].copy(), state[:, 4].copy(), state[:, 5].copy()
         return Assigned(starts, rows, first, least, short, longer, errors, remotes, strangers, further, back == 0)
 
     def _by_numpy(self, table: FrameTable, words: Words, networks: Ints, numbers: Ints) -> Assigned:
@@ -128,12 +143,12 @@ class Assigner:
         error = (table.flags & FrameFlag.ERROR) != 0
         remote = ~error & ((table.flags & FrameFlag.REMOTE) != 0)
         data = ~(error | remote)
-        lost = data & ((table.channel < 0) | (table.channel >= len(networks)))
+        lost = (table.channel < 0) | (table.channel >= len(networks))
         if lost.any():
             raise ValueError(_no_channel(table, int(np.argmax(lost))))
         slots = np.full(n, -1, np.int64)
-        channel = np.where(data, table.channel, 0).astype(np.int64)
-        network = networks[channel] if len(networks) else np.full(n, -1, np.int64)
+        channel = table.channel.astype(np.int64)
+        network = networks[channel]
         can_id = table.can_id.astype(np.int64)
         known = data & (network >= 0)
         standard = np.flatnonzero(known & ~table.extended & (can_id < 2048))
@@ -166,9 +181,10 @@ class Assigner:
         np.add.at(longer, slot, length > lookup.longest[slot])
         for one in np.flatnonzero(np.diff(starts[:-1])).tolist():
             came = np.unique(numbers[table.channel[rows[starts[one] : starts[one + 1]]]])
-            if self._first_channel[one] < 0:
-                self._first_channel[one] = came[0]
-            self.mixed[one] |= bool((came != self._first_channel[one]).any())
+            if self._per_slot[one, 6] == -1:
+                self._per_slot[one, 6] = came[0]
+            if (came != self._per_slot[one, 6]).any():
+                self._per_slot[one, 6] = -2
         stride = len(words) // n if n else 1
         return Assigned(
             starts,

@@ -168,6 +168,7 @@ class Decoder:
                 log.transport.unknown[group if group in self._unknown_groups else OTHERS] += 1
             else:
                 found.setdefault(slot, []).append(one)
+                self._assigner.came_on(slot, numbers[one.channel])
             log.transport.joined += 1
         log.transport.frames = len(rows)
         log.decoded += len(rows)
@@ -217,7 +218,7 @@ class Decoder:
                 log.rows[plan.name] = group.rows
                 heads.append((plan.name, None))
                 parts.append((plan, pieces_of(plan, group)))
-        log.several_channels = bool(self._assigner.mixed.any())
+        log.several_channels = self._assigner.several_channels
         work_out_all(parts, fast, assigned.first)
         for (name, source), (_, pieces) in zip(heads, parts, strict=True):
             for piece in pieces:
@@ -247,7 +248,7 @@ def _frames_of(slot: int, plan: MessagePlan, table: FrameTable, words: Words, as
     """Frames of a message that hold a signal, and how many do not."""
     a, b = assigned.starts[slot : slot + 2].tolist()
     group = Group(assigned.rows[a:b], None, words, len(words) // len(table))
-    group.put_plane(assigned.first[a:b])
+    group.put_plane(assigned.first[a:b], a)
     if assigned.least[slot] >= plan.full:
         return group, 0
     group.lengths = table.length[group.rows]

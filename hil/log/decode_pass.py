@@ -40,20 +40,19 @@ def fill_hash(keys, values, seed, places, found):  # type: ignore[no-untyped-def
 
 
 @compiled
-def assign(columns, channels, tables, unknown, per_slot, slots, totals):  # type: ignore[no-untyped-def]
-    """Find the slot of every frame, and count.
+def assign_standard(columns, channels, dense, per_slot, slots, left, totals):  # type: ignore[no-untyped-def]
+    """Find the slot of every data frame with a standard identifier that a message has, and count.
 
     Parameters
     ----------
     columns : time_ns, channel, can_id, extended, length, flags of the frames.
     channels : network and number of each channel; -1 for a network without databases.
-    tables : dense (networks, 2048); places, found, seed of the hash table of keys; j1939 by network.
-    unknown : places, found, keys, counts of the identifiers that no database knows; kept between tables.
-    per_slot : lengths, longest, and to be filled in: count, least, short, longer, channel (-1 at first; kept between
-        tables), mixed (kept between tables).
-    slots : filled in, one a frame: -1 for a frame that no message and no transfer has, count of slots for a transfer.
-    totals : filled in: errors, remotes, unknown, transport frames, unknown of further identifiers, number of unknown
-        identifiers kept (kept between tables), stamps that run back.
+    dense : slot by network and standard identifier (networks, 2048), -1 for none.
+    per_slot : int64 (slots, 7): length and most bytes by the database; filled in: count, least length, shorter,
+        longer; channel of the first frame (-1 before it), or -2 where there are several, kept between tables.
+    slots : filled in, one a frame; -1 for all other frames.
+    left : filled in: rows of all other frames.
+    totals : filled in: stamps that run back, number of rows left.
 
     Returns
     -------
@@ -61,18 +60,60 @@ def assign(columns, channels, tables, unknown, per_slot, slots, totals):  # type
     """
     times, channel, ids, wide, length, flags = columns
     networks, numbers = channels
-    dense, places, found, seed, j1939 = tables
-    unknown_places, unknown_found, unknown_keys, unknown_counts = unknown
-    lengths, longest, count, least, short, longer, first_channel, mixed = per_slot
-    mask, unknown_mask = places.shape[0] - 1, unknown_places.shape[0] - 1
-    transfer, limit = lengths.shape[0], unknown_keys.shape[0]
-    errors = remotes = strangers = transports = further = back = 0
+    back, others = 0, 0
     before = times[0] if times.shape[0] else 0
     for i in range(times.shape[0]):
-        slots[i] = -1
         if times[i] < before:
             back += 1
         before = times[i]
+        c = int(channel[i])
+        if c < 0 or c >= networks.shape[0]:
+            return i
+        slot = -1
+        if networks[c] >= 0 and not flags[i] & (_ERROR | _REMOTE) and not wide[i] and ids[i] < 2048:
+            slot = int(dense[networks[c], ids[i]])
+        slots[i] = slot
+        if slot < 0:
+            left[others] = i
+            others += 1
+            continue
+        per_slot[slot, 2] += 1
+        if length[i] != per_slot[slot, 0]:
+            n = int(length[i])
+            if n < per_slot[slot, 0]:
+                per_slot[slot, 4] += 1
+                per_slot[slot, 3] = min(per_slot[slot, 3], n)
+            elif n > per_slot[slot, 1]:
+                per_slot[slot, 5] += 1
+        if numbers[c] != per_slot[slot, 6]:
+            per_slot[slot, 6] = numbers[c] if per_slot[slot, 6] == -1 else -2
+    totals[0] = back
+    totals[1] = others
+    return -1
+
+
+@compiled
+def assign_left(left, columns, channels, tables, unknown, per_slot, slots, totals):  # type: ignore[no-untyped-def]
+    """Find the slot of the other frames, and count; parameters as of `assign_standard`.
+
+    Parameters
+    ----------
+    left : rows of these frames.
+    tables : places, found, seed of the hash table of keys; j1939 by network.
+    unknown : places, found, keys, counts of the identifiers that no database knows; kept between tables.
+    slots : filled in; -1 for a frame that no message and no transfer has, count of slots for a transfer.
+    totals : filled in: errors, remotes, unknown, transport frames, unknown of further identifiers, number of unknown
+        identifiers kept (kept between tables).
+    """
+    _, channel, ids, wide, length, flags = columns
+    networks, numbers = channels
+    places, found, seed, j1939 = tables
+    unknown_places, unknown_found, unknown_keys, unknown_counts = unknown
+    mask, unknown_mask = places.shape[0] - 1, unknown_places.shape[0] - 1
+    transfer, limit, kept = per_slot.shape[0], unknown_keys.shape[0], int(totals[5])
+    errors, remotes, strangers, transports, further = 0, 0, 0, 0, 0
+    for k in range(left.shape[0]):
+        i = left[k]
         if flags[i] & (_ERROR | _REMOTE):
             if flags[i] & _ERROR:
                 errors += 1
@@ -80,53 +121,41 @@ def assign(columns, channels, tables, unknown, per_slot, slots, totals):  # type
                 remotes += 1
             continue
         c = int(channel[i])
-        if c < 0 or c >= networks.shape[0]:
-            return i
-        network = int(networks[c])
-        can_id = int(ids[i])
+        network, can_id = int(networks[c]), int(ids[i])
         slot = -1
-        if network >= 0:
-            if not wide[i]:
-                if can_id < 2048:
-                    slot = int(dense[network, can_id])
-            else:
-                for kind in range(3 if j1939[network] else 1):
-                    value = can_id
-                    if kind == 1:
-                        value = can_id & 0x3FF_FFFF
-                    elif kind == 2:
-                        value = (can_id >> 8) & 0x3FFFF
-                        if (value >> 8) & 0xFF < 240:
-                            value &= 0x3FF00
-                    key = network << 34 | kind << 32 | value
-                    at = _hash(key, int(seed), mask)
-                    while places[at] >= 0 and places[at] != key:
-                        at = (at + 1) & mask
-                    if places[at] >= 0:
-                        slot = int(found[at])
-                        break
-                if slot < 0 and j1939[network]:
-                    value = (can_id >> 8) & 0x3FF00
-                    if value in (_TP_CM, _TP_DT):
-                        slots[i] = transfer
-                        transports += 1
-                        continue
+        if network >= 0 and wide[i]:
+            for kind in range(3 if j1939[network] else 1):
+                value = can_id
+                if kind == 1:
+                    value = can_id & 0x3FF_FFFF
+                elif kind == 2:
+                    value = (can_id >> 8) & 0x3FFFF
+                    if (value >> 8) & 0xFF < 240:
+                        value &= 0x3FF00
+                key = network << 34 | kind << 32 | value
+                at = _hash(key, int(seed), mask)
+                while places[at] >= 0 and places[at] != key:
+                    at = (at + 1) & mask
+                if places[at] >= 0:
+                    slot = int(found[at])
+                    break
+            if slot < 0 and j1939[network]:
+                value = (can_id >> 8) & 0x3FF00
+                if value in (_TP_CM, _TP_DT):
+                    slots[i] = transfer
+                    transports += 1
+                    continue
         if slot >= 0:
             slots[i] = slot
-            count[slot] += 1
+            per_slot[slot, 2] += 1
             n = int(length[i])
-            if n != lengths[slot]:
-                if n < lengths[slot]:
-                    short[slot] += 1
-                    if n < least[slot]:
-                        least[slot] = n
-                elif n > longest[slot]:
-                    longer[slot] += 1
-            if numbers[c] != first_channel[slot]:
-                if first_channel[slot] < 0:
-                    first_channel[slot] = numbers[c]
-                else:
-                    mixed[slot] = True
+            if n < per_slot[slot, 0]:
+                per_slot[slot, 4] += 1
+                per_slot[slot, 3] = min(per_slot[slot, 3], n)
+            elif n > per_slot[slot, 1]:
+                per_slot[slot, 5] += 1
+            if numbers[c] != per_slot[slot, 6]:
+                per_slot[slot, 6] = numbers[c] if per_slot[slot, 6] == -1 else -2
             continue
         strangers += 1
         key = int(numbers[c]) << 32 | can_id
@@ -137,12 +166,12 @@ def assign(columns, channels, tables, unknown, per_slot, slots, totals):  # type
             at = (at + 1) & unknown_mask
         if unknown_places[at] >= 0:
             unknown_counts[unknown_found[at]] += 1
-        elif totals[5] < limit:
+        elif kept < limit:
             unknown_places[at] = key
-            unknown_found[at] = totals[5]
-            unknown_keys[totals[5]] = key
-            unknown_counts[totals[5]] = 1
-            totals[5] += 1
+            unknown_found[at] = kept
+            unknown_keys[kept] = key
+            unknown_counts[kept] = 1
+            kept += 1
         else:
             further += 1
     totals[0] = errors
@@ -150,8 +179,7 @@ def assign(columns, channels, tables, unknown, per_slot, slots, totals):  # type
     totals[2] = strangers
     totals[3] = transports
     totals[4] = further
-    totals[6] = back
-    return -1
+    totals[5] = kept
 
 
 @compiled

@@ -28,6 +28,7 @@ class Group:
     buffer: Words
     stride: int = 1
     at: Rows | None = None
+    begin: int | None = None
     _planes: dict[int, Words] = field(default_factory=dict)
 
     def plane(self, word: int) -> Words:
@@ -37,9 +38,10 @@ class Group:
             self._planes[word] = self.buffer[at + word]
         return self._planes[word]
 
-    def put_plane(self, words: Words) -> None:
-        """Set the first word of all frames, where it is known already."""
+    def put_plane(self, words: Words, begin: int | None = None) -> None:
+        """Set the first word of all frames, where it is known already, and where the assigned words hold it."""
         self._planes[0] = words
+        self.begin = begin
 
     def words(self, plan: SignalPlan) -> Words:
         """Words that hold a signal, see `SignalPlan.shift`."""
@@ -62,6 +64,7 @@ class Piece:
 
     Attributes
     ----------
+    begin : where the assigned words hold ``words``; None where they do not.
     rows : the frames, without those whose value is not available.
     n, sna, outside : frames, values not available, values out of range.
     """
@@ -69,7 +72,8 @@ class Piece:
     plan: SignalPlan
     words: Words
     rows: Rows
-    values: Values = field(default_factory=lambda: np.zeros(0, np.int64))
+    begin: int | None = None
+    values: Values = field(init=False)
     n: int = 0
     sna: int = 0
     outside: int = 0
@@ -104,7 +108,13 @@ def pieces_of(plan: MessagePlan, group: Group) -> list[Piece]:
                     cut[short] = base.take(np.flatnonzero(base.lengths >= one.end))
                 base = cut[short]
             there[one] = base
-    return [Piece(s, there[s].words(s), there[s].rows) for s in plan.signals if s.kept and len(there[s].rows)]
+    pieces = []
+    for signal in plan.signals:
+        group = there[signal]
+        if signal.kept and len(group.rows):
+            begin = group.begin if signal.word == 0 and not signal.straddles else None
+            pieces.append(Piece(signal, group.words(signal), group.rows, begin))
+    return pieces
 
 
 def _selected(
@@ -146,7 +156,7 @@ def work_out(piece: Piece) -> None:
 def work_out_all(parts: Sequence[tuple[MessagePlan, Sequence[Piece]]], fast: bool, base: Words) -> None:
     """Values of all signals; the compiled pass takes what it can.
 
-    ``base`` holds the words of most pieces, which are views of it.
+    ``base`` holds the words of the pieces that have a ``begin``.
     """
     compiled: list[Piece] = []
     numbers: list[int] = []
@@ -180,23 +190,24 @@ def _compiled(
     as_float = out.view(np.float64)
     counts = np.zeros((len(pieces), 2), np.int64)
     scratch = np.zeros(1024, np.int64)
-    begin = base.__array_interface__["data"][0]
     further: dict[int, int] = {}  # words outside of the base, each once
     extra: list[Words] = []
     size = 0
-    in_base = np.zeros(len(pieces), np.bool_)
+    in_base, begins = [False] * len(pieces), [0] * len(pieces)
     for i, piece in enumerate(pieces):
         words = piece.words
-        if words.base is base:
-            jobs[i, 1] = (words.__array_interface__["data"][0] - begin) // 8
+        if piece.begin is not None:
+            begins[i] = piece.begin
             in_base[i] = True
             continue
         if id(words) not in further:
             further[id(words)] = size
             extra.append(words)
             size += len(words)
-        jobs[i, 1] = further[id(words)]
-    for pool, chosen in ((base, in_base), (np.concatenate([*extra, base[:0]]), ~in_base)):
+        begins[i] = further[id(words)]
+    jobs[:, 1] = begins
+    inside = np.array(in_base)
+    for pool, chosen in ((base, inside), (np.concatenate([*extra, base[:0]]), ~inside)):
         some = np.flatnonzero(chosen)
         if not len(some):
             continue

@@ -129,10 +129,12 @@ class Lookup:
                     earlier = groups.get((WITHOUT_PRIORITY, can_id & 0x3FF_FFFF))
                     earlier = groups.get((GROUP, group_number(can_id))) if earlier is None else earlier
                     self.by_key.setdefault(key(number, IDENTIFIER, can_id), slot if earlier is None else earlier)
-            for (kind, value), slot in here.items():
-                if kind == WITHOUT_PRIORITY and (GROUP, group_number(value)) in groups:
-                    continue
-                groups.setdefault((kind, value), slot)
+            groups |= {
+                (kind, value): slot
+                for (kind, value), slot in here.items()
+                if (kind, value) not in groups
+                and not (kind == WITHOUT_PRIORITY and (GROUP, group_number(value)) in groups)
+            }
         for (kind, value), slot in groups.items():
             self.by_key[key(number, kind, value)] = slot
         self._dense.append(dense)
