@@ -377,3 +377,18 @@ def test_small_logs_are_read_without_the_compiled_pass_and_large_ones_with_it(tm
         with open_log(path) as log:
             assert sum(map(len, log.tables())) == copies
         assert bool(used) == compiled
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [container(NOISE, packed=damaged(zlib.compress(NOISE))), container(NOISE, size=100), container(NOISE)[:-100]],
+    ids=["damaged", "too-small", "cut"],
+)
+def test_without_isal_the_frames_are_the_same(log_of, monkeypatch, bad):
+    content = file_of(container(NOISE), bad, container(NOISE))
+    rows, account = log_of(content)
+    monkeypatch.setattr(blf_inflate, "INFLATE", zlib)
+    again, other = log_of(content)
+    assert rows[:50] == again[:50]
+    assert rows[-50:] == again[-50:]
+    assert (account.rejected, account.truncated_at) == (other.rejected, other.truncated_at)
