@@ -67,9 +67,8 @@ class LoopbackBus(can.BusABC):
         self._own_lost = 0
         self._lock = threading.RLock()  # held while the member or what stands above is used, never while waiting
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)  # own frames, or the end
-        self._close_wake = weakref.finalize(
-            self, os.close, self._wake
-        )  # not at shutdown: another thread may be waiting on it
+        # closed with the object, not at shutdown: another thread may be waiting on it
+        self._close_wake = weakref.finalize(self, os.close, self._wake)
         self._waiting = select.poll()
         self._waiting.register(self._member.fileno(), select.POLLIN)
         self._waiting.register(self._wake, select.POLLIN)

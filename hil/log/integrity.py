@@ -159,12 +159,8 @@ def has_profile_layout(message: Message) -> bool:
     The check value is the signal CRC in the first byte, the counter ALIVE_COUNTER in the low nibble of the second; the
     data id is the DBC's attribute E2EDataID, which the signals do not show.
     """
-    bits = {signal.name: signal.bits() for signal in message.signals}
-    return (
-        2 <= message.length <= 64
-        and bits.get(CRC_SIGNAL) == frozenset(range(8))
-        and bits.get(COUNTER_SIGNAL) == frozenset(range(8, 12))
-    )
+    masks = {signal.name: signal.mask() for signal in message.signals if signal.name in (CRC_SIGNAL, COUNTER_SIGNAL)}
+    return 2 <= message.length <= 64 and masks == {CRC_SIGNAL: 0x00FF, COUNTER_SIGNAL: 0x0F00}
 
 
 def check_integrity(recording: Recording, legacy: bool = False) -> dict[str, Integrity]:

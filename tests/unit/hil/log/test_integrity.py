@@ -9,7 +9,8 @@ from dbc import e2e
 from dbc.contract import contract, database_text
 from dbc.database import parse_database
 from dbc.frame import BusName
-from hil.log.frames import FrameBuilder, FrameFlag
+from hil.log.builder import FrameBuilder
+from hil.log.frames import FrameFlag
 from hil.log.integrity import Integrity, IntegrityCounter, check_frames, check_integrity, has_profile_layout
 
 PROTECTED = [spec for bus in BusName for spec in contract(bus).by_id.values() if spec.data_id is not None]
