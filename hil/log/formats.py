@@ -124,7 +124,8 @@ def format_of(source: Source) -> Format:
     """
     head = source.head()
     if not head:
-        raise LogError(source.path, "empty: no log in it; give a log file")
+        problem = "gzip file that cannot be unpacked" if source.packed else "empty: no log in it"
+        raise LogError(source.path, f"{problem}; give a log file")
     scores = [form.told_by(head) for form in FORMATS]
     if not max(scores):
         names = ", ".join(f.name for f in FORMATS)
