@@ -37,7 +37,13 @@ def read_parquet(source: Source, account: Account, options: ReadOptions) -> Iter
             source.path, f"has {source.size} bytes, more than the limit; a Parquet file can only be read as a whole"
         )
     file = source.random_access()
-    yield from frames_of(fenced_bytes(_READER, source.path, "Parquet reader", descriptor=file.fileno()), account)
+    pieces = fenced_bytes(_READER, source.path, "Parquet reader", descriptor=file.fileno())
+    import pyarrow as pa
+
+    try:
+        yield from frames_of(pieces, account)
+    except pa.ArrowException as error:
+        raise LogError(source.path, f"damaged Parquet file: {str(error).splitlines()[0]}") from error
 
 
 def frames_of(pieces: Iterator[bytes], account: Account) -> Iterator[FrameTable]:

@@ -134,7 +134,14 @@ def _channel(array: Any, name: str) -> Any:
     if not (pa.types.is_string(array.type) or pa.types.is_large_string(array.type)):
         raise _wrong(array, name, "string")
     array = pc.if_else(pc.less_equal(pc.binary_length(array), _MAX_NAME), array, None)
-    return array.cast(pa.string()).dictionary_encode()
+    return _coded(array, lambda name: name.decode("utf-8", "backslashreplace"), pa.string())
+
+
+def _coded(array: Any, meaning: Callable[[bytes], Any], kind: Any) -> Any:
+    """Texts as a dictionary of what they mean; they need not be sound UTF-8."""
+    coded = array.cast(pa.large_binary() if pa.types.is_large_string(array.type) else pa.binary()).dictionary_encode()
+    values = [meaning(text) for text in coded.dictionary.to_pylist()]
+    return pa.DictionaryArray.from_arrays(coded.indices, pa.array(values, kind))
 
 
 def _integer(array: Any, name: str) -> Any:
@@ -152,14 +159,13 @@ def _truth(array: Any, name: str) -> Any:
 def _flags(array: Any, name: str) -> Any:
     if not pa.types.is_string(array.type):
         return _integer(array, name)
-    coded = array.dictionary_encode()
-    bits = [_bits(text) for text in coded.dictionary.to_pylist()]
-    return pa.array(bits, pa.int64()).take(coded.indices)
+    coded = _coded(array, _bits, pa.int64())
+    return coded.dictionary.take(coded.indices)
 
 
-def _bits(text: str) -> int | None:
-    words = text.split()
-    return sum(1 << WORDS.index(word) for word in set(words)) if set(words) <= set(WORDS) else None
+def _bits(text: bytes) -> int | None:
+    words = set(text.decode("ascii", "replace").split())
+    return sum(1 << WORDS.index(word) for word in words) if words <= set(WORDS) else None
 
 
 def _data(array: Any, name: str) -> Any:

@@ -137,6 +137,12 @@ def test_many_rejected_rows_are_all_counted(tmp_path):
     assert (account.rejected, len(account.first_rejected), len(frames)) == (1000, 10, 0)
 
 
+def test_names_need_not_be_sound_utf8(tmp_path):
+    name = pa.array([b"a\xff"]).view(pa.string())
+    frames, _ = taken(in_old_layout(FrameTable.empty(1, channels=("a",)), channel=name), tmp_path / "a.parquet")
+    assert frames.channels == ("a\\xff",)
+
+
 def test_coarser_stamps(tmp_path):
     stamps = pa.array([1, -5, None, 2**62], pa.timestamp("ms", tz="UTC"))
     table = FrameTable.empty(4, channels=("a",)).to_arrow().set_column(0, "time", stamps)
