@@ -35,6 +35,9 @@ SCHEMA = pa.schema(
     ]
 )
 WORDS = ("remote", "error", "fd", "brs", "esi", "tx")  # of the flags, in the order of their bits
+FREE_ROWS, ROWS_PER_BYTE = 4_000_000, 4
+"""A file may have so many rows, and so many more for each of its bytes: repeated rows take next to no bytes, but time
+and memory when they are read."""
 _MAX_NAME = 1024
 _MAX_DATA = 64
 _UNITS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
@@ -70,7 +73,11 @@ def batches(path: Path) -> Iterator[bytes]:
             raise BrakebenchError(f"no table of frames: columns {', '.join(missing)} are missing (decoded signals?)")
         start = (file.schema_arrow.metadata or {}).get(START, b"")
         yield json.dumps({"start_ns": int(start) if start.lstrip(b"-").isdigit() else None}).encode()
+        size, rows = path.stat().st_size, 0
         for batch in file.iter_batches(ROWS, columns=list(columns), use_threads=False):
+            rows += len(batch)
+            if rows > FREE_ROWS + ROWS_PER_BYTE * size:
+                raise BrakebenchError(f"more than {FREE_ROWS + ROWS_PER_BYTE * size} rows in {size} bytes: no log")
             arrays = [
                 _TO_COLUMN[name](_flat(batch.column(batch.schema.get_field_index(name)), name), name)
                 for name in columns

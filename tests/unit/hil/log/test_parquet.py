@@ -178,6 +178,15 @@ def test_packed_and_limited(tmp_path):
         log.frames()
 
 
+def test_a_file_that_unpacks_to_far_too_many_rows(tmp_path, monkeypatch):
+    content = written([FrameTable.empty(50_000, channels=("a",))])
+    assert len(content) < 5_000
+    assert len(taken(content, tmp_path / "a.parquet")[0]) == 50_000
+    monkeypatch.setattr(parquet_columns, "FREE_ROWS", 20_000)
+    with pytest.raises(BrakebenchError, match="rows in .* bytes: no log"):
+        taken(content, tmp_path / "a.parquet")
+
+
 @pytest.mark.slow
 def test_mutants(tmp_path, monkeypatch):
     """All in one process behind the fence, which is begun anew where the library takes it down."""
