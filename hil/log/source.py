@@ -176,8 +176,7 @@ class GzipStream:
                 return b""
             self._inflater = _ZLIB.decompressobj(GZIP_BITS)
             self._begun = True
-        if not self._packed:
-            raise DamagedError("it ends early")
+        ended = not self._packed  # but content may still wait inside
         try:
             part: bytes = self._inflater.decompress(self._packed, size)
         except _ZLIB.error as error:
@@ -186,6 +185,8 @@ class GzipStream:
         self._packed = self._inflater.unconsumed_tail
         if self._inflater.eof:
             self._packed, self._inflater = self._inflater.unused_data, None
+        elif ended and not part:
+            raise DamagedError("it ends early")
         return part
 
 
