@@ -131,15 +131,14 @@ def _database(path: Path) -> Database:
         raise BrakebenchError(str(error)) from error
 
 
-def bit_rates(words: list[str]) -> tuple[BitRates, dict[str, BitRates]]:
-    """Bit rates of ``--bitrate``: of all channels, and by channel.
+def bit_rates(words: list[str]) -> dict[str, BitRates]:
+    """Bit rates of ``--bitrate`` by channel; "" stands for all others.
 
     Raises
     ------
     BrakebenchError
         For what is no bit rate.
     """
-    general: BitRates = (None, None)
     by_channel: dict[str, BitRates] = {}
     for word in words:
         channel, _, rates = word.rpartition("=")
@@ -152,12 +151,8 @@ def bit_rates(words: list[str]) -> tuple[BitRates, dict[str, BitRates]]:
                 f"--bitrate {word}: expected bit/s as 500000, 500000/2000000 (with the data bit rate of CAN FD) or "
                 "can0=500000"
             )
-        one: BitRates = (numbers[0], numbers[1] if len(numbers) == 2 else None)
-        if channel:
-            by_channel[channel] = one
-        else:
-            general = one
-    return general, by_channel
+        by_channel[channel] = numbers[0], numbers[1] if len(numbers) == 2 else None
+    return by_channel
 
 
 def words_of(text: list[str]) -> tuple[str, ...]:
