@@ -105,7 +105,7 @@ class Contents:
 
     def _rates(self, channel: str) -> BitRates:
         given = self._bit_rates.get(channel) or self._bit_rates.get("")
-        return given or (self.databases.of(channel).bit_rate, None)
+        return given or (self.databases.bit_rate(channel), None)
 
     def _know_channels(self, channels: tuple[str, ...]) -> None:
         for number, channel in enumerate(channels[len(self._names) :], len(self._names)):

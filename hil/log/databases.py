@@ -20,18 +20,20 @@ class Databases:
     general : of every channel that is not named in ``by_channel``; None where those have none.
     by_channel : by channel name.
     warnings : what was odd about them, and between them.
+    guessed : nobody named them; they are tried on a log that may be of another car.
     """
 
     general: Database | None
     by_channel: Mapping[str, Database] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    guessed: bool = False
     _groups: dict[int, dict[int, Message]] = field(default_factory=dict)
 
     @classmethod
     def own(cls) -> "Databases":
         """Our own two: bench.dbc for a channel named bench, brake.dbc for all others."""
         ours = own_databases()
-        return cls(ours[BusName.VEHICLE.value], {BusName.BENCH.value: ours[BusName.BENCH.value]})
+        return cls(ours[BusName.VEHICLE.value], {BusName.BENCH.value: ours[BusName.BENCH.value]}, guessed=True)
 
     @classmethod
     def joined(cls, general: Iterable[Database], by_channel: Mapping[str, Iterable[Database]]) -> "Databases":
@@ -54,6 +56,11 @@ class Databases:
     def of(self, channel: str) -> Database:
         """Database of a channel, one without messages where it has none."""
         return self.by_channel.get(channel, self.general or NONE)
+
+    def bit_rate(self, channel: str) -> int | None:
+        """Bit rate of a channel, bit/s; None where no database states it, or only a guessed one does."""
+        ours = channel in {bus.value for bus in BusName}  # our recordings name their channels so
+        return None if self.guessed and not ours else self.of(channel).bit_rate
 
     def all(self) -> list[Database]:
         """Every one of them."""
