@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from hil.cli.columns import terminal_width
@@ -21,9 +22,9 @@ from hil.cli.summary_json import summary_values
 from hil.cli.summary_text import summary_lines
 from hil.errors import BrakebenchError
 from hil.log.account import printable
+from hil.log.blocks import Block, Field, Layout, blocks_of
 from hil.log.choice import Choice, Moment
 from hil.log.contents import Contents
-from hil.log.databases import Databases
 from hil.log.several import Logs
 from hil.log.source import ReadOptions
 from hil.log.summary import Summary
@@ -66,9 +67,8 @@ def run(args: argparse.Namespace) -> int:
     """Summarise, write the signals, say what is missing."""
     databases_, files = databases(args.dbc)
     choice = _choice(args)
-    names = choice.check(databases_)
-    general, by_channel = bit_rates(args.bitrate)
-    contents = Contents(databases_, choice, by_channel, general, args.e2e_legacy)
+    wanted = choice.wanted(databases_)
+    contents = Contents(databases_, wanted, bit_rates(args.bitrate), args.e2e_legacy)
     _check_out(args)
     limit = None if args.limit_mb is None else int(args.limit_mb * 1_000_000)
     warnings = (*databases_.warnings, *(w for one in databases_.all() for w in one.warnings))
@@ -83,8 +83,8 @@ def run(args: argparse.Namespace) -> int:
         rows = None
         if args.out and (summary.frames or logs.whole):
             progress.part(1, "writing")
-            chosen = databases_.only(names) if choice.messages or choice.signals else databases_
-            rows = _write(args, logs, contents, summary, chosen, files, progress)
+            blocks = blocks_of(choice.frames(logs.tables(progress)), databases_.decoder(wanted))
+            rows = _write(args, blocks, contents, summary, [*files, *(part.path for part in logs.parts)])
     if args.json:
         values = summary_values(logs, contents, summary, warnings)
         print(json.dumps(values | {"out": args.out, "rows": rows}, allow_nan=False))
@@ -128,38 +128,22 @@ def _check_found(logs: Logs, choice: Choice, summary: Summary) -> None:
 
 
 def _write(
-    args: argparse.Namespace,
-    logs: Logs,
-    contents: Contents,
-    summary: Summary,
-    chosen: Databases,
-    files: list[Path],
-    progress: Progress,
+    args: argparse.Namespace, blocks: Iterable[Block], contents: Contents, summary: Summary, read: list[Path]
 ) -> int:
-    from hil.log.blocks import Field, Layout
-    from hil.log.chunks import blocks_of
     from hil.log.export_messages import write_signals
     from hil.log.resample import resampled
 
     fields = tuple(Field(one.message, one.signal, one.dtype) for one in contents.signals.values())
-    layout = Layout(
-        fields,
-        contents.several_channels and args.resample is None,
-        args.names,
-        summary.first_ns,
-        contents.channel_of(),
-    )
-    blocks = blocks_of(contents.choice.frames(logs.tables(progress)), chosen)
+    several = contents.counts.several_channels and args.resample is None
+    layout = Layout(fields, several, args.names, summary.first_ns, contents.channel_of())
     if args.resample is not None:
-        step_ns = round(args.resample * 1e9)
-        blocks = resampled(blocks, fields, summary.first_ns, summary.last_ns, step_ns)
-    read = [*files, *(part.path for part in logs.parts)]
+        blocks = resampled(blocks, fields, summary.first_ns, summary.last_ns, round(args.resample * 1e9))
     return write_signals(blocks, layout, args.out, args.force, read)
 
 
 def _exit_code(logs: Logs, contents: Contents, summary: Summary) -> int:
     """0 whole; 1 something of the log is missing; 2 no frame could be read."""
-    if logs.whole and not contents.rejected:
+    if logs.whole and not contents.counts.rejected:
         return 0
     if not summary.frames:
         print("brakebench: no frame could be read; give a CAN log", file=sys.stderr)

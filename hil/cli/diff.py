@@ -53,7 +53,6 @@ def run(args: argparse.Namespace) -> int:
     """Compare and say what differs."""
     databases_, _ = databases(args.dbc)
     choice = Choice(tuple(args.channel), messages=words_of(args.messages), signals=words_of(args.signals))
-    choice.check(databases_)
     tolerance = _tolerance(args.tolerance)
     options = ReadOptions(timezone=args.timezone)
     with Logs([args.first], options) as first, Logs([args.second], options) as second:

@@ -7,8 +7,9 @@ from datetime import UTC, datetime, tzinfo
 from pathlib import Path
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
-from dbc.database import Database, DatabaseError, parse_database
+from dbc.database import Database
 from hil.errors import BrakebenchError
+from hil.log.database_files import read_database
 from hil.log.databases import Databases
 from hil.log.source import STDIN
 from hil.log.summary import BitRates
@@ -24,8 +25,8 @@ def add_databases(parser: argparse.ArgumentParser) -> None:
         metavar="[CHANNEL=]FILE",
         action="append",
         default=[],
-        help="database of all channels, or of one; may be given several times. A channel with databases of its own "
-        "uses no other",
+        help="database (DBC, ARXML, KCD, SYM) of all channels, or of one; may be given several times. A channel with "
+        "databases of its own uses no other",
     )
 
 
@@ -117,29 +118,19 @@ def databases(words: list[str]) -> tuple[Databases, list[Path]]:
         path = Path(name)
         if path not in files:
             files.append(path)
-            read.append(_database(path))
+            read.append(read_database(path))
         (by_channel.setdefault(channel, []) if channel else general).append(read[files.index(path)])
     return Databases.joined(general, by_channel), files
 
 
-def _database(path: Path) -> Database:
-    try:
-        return parse_database(path.read_bytes(), str(path))
-    except OSError as error:
-        raise BrakebenchError(f"{path}: cannot be opened: {error.strerror or error}; give a DBC file") from error
-    except DatabaseError as error:
-        raise BrakebenchError(str(error)) from error
-
-
-def bit_rates(words: list[str]) -> tuple[BitRates, dict[str, BitRates]]:
-    """Bit rates of ``--bitrate``: of all channels, and by channel.
+def bit_rates(words: list[str]) -> dict[str, BitRates]:
+    """Bit rates of ``--bitrate`` by channel; "" stands for all others.
 
     Raises
     ------
     BrakebenchError
         For what is no bit rate.
     """
-    general: BitRates = (None, None)
     by_channel: dict[str, BitRates] = {}
     for word in words:
         channel, _, rates = word.rpartition("=")
@@ -152,12 +143,8 @@ def bit_rates(words: list[str]) -> tuple[BitRates, dict[str, BitRates]]:
                 f"--bitrate {word}: expected bit/s as 500000, 500000/2000000 (with the data bit rate of CAN FD) or "
                 "can0=500000"
             )
-        one: BitRates = (numbers[0], numbers[1] if len(numbers) == 2 else None)
-        if channel:
-            by_channel[channel] = one
-        else:
-            general = one
-    return general, by_channel
+        by_channel[channel] = numbers[0], numbers[1] if len(numbers) == 2 else None
+    return by_channel
 
 
 def words_of(text: list[str]) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from datetime import tzinfo
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,14 +15,12 @@ from hil.cli.log_options import LOGS, add_databases, add_force, add_timezone, da
 from hil.cli.progress import Progress
 from hil.errors import BrakebenchError
 from hil.log.atomic_write import atomic_write
-from hil.log.choice import Choice, Moment
-from hil.log.chunks import decode_chunk
-from hil.log.databases import Databases
-from hil.log.decode import Values
+from hil.log.choice import Choice, Moment, matches
+from hil.log.decode import Decoder
+from hil.log.decoded import Column, Values
 from hil.log.frames import FrameTable
 from hil.log.several import UNDATED_NS, Logs
 from hil.log.source import ReadOptions
-from hil.log.value_names import named_values
 from hil.log.wall_clock import wall_clock_of
 from hil.report.courses import Course, Courses, write_courses
 from hil.report.thin import thinned
@@ -60,9 +59,9 @@ def run(args: argparse.Namespace) -> int:
     databases_, files = databases(args.dbc)
     begin, end = (None if text is None else Moment.parse(text, args.timezone) for text in (args.begin, args.end))
     choice = Choice(tuple(args.channel), begin, end, signals=words_of(args.signal))
-    chosen = databases_.only(choice.check(databases_))
+    decoder = databases_.decoder(choice.wanted(databases_))
     with Logs(paths([args.log]), ReadOptions(timezone=args.timezone)) as logs, Progress() as progress:
-        gathered = gather(logs, chosen, choice, progress)
+        gathered = gather(logs, decoder, choice, progress)
         whole = logs.whole
         read = [*files, *(part.path for part in logs.parts)]
     if not gathered.signals:
@@ -115,7 +114,7 @@ class Signals:
     first_ns: int = 0
 
 
-def gather(logs: Logs, databases_: Databases, choice: Choice, progress: Progress) -> Signals:
+def gather(logs: Logs, decoder: Decoder, choice: Choice, progress: Progress) -> Signals:
     """Read the chosen signals of a log."""
     found = Signals()
 
@@ -127,9 +126,8 @@ def gather(logs: Logs, databases_: Databases, choice: Choice, progress: Progress
             yield table
 
     for table in choice.frames(noted(logs.tables(progress))):
-        for name, column in decode_chunk(table, databases_).columns.items():
-            message, _, signal = name.rpartition(".")
-            if not len(column.rows) or not choice.signal(message, signal):
+        for name, column in decoder.add(table).columns.items():
+            if not len(column.rows):
                 continue
             if name not in found.signals:
                 if len(found.signals) >= MOST_SIGNALS:
@@ -143,9 +141,8 @@ def order_of(choice: Choice, names: list[str]) -> list[str]:
     """Names in the order in which they were asked for."""
     ordered: dict[str, None] = {}
     for pattern in choice.signals:
-        one = Choice(signals=(pattern,))
-        ordered |= dict.fromkeys(name for name in names if one.signal(*_parts(name)))
-    return list(ordered)
+        ordered |= dict.fromkeys(name for name in names if matches(*_parts(name), pattern))
+    return list(ordered | dict.fromkeys(names))
 
 
 def _parts(name: str) -> tuple[str, str]:
@@ -181,13 +178,22 @@ def panels(gathered: Signals, names: list[str]) -> list[Courses]:
 def _names(one: Gathered, y: npt.NDArray[np.float64]) -> dict[float, str] | None:
     """Texts of the values that occur (ascending), where most of them have a name, or are bits; None for a quantity."""
     values = np.unique(y[np.isfinite(y)])
-    named = {float(value): text for value, text in named_values(one.signal, np.dtype(one.dtype)).items()}
     if one.signal.length == 1 and not one.signal.is_float:
         both = [raw * float(one.signal.factor) + float(one.signal.offset) for raw in (0, 1)]
         values = np.unique([*values, *both])
-    elif len(values) > MOST_NAMES or 2 * sum(value in named for value in values.tolist()) < max(1, len(values)):
+    elif len(values) > MOST_NAMES or 2 * len(_named(one, values)) < max(1, len(values)):
         return None
+    named = _named(one, values)
     return {value: f"{named[value]}  {value:g}" if value in named else f"{value:g}" for value in values.tolist()}
+
+
+def _named(one: Gathered, values: npt.NDArray[np.float64]) -> dict[float, str]:
+    """Names of those values that have one."""
+    if not one.signal.choices:
+        return {}
+    given: Any = values.astype(one.dtype)
+    texts = Column(one.signal, np.arange(len(values)), given).names()
+    return {value: text for value, text in zip(values.tolist(), texts.tolist(), strict=True) if text is not None}
 
 
 def _with_gaps(course: Course) -> Course:

@@ -5,6 +5,7 @@ from typing import Any
 
 from hil.log.contents import Contents, SignalSummary
 from hil.log.decode import NOT_A_FRAME
+from hil.log.decoded import SignalCount, TransportCount
 from hil.log.several import Logs, Part
 from hil.log.summary import Backwards, ChannelSummary, IdSummary, Summary
 
@@ -13,28 +14,40 @@ def summary_values(logs: Logs, contents: Contents, summary: Summary, warnings: t
     """Everything of the summary, by the keys that docs/json.md names."""
     lost = sum(part.account.rejected for part in logs.parts)
     cuts = [part.account.truncated_at for part in logs.parts if part.account.truncated_at is not None]
-    reasons = dict(contents.reasons) | ({NOT_A_FRAME: lost} if lost else {})
-    unknown = [one for one in summary.ids if contents.message(one.channel, one.can_id, one.extended) is None]
+    counts = contents.counts
+    reasons = dict(counts.reasons) | ({NOT_A_FRAME: lost} if lost else {})
+    unknown = [one for one in summary.ids if contents.name(one.channel, one.can_id, one.extended) is None]
     unknown_ids = {f"{one.channel} {one.name}": one.count for one in sorted(unknown, key=lambda one: -one.count)}
     return {
         "log": ", ".join(str(part.path) for part in logs.parts),
         "format": ", ".join(dict.fromkeys(part.format for part in logs.parts)),
         "frames": summary.frames + lost,
-        "decoded": contents.decoded,
-        "unknown": contents.unknown,
-        "rejected": contents.rejected + lost,
+        "decoded": counts.decoded,
+        "unknown": counts.unknown,
+        "rejected": counts.rejected + lost,
         "truncated_at": cuts[0] if cuts else None,
         "duration_s": summary.duration_s,
         "first_ns": summary.first_ns,
         "last_ns": summary.last_ns,
         "logs": [_part(part) for part in logs.parts],
-        "notes": logs.notes,
+        "notes": [*logs.notes, *counts.notes],
         "channels": {one.name: _channel(one) for one in summary.channels},
         "ids": [_id(one, contents) for one in summary.ids],
         "frames_of_other_ids": summary.other_frames,
         "stamps_back": _back(summary.backwards),
-        "messages": {name: {"count": one.count, "rate_hz": one.rate_hz} for name, one in contents.messages.items()},
-        "signals": {name: _signal(one) for name, one in contents.signals.items()},
+        "messages": {
+            name: {
+                "count": one.count,
+                "rate_hz": one.rate_hz,
+                "short": one.short,
+                "longer": one.longer,
+                "transported": one.transported,
+            }
+            for name, one in counts.messages.items()
+        },
+        "signals": {
+            name: _signal(one, counts.signals.get(name, SignalCount(0))) for name, one in contents.signals.items()
+        },
         "protection": {
             name: {
                 "received": one.received,
@@ -45,6 +58,7 @@ def summary_values(logs: Logs, contents: Contents, summary: Summary, warnings: t
             }
             for name, one in contents.protection().items()
         },
+        "transport": _transport(counts.transport),
         "unknown_ids": unknown_ids,
         "rejected_reasons": reasons,
         "first_rejected": [
@@ -53,6 +67,16 @@ def summary_values(logs: Logs, contents: Contents, summary: Summary, warnings: t
             for one in part.account.first_rejected
         ],
         "dbc_warnings": list(warnings),
+    }
+
+
+def _transport(one: TransportCount) -> dict[str, Any]:
+    return {
+        "frames": one.frames,
+        "joined": one.joined,
+        "broken": dict(one.broken),
+        "unknown": dict(one.unknown),
+        "open": one.open,
     }
 
 
@@ -95,13 +119,12 @@ def _channel(one: ChannelSummary) -> dict[str, Any]:
 
 
 def _id(one: IdSummary, contents: Contents) -> dict[str, Any]:
-    message = contents.message(one.channel, one.can_id, one.extended)
     cycle = one.cycle
     return {
         "channel": one.channel,
         "id": one.can_id,
         "extended": one.extended,
-        "message": None if message is None else message.name,
+        "message": contents.name(one.channel, one.can_id, one.extended),
         "count": one.count,
         "first_ns": one.first_ns,
         "last_ns": one.last_ns,
@@ -126,11 +149,11 @@ def _id(one: IdSummary, contents: Contents) -> dict[str, Any]:
     }
 
 
-def _signal(one: SignalSummary) -> dict[str, Any]:
+def _signal(one: SignalSummary, count: SignalCount) -> dict[str, Any]:
     return {
-        "count": one.count.n,
-        "not_available": one.count.sna,
-        "out_of_range": one.count.out_of_range,
+        "count": count.n,
+        "not_available": count.sna,
+        "out_of_range": count.out_of_range,
         "least": _finite(one.least),
         "greatest": _finite(one.greatest),
         "unit": one.signal.unit,

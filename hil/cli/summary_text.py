@@ -6,6 +6,7 @@ from datetime import tzinfo
 from hil.cli.columns import columns, wrapped
 from hil.log.contents import Contents, SignalSummary
 from hil.log.decode import NOT_A_FRAME
+from hil.log.decoded import DecodedCounts, SignalCount
 from hil.log.several import UNDATED_NS, Logs, Part
 from hil.log.summary import ChannelSummary, Cycle, IdSummary, Summary
 from hil.log.wall_clock import wall_clock_of
@@ -19,13 +20,14 @@ def summary_lines(
     logs: Logs, contents: Contents, summary: Summary, zone: tzinfo, width: int, warnings: tuple[str, ...]
 ) -> list[str]:
     """Lines of at most ``width`` letters, where names and notes can be broken."""
+    counts = contents.counts
     lines = [line for part in logs.parts for line in wrapped(_part(part), width)]
-    lines += wrapped(_account(logs, contents, summary, zone), width)
+    lines += wrapped(_account(logs, counts, summary, zone), width)
     if summary.channels:
         lines += ["", *_channels(summary, width)]
     if summary.ids:
         lines += ["", *_ids(contents, summary, width)]
-    notes = [*_notes(logs, contents, summary), *_warned(warnings)]
+    notes = [*_notes(logs, contents, counts, summary), *_warned(warnings)]
     if notes:
         lines.append("")
     return lines + [line for note in notes for line in wrapped(note, width, "    ")]
@@ -35,18 +37,17 @@ def _part(part: Part) -> str:
     return f"{part.path}: {part.format}, {_count(part.frames, 'frame')}"
 
 
-def _account(logs: Logs, contents: Contents, summary: Summary, zone: tzinfo) -> str:
-    rejected = contents.rejected + sum(part.account.rejected for part in logs.parts)
+def _account(logs: Logs, counts: DecodedCounts, summary: Summary, zone: tzinfo) -> str:
+    rejected = counts.rejected + sum(part.account.rejected for part in logs.parts)
     when = ""
     if summary.frames:
         when = f" in {summary.duration_s:.3f} s"
         if summary.first_ns >= UNDATED_NS:
             stamp = wall_clock_of(summary.first_ns, zone).isoformat(" ", "milliseconds")
             when += f" from {stamp} {zone}"
-    total = summary.frames + rejected - contents.rejected
+    total = summary.frames + rejected - counts.rejected
     return (
-        f"{_count(total, 'frame')}{when}: {contents.decoded:,} decoded, {contents.unknown:,} unknown, "
-        f"{rejected:,} rejected"
+        f"{_count(total, 'frame')}{when}: {counts.decoded:,} decoded, {counts.unknown:,} unknown, {rejected:,} rejected"
     )
 
 
@@ -101,12 +102,11 @@ def _ids(contents: Contents, summary: Summary, width: int) -> Iterator[str]:
     heads = ("channel", "id", "message", "frames", "stated", "min", "p50", "p99", "max ms", "gaps")
     rows = []
     for one in summary.ids[:SHOWN_IDS]:
-        message = contents.message(one.channel, one.can_id, one.extended)
         rows.append(
             (
                 one.channel if several else "",
                 one.name[2:].upper(),
-                "-" if message is None else message.name,
+                contents.name(one.channel, one.can_id, one.extended) or "-",
                 f"{one.count:,}",
                 *_cycle(one.cycle),
             )
@@ -132,9 +132,9 @@ def _some(notes: list[str], more: str) -> Iterator[str]:
         yield f"{more}: and {len(notes) - SHOWN} more (all of them with --json)"
 
 
-def _notes(logs: Logs, contents: Contents, summary: Summary) -> Iterator[str]:
+def _notes(logs: Logs, contents: Contents, counts: DecodedCounts, summary: Summary) -> Iterator[str]:
     """What the reader should know beside the numbers: what is lost first."""
-    yield from _losses(logs, contents)
+    yield from _losses(logs, counts)
     back = summary.backwards
     if back is not None:
         where = _seconds(back.time_ns - summary.began_ns)
@@ -146,9 +146,7 @@ def _notes(logs: Logs, contents: Contents, summary: Summary) -> Iterator[str]:
     ids = summary.ids
 
     def name(one: IdSummary) -> str:
-        message = contents.message(one.channel, one.can_id, one.extended)
-        named = "" if message is None else f" {message.name}"
-        return f"{one.channel} {one.name}{named}"
+        return f"{one.channel} {one.name} {contents.name(one.channel, one.can_id, one.extended) or ''}".rstrip()
 
     gaps = [(one, one.cycle) for one in ids if one.cycle is not None and one.cycle.gaps]
     gaps.sort(key=lambda pair: pair[1].max_ns / max(pair[1].p50_ns, 1.0), reverse=True)
@@ -170,15 +168,17 @@ def _notes(logs: Logs, contents: Contents, summary: Summary) -> Iterator[str]:
         "length",
     )
     signals = contents.signals
-    yield from _some([_outside(name, one) for name, one in signals.items() if one.count.out_of_range], "out of range")
-    yield from _some(
-        [
-            f"not available: {name} in {one.count.sna:,} of {_count(one.count.n, 'frame')}"
-            for name, one in signals.items()
-            if one.count.sna
-        ],
-        "not available",
-    )
+    found = {name: count for name, count in counts.signals.items() if name in signals}
+    outside = [_outside(name, signals[name], count) for name, count in found.items() if count.out_of_range]
+    yield from _some(outside, "out of range")
+    missing = [
+        f"not available: {name} in {count.sna:,} of {_count(count.n, 'frame')}"
+        for name, count in found.items()
+        if count.sna
+    ]
+    yield from _some(missing, "not available")
+    yield from counts.notes
+    yield from _transport(counts)
     unknown = sorted((one for one in ids if _is_unknown(contents, one)), key=lambda one: -one.count)
     if unknown:
         shown = ", ".join(f"{one.channel} {one.name} ({one.count:,})" for one in unknown[:SHOWN_UNKNOWN])
@@ -189,10 +189,10 @@ def _notes(logs: Logs, contents: Contents, summary: Summary) -> Iterator[str]:
 
 
 def _is_unknown(contents: Contents, one: IdSummary) -> bool:
-    return contents.message(one.channel, one.can_id, one.extended) is None
+    return contents.name(one.channel, one.can_id, one.extended) is None
 
 
-def _losses(logs: Logs, contents: Contents) -> Iterator[str]:
+def _losses(logs: Logs, counts: DecodedCounts) -> Iterator[str]:
     for part in logs.parts:
         account = part.account
         if account.rejected:
@@ -204,7 +204,7 @@ def _losses(logs: Logs, contents: Contents) -> Iterator[str]:
             yield f"{part.path}: {count:,} {kind} passed over"
         yield from (f"{part.path}: {note}" for note in account.notes)
     yield from logs.notes
-    yield from (f"rejected: {count:,} {reason}" for reason, count in contents.reasons.items())
+    yield from (f"rejected: {count:,} {reason}" for reason, count in counts.reasons.items())
 
 
 def _protection(contents: Contents) -> Iterator[str]:
@@ -228,13 +228,25 @@ def _protection(contents: Contents) -> Iterator[str]:
         yield f"end-to-end protection: {_count(sound, 'message')} sound"
 
 
-def _outside(name: str, one: SignalSummary) -> str:
+def _transport(counts: DecodedCounts) -> Iterator[str]:
+    """J1939 transfers that came to nothing."""
+    transport = counts.transport
+    for reason, count in transport.broken.items():
+        yield f"J1939 transport: {_count(count, 'transfer')} broken: {reason}"
+    if transport.open:
+        yield f"J1939 transport: {_count(transport.open, 'transfer')} unfinished at the end"
+    if transport.unknown:
+        shown = ", ".join(f"{name} ({count:,})" for name, count in transport.unknown.most_common(SHOWN_UNKNOWN))
+        yield f"J1939 transport: no message of the database for {shown}"
+
+
+def _outside(name: str, one: SignalSummary, count: SignalCount) -> str:
     signal = one.signal
     unit = f" {signal.unit}" if signal.unit else ""
-    return (
-        f"out of range: {name} in {one.count.out_of_range:,} of {_count(one.count.n, 'frame')} "
-        f"({one.least:g} to {one.greatest:g}{unit}, stated {signal.minimum:g} to {signal.maximum:g})"
-    )
+    low, high = ("-" if end is None else f"{end:g}" for end in (signal.minimum, signal.maximum))
+    values = "" if one.least is None else f"{one.least:g} to {one.greatest:g}{unit}, "
+    where = f"{count.out_of_range:,} of {_count(count.n, 'frame')}"
+    return f"out of range: {name} in {where} ({values}stated {low} to {high})"
 
 
 def _warned(warnings: tuple[str, ...]) -> Iterator[str]:

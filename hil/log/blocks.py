@@ -1,6 +1,6 @@
 """Decoded rows on their way to a file, whatever its format."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dbc.database import Signal
-from hil.log.decode import Values
-
-Rows = npt.NDArray[np.int64]
+from hil.log.decode import Decoder
+from hil.log.decoded import DecodedLog, Rows, Values
+from hil.log.frames import FrameTable
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,3 +66,16 @@ class Layout:
     names: bool = False
     start_ns: int = 0
     channel_of: Mapping[str, str] = field(default_factory=dict)
+
+
+def block_of(log: DecodedLog) -> Block:
+    """Return decoded frames as rows to be written, one row per frame."""
+    frames = log.recording.frames
+    columns = {name: (column.rows, column.values) for name, column in log.columns.items()}
+    return Block(frames.time_ns, frames.channel, frames.channels, columns, log.rows)
+
+
+def blocks_of(tables: Iterable[FrameTable], decoder: Decoder) -> Iterator[Block]:
+    """Yield the signals of tables as rows to be written, one row per frame."""
+    for table in tables:
+        yield block_of(decoder.add(table))

@@ -89,35 +89,38 @@ class Choice:
                 mask &= table.time_ns <= _bounded(self.end, first_ns)
             yield table if mask.all() else table.take(mask)
 
-    def signal(self, message: str, signal: str) -> bool:
-        """Tell whether a signal is chosen."""
-        if self.messages and not any(fnmatchcase(message, pattern) for pattern in self.messages):
-            return False
-        return not self.signals or any(_matches(message, signal, pattern) for pattern in self.signals)
-
-    def check(self, databases: Databases) -> set[str]:
-        """Return the names of messages with a chosen signal.
+    def wanted(self, databases: Databases) -> list[str] | None:
+        """Names ("MESSAGE.SIGNAL") of the chosen signals; None for all.
 
         Raises
         ------
         BrakebenchError
             For a pattern that matches nothing of the databases.
         """
+        if not self.messages and not self.signals:
+            return None
         names = [(message.name, signal.name) for message in databases.messages() for signal in message.signals]
-        for pattern in self.messages:
-            if not any(fnmatchcase(message.name, pattern) for message in databases.messages()):
-                raise BrakebenchError(f"no message of the database is called {pattern!r}{_known(names, 0)}")
-        for pattern in self.signals:
-            if not any(_matches(*name, pattern) for name in names):
+        found: dict[str, None] = {}
+        for pattern in self.signals or ("*",):
+            matched = [name for name in names if matches(*name, pattern)]
+            if not matched:
                 raise BrakebenchError(f"no signal of the database is called {pattern!r}{_known(names, 1)}")
-        return {message for message, signal in names if self.signal(message, signal)}
+            found |= dict.fromkeys(f"{m}.{s}" for m, s in matched if not self.messages or self._of_message(m))
+        for pattern in self.messages:
+            if not any(fnmatchcase(message, pattern) for message, _ in names):
+                raise BrakebenchError(f"no message of the database is called {pattern!r}{_known(names, 0)}")
+        return list(found)
+
+    def _of_message(self, message: str) -> bool:
+        return any(fnmatchcase(message, pattern) for pattern in self.messages)
 
 
 def _bounded(moment: Moment, first_ns: int) -> int:
     return max(-MOST_NS, min(MOST_NS, moment.time_ns + (first_ns if moment.relative else 0)))
 
 
-def _matches(message: str, signal: str, pattern: str) -> bool:
+def matches(message: str, signal: str, pattern: str) -> bool:
+    """Tell whether a pattern means a signal: ``MESSAGE.SIGNAL``, or the signal alone where it has no dot."""
     return fnmatchcase(f"{message}.{signal}" if "." in pattern else signal, pattern)
 
 

@@ -1,23 +1,19 @@
 """What a log holds by its databases: messages, signals and their ranges, end-to-end protection, unknown frames."""
 
-from collections import Counter
-from dataclasses import dataclass, field
+from collections.abc import Collection
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from dbc.contract import MessageSpec, contract
-from dbc.database import Database, Message, Signal
-from dbc.frame import BusName
-from hil.log.choice import Choice
-from hil.log.chunks import MessageCount, SignalCount, decode_chunk
+from dbc.database import Signal
 from hil.log.databases import Databases
-from hil.log.decode import Column
+from hil.log.decode import DecodedCounts, DecodedLog
+from hil.log.decoded import Column
 from hil.log.frames import FrameFlag, FrameTable
 from hil.log.integrity import Integrity, IntegrityCounter, has_profile_layout
 from hil.log.summary import BitRates, Statistics, Summary
 
-NO_FRAMES = SignalCount(0)
 MAX_PROTECTED = 65_535  # identifiers, over all channels
 
 
@@ -27,22 +23,19 @@ class SignalSummary:
 
     Attributes
     ----------
-    message, signal : as the database has them.
+    message, signal : as the database has them; the message with its source address where several nodes send it.
     dtype : of its values.
-    count : how often it came, and how often without a value or outside its range.
     least, greatest : of the finite values, None without one.
     """
 
     message: str
     signal: Signal
     dtype: np.dtype[Any]
-    count: SignalCount = NO_FRAMES
     least: float | int | None = None
     greatest: float | int | None = None
 
-    def add(self, column: Column, count: SignalCount) -> None:
-        """Count the values of one table."""
-        self.count += count
+    def add(self, column: Column) -> None:
+        """Look at the values of one table."""
         values = column.values
         finite = values[np.isfinite(values)] if values.dtype.kind == "f" else values
         if len(finite):
@@ -51,79 +44,75 @@ class SignalSummary:
             self.greatest = greatest if self.greatest is None else max(self.greatest, greatest)
 
 
-@dataclass(slots=True)
 class Contents:
     """Counts the tables of a log by its databases; all of it in memory that does not grow with the log.
 
+    Parameters
+    ----------
+    wanted : messages and signals that `signals` has, as of `hil.log.decode.Decoder`; None for all.
+    bit_rates : of channels by name; a channel that is not named has that of "", else its database's.
+    legacy : check end-to-end protection by the check value of older recordings.
+
     Attributes
     ----------
-    decoded, unknown, rejected : frames of a message, of none, and shorter than their message.
-    errors, remotes : error frames and remote frames, which are among the unknown ones.
-    messages, signals : by name; signals as ``MESSAGE.SIGNAL``, those of the choice that the log has.
-    several_channels : a message came on more than one channel.
+    signals : by ``MESSAGE.SIGNAL``, those that the log has.
+    unmatched : wanted names that the databases do not have.
     """
 
-    databases: Databases
-    choice: Choice = field(default_factory=Choice)
-    bit_rates: dict[str, BitRates] = field(default_factory=dict)
-    bit_rate: BitRates = (None, None)
-    legacy: bool = False
-    fast: bool | None = None
-    decoded: int = 0
-    unknown: int = 0
-    rejected: int = 0
-    reasons: Counter[str] = field(default_factory=Counter)
-    messages: dict[str, MessageCount] = field(default_factory=dict)
-    signals: dict[str, SignalSummary] = field(default_factory=dict)
-    several_channels: bool = False
-    _statistics: Statistics | None = None
-    _protected: dict[int, tuple[str, IntegrityCounter]] = field(default_factory=dict)
-    _channels_of: dict[str, set[int]] = field(default_factory=dict)
-    _by_group: dict[int, dict[int, Message]] = field(default_factory=dict)
-    _names: tuple[str, ...] = ()
+    def __init__(
+        self,
+        databases: Databases,
+        wanted: Collection[str] | None = None,
+        bit_rates: dict[str, BitRates] | None = None,
+        legacy: bool = False,
+    ) -> None:
+        self.databases = databases
+        self.signals: dict[str, SignalSummary] = {}
+        self._legacy = legacy
+        self._bit_rates = bit_rates or {}
+        self._statistics = Statistics(self._rates)
+        self._decoder = databases.decoder(wanted)
+        self._protected: dict[int, tuple[str, IntegrityCounter]] = {}
+        self._channels_of: dict[str, set[int]] = {}
+        self._names: tuple[str, ...] = ()
+
+    @property
+    def counts(self) -> DecodedCounts:
+        """Account of the frames so far; put together anew at every call."""
+        return self._decoder.totals
 
     def add(self, table: FrameTable) -> None:
         """Count further frames."""
-        if self._statistics is None:
-            self._statistics = Statistics(self._rates, self.fast)
         self._statistics.add(table)
         self._know_channels(table.channels)
         if not len(table):
             return
-        chunk = decode_chunk(table, self.databases)
-        self.decoded += chunk.decoded
-        self.unknown += chunk.unknown
-        self.rejected += chunk.rejected
-        self.reasons.update(chunk.reasons)
-        for name, count in chunk.messages.items():
-            self.messages[name] = self.messages[name] + count if name in self.messages else count
+        log = self._decoder.add(table)
+        self._note_channels(log, table)
+        for name, column in log.columns.items():
+            if name not in self.signals:
+                self.signals[name] = SignalSummary(name.rpartition(".")[0], column.signal, column.values.dtype)
+            self.signals[name].add(column)
+        self._check_protection(table)
+
+    def _note_channels(self, log: DecodedLog, table: FrameTable) -> None:
+        for name, rows in log.rows.items():
             came_on = self._channels_of.setdefault(name, set())
             if len(table.channels) == 1:
                 came_on.add(0)
             else:
-                came_on.update(np.flatnonzero(np.bincount(table.channel[chunk.rows[name]])).tolist())
-            self.several_channels |= len(came_on) > 1
-        for name, column in chunk.columns.items():
-            message, _, signal = name.rpartition(".")
-            if self.choice.signal(message, signal):
-                if name not in self.signals:
-                    self.signals[name] = SignalSummary(message, column.signal, column.values.dtype)
-                self.signals[name].add(column, chunk.signals[name])
-        self._check_protection(table)
+                came_on.update(np.flatnonzero(np.bincount(table.channel[rows])).tolist())
 
     def _rates(self, channel: str) -> BitRates:
-        if channel in self.bit_rates:
-            return self.bit_rates[channel]
-        if self.bit_rate != (None, None):
-            return self.bit_rate
-        return getattr(self.databases.of(channel), "bit_rate", None), None
+        given = self._bit_rates.get(channel) or self._bit_rates.get("")
+        return given or (self.databases.bit_rate(channel), None)
 
     def _know_channels(self, channels: tuple[str, ...]) -> None:
         for number, channel in enumerate(channels[len(self._names) :], len(self._names)):
             for (can_id, extended), message in self.databases.of(channel).messages.items():
-                data_id = _data_id(self.databases, channel, message)
+                data_id = message.e2e_data_id
                 if data_id is not None and has_profile_layout(message) and len(self._protected) < MAX_PROTECTED:
-                    counter = IntegrityCounter(data_id, message.length, self.legacy)
+                    counter = IntegrityCounter(data_id, message.length, self._legacy)
                     self._protected[number << 32 | extended << 31 | can_id] = message.name, counter
         self._names = channels
 
@@ -148,25 +137,17 @@ class Contents:
         """Summary of the frames so far; cycle times stated by the databases are the nominal ones."""
 
         def nominal_ns(channel: str, can_id: int, extended: bool) -> int | None:
-            message = self.message(channel, can_id, extended)
-            return None if message is None else _cycle_ns(self.databases, channel, message)
+            message = self.databases.message(channel, can_id, extended)
+            return round(message.cycle_time_ms * 1e6) if message is not None and message.cycle_time_ms else None
 
-        return (self._statistics or Statistics()).result(nominal_ns)
+        return self._statistics.result(nominal_ns)
 
-    def message(self, channel: str, can_id: int, extended: bool) -> Message | None:
-        """Message of an identifier, None where no database describes it."""
-        database = self.databases.of(channel)
-        message = database.messages.get((can_id, extended))
-        if message is None and extended:
-            message = self._groups(database).get(_group(can_id))
-        return message
-
-    def _groups(self, database: Database) -> dict[int, Message]:
-        """J1939 messages of a database by parameter group number, whatever address they come from."""
-        if id(database) not in self._by_group:
-            matched = [m for m in database.messages.values() if getattr(m, "pgn_match", False)]
-            self._by_group[id(database)] = {_group(message.can_id): message for message in matched}
-        return self._by_group[id(database)]
+    def name(self, channel: str, can_id: int, extended: bool) -> str | None:
+        """Name of the message that an identifier stands for, None where no database describes it."""
+        message = self.databases.message(channel, can_id, extended)
+        if message is not None:
+            return message.name
+        return "J1939 transport" if self.databases.joins(channel, can_id, extended) else None
 
     def protection(self) -> dict[str, Integrity]:
         """End-to-end protection by message; what came on several channels is added up."""
@@ -180,29 +161,3 @@ class Contents:
     def channel_of(self) -> dict[str, str]:
         """Channel of each message; several are named together."""
         return {name: ", ".join(self._names[number] for number in sorted(of)) for name, of in self._channels_of.items()}
-
-
-def _group(can_id: int) -> int:
-    """J1939 parameter group number: below PDU format 240 the low byte is a destination and no part of it."""
-    group = can_id >> 8 & 0x3FFFF
-    return group if group >> 8 & 0xFF >= 240 else group & 0x3FF00
-
-
-def _own_spec(databases: Databases, channel: str, message: Message) -> MessageSpec | None:
-    """Until the database itself tells cycle time and data id: those of our own messages."""
-    if "our " not in databases.of(channel).source:
-        return None
-    return contract(BusName.BENCH if channel == BusName.BENCH.value else BusName.VEHICLE).by_id.get(message.can_id)
-
-
-def _data_id(databases: Databases, channel: str, message: Message) -> int | None:
-    spec = _own_spec(databases, channel, message)
-    return getattr(message, "e2e_data_id", None) if spec is None else spec.data_id
-
-
-def _cycle_ns(databases: Databases, channel: str, message: Message) -> int | None:
-    spec = _own_spec(databases, channel, message)
-    if spec is not None:
-        return spec.cycle_ns or None
-    cycle_ms = getattr(message, "cycle_time_ms", None)
-    return round(cycle_ms * 1e6) if cycle_ms else None

@@ -1,6 +1,6 @@
 """Compares the signals of two logs: which differ, from when, by how much."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,7 +11,7 @@ from dbc.database import Signal
 from hil.log.choice import Choice
 from hil.log.contents import Contents
 from hil.log.databases import Databases
-from hil.log.decode import Values
+from hil.log.decoded import Values
 from hil.log.series import MessageSeries, Samples, collect
 from hil.log.several import Logs
 from hil.log.summary import Summary
@@ -118,35 +118,45 @@ def diff_logs(
     else from the first frame of each log on. Messages are compared group by group, so that memory does not grow with
     the logs; a group is at least one message.
     """
-    sides = [_contents(logs, databases, choice) for logs in (first, second)]
+    wanted = choice.wanted(databases)
+    sides = [_contents(logs, databases, choice, wanted) for logs in (first, second)]
     ours, other = (contents.summary() for contents in sides)
     same_clock = ours.first_ns <= other.last_ns and other.first_ns <= ours.last_ns
     starts = [0, 0] if same_clock else [ours.first_ns, other.first_ns]
-    chosen = choice.check(databases)
-    counts = [{name: one.count for name, one in side.messages.items() if name in chosen} for side in sides]
+    counts = [_frames(side, wanted) for side in sides]
     found = LogDifference(same_clock)
     found.only_first = {name: n for name, n in counts[0].items() if name not in counts[1]}
     found.only_second = {name: n for name, n in counts[1].items() if name not in counts[0]}
-    if not (choice.messages or choice.signals):
+    if wanted is None:
         found.unknown = _unknown(sides, (ours, other))
     begin_ns = ours.first_ns - starts[0]
+    names_of: dict[str, list[str]] = {}
+    for name, signal in sides[0].signals.items():
+        names_of.setdefault(signal.message, []).append(name)
     sizes = {
-        name: (n + counts[1][name]) * (1 + sum(1 for one in sides[0].signals.values() if one.message == name))
+        name: (n + counts[1][name]) * (1 + len(names_of.get(name, ())))
         for name, n in counts[0].items()
         if name in counts[1]
     }
-    for names in _groups(sizes):
-        part = databases.only(names)
-        one, two = (collect(choice.frames(logs.tables()), part) for logs in (first, second))
-        for name in sorted(names):
-            one[name].time_ns -= starts[0]
-            two[name].time_ns -= starts[1]
-            _compare(found, name, one[name], two[name], choice, tolerance, begin_ns)
+    for messages in _groups(sizes):
+        names = [name for message in messages for name in names_of.get(message, ())]
+        one, two = (collect(choice.frames(logs.tables()), databases.decoder(names)) for logs in (first, second))
+        for message in sorted(messages & one.keys() & two.keys()):
+            one[message].time_ns -= starts[0]
+            two[message].time_ns -= starts[1]
+            _compare(found, message, one[message], two[message], tolerance, begin_ns)
     return found
 
 
-def _contents(logs: Logs, databases: Databases, choice: Choice) -> Contents:
-    contents = Contents(databases, choice)
+def _frames(contents: Contents, wanted: Collection[str] | None) -> dict[str, int]:
+    """Frames of each message that has a chosen signal."""
+    chosen = None if wanted is None else {name.rpartition(".")[0] for name in wanted}
+    messages = contents.counts.messages
+    return {name: one.count for name, one in messages.items() if chosen is None or name in chosen}
+
+
+def _contents(logs: Logs, databases: Databases, choice: Choice, wanted: Collection[str] | None) -> Contents:
+    contents = Contents(databases, wanted)
     for table in choice.frames(logs.tables()):
         contents.add(table)
     return contents
@@ -156,7 +166,7 @@ def _unknown(sides: list[Contents], summaries: tuple[Summary, Summary]) -> dict[
     counts: list[dict[str, int]] = [{}, {}]
     for side, summary, count in zip(sides, summaries, counts, strict=True):
         for one in summary.ids:
-            if side.message(one.channel, one.can_id, one.extended) is None:
+            if side.name(one.channel, one.can_id, one.extended) is None:
                 count[one.name] = count.get(one.name, 0) + one.count
     names = sorted({*counts[0], *counts[1]})
     pairs = {name: (counts[0].get(name, 0), counts[1].get(name, 0)) for name in names}
@@ -181,7 +191,6 @@ def _compare(
     name: str,
     one: MessageSeries,
     two: MessageSeries,
-    choice: Choice,
     tolerance: Tolerance,
     begin_ns: int,
 ) -> None:
@@ -191,7 +200,7 @@ def _compare(
     starts = [float((times[0] - begin_ns) / 1e9) for times in alone if len(times)]
     found.messages.append(MessageDifference(name, n, m, len(alone[0]), len(alone[1]), min(starts, default=None)))
     for signal in one.signals:
-        if signal in two.signals and choice.signal(name, signal):
+        if signal in two.signals:
             limit = tolerance(f"{name}.{signal}", one.signals[signal].signal)
             if limit is None:
                 limit = own_tolerance(one.signals[signal].signal)

@@ -15,11 +15,9 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from hil.log.atomic_write import atomic_write
-from hil.log.blocks import Block, Field, Layout, Rows
-from hil.log.chunks import chunk_of
-from hil.log.decode import DecodedLog, Values
+from hil.log.blocks import Block, Field, Layout, block_of
+from hil.log.decoded import Column, DecodedLog, Rows, Values
 from hil.log.frames import LogError
-from hil.log.value_names import value_names
 
 SUFFIXES = (".parquet", ".csv")
 CELLS_PER_BATCH = 1_000_000
@@ -41,14 +39,10 @@ def export(log: DecodedLog, path: Path, overwrite: bool = False, read: Iterable[
     LogError
         For a suffix that is neither .parquet nor .csv, when the file exists, and when it cannot be written.
     """
-    chunk = chunk_of(log)
     fields = tuple(
         Field(name.rpartition(".")[0], column.signal, column.values.dtype) for name, column in log.columns.items()
     )
-    columns = {name: (column.rows, column.values) for name, column in log.columns.items()}
-    frames = log.recording.frames
-    block = Block(frames.time_ns, frames.channel, frames.channels, columns, chunk.rows)
-    export_blocks([block], Layout(fields, log.several_channels), path, overwrite, read)
+    export_blocks([block_of(log)], Layout(fields, log.several_channels), path, overwrite, read)
 
 
 def export_blocks(
@@ -158,10 +152,10 @@ def _arrays(block: Block, layout: Layout, fields: Iterable[Field], begin: int, e
         empty[at] = False
         yield pa.array(dense, mask=empty)
         if named:
-            codes, texts = value_names(dense, one.signal)
-            yield pa.DictionaryArray.from_arrays(
-                pa.array(codes, mask=empty | (codes < 0)), pa.array(list(texts), pa.string())
-            )
+            place = np.zeros(n, np.int64)
+            place[at] = np.arange(b - a)
+            texts = Column(one.signal, rows[a:b], values[a:b]).to_arrow_names()
+            yield texts.take(pa.array(place, mask=empty))
 
 
 _NOTHING: tuple[Rows, Values] = (np.zeros(0, np.int64), np.zeros(0))

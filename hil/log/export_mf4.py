@@ -1,14 +1,30 @@
 """Decoded signals as an MF4 file with one group for each message."""
 
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import Self
 
 import numpy as np
 
-from hil.log.blocks import Block, Layout
+from dbc.database import Signal
+from hil.log.blocks import Block, Field, Layout
 from hil.log.export_messages import grouped, of_message
-from hil.log.mf4_signals import SignalsWriter  # type: ignore[import-not-found]
+from hil.log.mdf_signals import SignalsWriter
+
+
+def _named(one: Field) -> Signal:
+    """Signal whose names are those of its values, not of its raw values."""
+    if not one.signal.choices:
+        return one.signal
+    raw = np.array([number for number in one.signal.choices if -(2**63) <= number < 2**63], np.int64)
+    values = np.asarray(raw * float(one.signal.factor) + float(one.signal.offset))
+    whole = {
+        int(value): one.signal.choices[number]
+        for value, number in zip(values, raw.tolist(), strict=True)
+        if np.isfinite(value) and value == np.round(value)
+    }
+    return replace(one.signal, choices=whole)
 
 
 class Mf4Groups(AbstractContextManager["Mf4Groups"]):
@@ -22,7 +38,7 @@ class Mf4Groups(AbstractContextManager["Mf4Groups"]):
             message: self._writer.group(
                 message,
                 layout.channel_of.get(message, ""),
-                [one.signal for one in fields],
+                [_named(one) for one in fields],
                 [one.dtype for one in fields],
             )
             for message, fields in self._groups.items()

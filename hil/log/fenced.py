@@ -16,7 +16,7 @@ from pathlib import Path
 from hil.errors import BrakebenchError
 from hil.rt.process import end_with_parent
 
-FUNCTIONS = frozenset({"hil.log.parquet_columns:batches"})
+FUNCTIONS = frozenset({"hil.log.parquet_columns:batches", "hil.log.foreign_databases:database_json"})
 """What may run here: ``function(path) -> Iterable[bytes]``. Its module is imported, and the module's ``warm()`` called
 where it has one, before the limits are set."""
 _MAX_TEXT = 400

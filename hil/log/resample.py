@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hil.errors import BrakebenchError
-from hil.log.blocks import Block, Field, Rows
-from hil.log.decode import Values
+from hil.log.blocks import Block, Field
+from hil.log.decoded import Rows, Values
 
 MAX_ROWS = 200_000_000
 

@@ -7,10 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dbc.database import Signal
-from hil.log.blocks import Rows
-from hil.log.chunks import decode_chunk
-from hil.log.databases import Databases
-from hil.log.decode import Values
+from hil.log.decode import Decoder
+from hil.log.decoded import Rows, Values
 from hil.log.frames import FrameTable
 
 
@@ -31,22 +29,23 @@ class MessageSeries:
     signals: dict[str, Samples] = field(default_factory=dict)
 
 
-def collect(tables: Iterable[FrameTable], databases: Databases) -> dict[str, MessageSeries]:
-    """Messages by name with their signals, as whole columns: memory grows with what the databases describe."""
+def collect(tables: Iterable[FrameTable], decoder: Decoder) -> dict[str, MessageSeries]:
+    """Messages by name with their signals, as whole columns: memory grows with what the decoder wants."""
     times: dict[str, list[npt.NDArray[np.int64]]] = {}
     counts: dict[str, int] = {}
     parts: dict[str, dict[str, list[Samples]]] = {}
     for table in tables:
-        chunk = decode_chunk(table, databases)
-        for name, rows in chunk.rows.items():
-            times.setdefault(name, []).append(table.time_ns[rows])
+        log = decoder.add(table)
+        wanted = {full.rpartition(".")[0] for full in log.columns}
+        for name in wanted:
+            times.setdefault(name, []).append(table.time_ns[log.rows[name]])
             parts.setdefault(name, {})
-        for full, column in chunk.columns.items():
+        for full, column in log.columns.items():
             name, _, signal = full.rpartition(".")
-            at = np.searchsorted(chunk.rows[name], column.rows) + counts.get(name, 0)
+            at = np.searchsorted(log.rows[name], column.rows) + counts.get(name, 0)
             parts[name].setdefault(signal, []).append(Samples(column.signal, at, column.values))
-        for name, rows in chunk.rows.items():
-            counts[name] = counts.get(name, 0) + len(rows)
+        for name in wanted:
+            counts[name] = counts.get(name, 0) + len(log.rows[name])
     return {
         name: MessageSeries(np.concatenate(some), {signal: _joined(samples) for signal, samples in parts[name].items()})
         for name, some in times.items()

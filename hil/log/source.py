@@ -3,6 +3,7 @@
 import shutil
 import sys
 import tempfile
+import zlib
 from dataclasses import dataclass
 from datetime import UTC, tzinfo
 from pathlib import Path
@@ -13,7 +14,7 @@ from hil.log.frames import LogError
 
 HEAD_BYTES = 65_536  # enough to tell the format
 STDIN = "-"
-PACKED_BYTES = 16_384  # as much is lost before a damage
+PACKED_BYTES = 16_384
 GZIP_BITS = 31  # zlib's name for a gzip frame around the stream
 _GZIP = b"\x1f\x8b"
 
@@ -23,8 +24,6 @@ try:
 
     _ZLIB = isal_zlib  # three times as fast
 except ImportError:
-    import zlib
-
     _ZLIB = zlib
 
 
@@ -97,11 +96,11 @@ class Source:
         """At most ``size`` bytes; fewer at the end of what can be read, none behind it."""
         if self.limit_bytes is not None and self._position + size > self.limit_bytes:
             size = self.limit_bytes - self._position
-            if size == 0 and self._stream.read(1):
-                self.account.note(f"only the first {self.limit_bytes} bytes are read")
-                self.account.cut_at(self.limit_bytes)
         try:
             content = self._stream.read(size)
+            if size == 0 and self._stream.read(1):
+                self.account.note(f"only the first {self.limit_bytes} bytes are read")
+                self.account.cut_at(self._position)
         except DamagedError as error:
             content = b""
             self.account.note(f"damaged gzip file: {error}")
@@ -132,6 +131,7 @@ class Source:
             self._raw.seek(0)
             return self._raw
         if self._kept is None:
+            self.rewind(self.account)
             self._kept = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the source)
             while part := self.read(1 << 20):
                 self._kept.write(part)
@@ -150,44 +150,82 @@ class GzipStream:
         self._raw = raw
         self._inflater: Any = None
         self._packed = b""
-        self._begun = False
+        self._begin: int | None = None  # of the member, in the file
+        self._given = 0  # bytes of the member
+        self._damage: DamagedError | None = None
+        self._saved = b""  # what is sound before it
 
     def read(self, size: int) -> bytes:
         """At most ``size`` bytes, none at the end; raises DamagedError where the rest cannot be unpacked."""
         content = bytearray()
         while len(content) < size:
+            if self._saved or self._damage:
+                part, self._saved = self._saved[: size - len(content)], self._saved[size - len(content) :]
+                content += part
+                if content:
+                    break
+                raise self._damage or DamagedError
             if not self._packed:
                 self._packed = self._raw.read(PACKED_BYTES)
             if not self._packed and self._inflater is None:
                 break
             try:
-                part = self._inflated(size - len(content))
-            except DamagedError:
-                if not content:
-                    raise
-                break
-            content += part
+                content += self._inflated(size - len(content))
+            except DamagedError as error:
+                self._damage = error
         return bytes(content)
 
     def _inflated(self, size: int) -> bytes:
         if self._inflater is None:
-            if self._begun and not self._packed.startswith(b"\x1f"):  # padding behind the last member
+            if self._begin is not None and not self._packed.startswith(b"\x1f"):  # padding behind the last member
                 self._packed = b""
                 return b""
             self._inflater = _ZLIB.decompressobj(GZIP_BITS)
-            self._begun = True
+            self._begin, self._given = self._raw.tell() - len(self._packed), 0
         ended = not self._packed  # but content may still wait inside
         try:
             part: bytes = self._inflater.decompress(self._packed, size)
         except _ZLIB.error as error:
-            self._raw.seek(0, 2)
+            self._saved = self._sound()
             raise DamagedError(str(error)) from error
+        self._given += len(part)
         self._packed = self._inflater.unconsumed_tail
         if self._inflater.eof:
             self._packed, self._inflater = self._inflater.unused_data, None
         elif ended and not part:
             raise DamagedError("it ends early")
         return part
+
+    def _sound(self) -> bytes:
+        """What the member holds up to its damage and was not given out: it is unpacked once more, byte by byte at last.
+
+        An inflater that meets a damage keeps what it had unpacked from the same piece to itself.
+        """
+        self._raw.seek(self._begin or 0)
+        inflater, skipped, saved = zlib.decompressobj(GZIP_BITS), self._given, bytearray()
+        while packed := self._raw.read(PACKED_BYTES):
+            before = inflater.copy()
+            try:
+                part = inflater.decompress(packed)
+            except zlib.error:
+                part = _by_bytes(before, packed)
+                packed = b""
+            saved += part[skipped:]
+            skipped -= min(skipped, len(part))
+            if not packed or inflater.eof:
+                break
+        self._raw.seek(0, 2)
+        return bytes(saved)
+
+
+def _by_bytes(inflater: Any, packed: bytes) -> bytes:
+    content = bytearray()
+    try:
+        for k in range(len(packed)):
+            content += inflater.decompress(packed[k : k + 1])
+    except zlib.error:
+        pass
+    return bytes(content)
 
 
 def _spooled(stream: IO[bytes]) -> IO[bytes]:

@@ -69,12 +69,13 @@ def result(capsys):
 
 def test_json_is_one_object_alone_on_stdout(log, dbc, tmp_path, result):
     found = result(log, "--dbc", dbc, "--out", tmp_path / "a.parquet", code=1)
-    assert (found["frames"], found["decoded"], found["unknown"], found["rejected"]) == (6, 2, 1, 3)
+    assert (found["frames"], found["decoded"], found["unknown"], found["rejected"]) == (6, 3, 1, 2)
     assert found["truncated_at"] == LOG.index("(3.0)")
-    assert found["messages"] == {"M": {"count": 2, "rate_hz": pytest.approx(1 / 1.5)}}
+    assert found["messages"]["M"]["count"] == 3
+    assert found["messages"]["M"]["short"] == 1
     assert found["unknown_ids"] == {"can0 0x7ff": 1}
     assert [one["text"] for one in found["first_rejected"]] == ["bad", "(3.0) can0 00"]
-    assert found["rejected_reasons"] == {"shorter than the message in the DBC": 1, "not a frame": 2}
+    assert found["rejected_reasons"] == {"not a frame": 2}
     assert found["ids"][0]["lengths"] == [1, 2]
     assert found["ids"][0]["length_changes"] == 2
     assert pyarrow.parquet.read_table(found["out"]).column_names == ["time", "M.S", "M.T"]
@@ -83,10 +84,10 @@ def test_json_is_one_object_alone_on_stdout(log, dbc, tmp_path, result):
 def test_text_accounts_for_every_frame(log, dbc, capsys):
     assert run(log, "--dbc", dbc) == 1
     out = capsys.readouterr().out
-    assert "6 frames in 1.500 s: 2 decoded, 1 unknown, 3 rejected" in out
+    assert "6 frames in 1.500 s: 3 decoded, 1 unknown, 2 rejected" in out
     assert "2 not a frame" in out
     assert "at byte 38: bad" in out
-    assert "rejected: 1 shorter than the message in the DBC" in out
+    assert "M: frames shorter than the database says" in out
     assert "unknown: can0 0x7ff (1)" in out
     assert "cut off at byte" in out
     assert "length: can0 0x001 M changes 2 times between 1, 2 bytes" in out
@@ -131,7 +132,12 @@ def test_without_a_database_ours_are_used_and_their_protection_is_checked(tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("content", "message"), [(None, "cannot be opened"), (b"hello", "no message in it"), (b"\0\0", "zero bytes")]
+    ("content", "message"),
+    [
+        (None, "cannot be opened"),
+        (b"hello", "begins with 'hello'; expected"),
+        (b"BO_ 1", "no message|can be used"),
+    ],
 )
 def test_a_bad_database_is_refused_with_its_name(log, tmp_path, content, message):
     path = tmp_path / "bad.dbc"
@@ -139,6 +145,34 @@ def test_a_bad_database_is_refused_with_its_name(log, tmp_path, content, message
         path.write_bytes(content)
     with pytest.raises(BrakebenchError, match=rf"bad\.dbc: .*{message}"):
         run(log, "--dbc", path)
+
+
+KCD = """<NetworkDefinition xmlns="http://kayak.2codeornot2code.org/1.0"><Document/><Bus name="B">
+<Message id="0x001" length="2" name="M"><Signal name="S" offset="0" length="8"/></Message></Bus></NetworkDefinition>"""
+
+
+def test_a_database_of_another_format(log, tmp_path, result):
+    path = tmp_path / "a.kcd"
+    path.write_text(KCD)
+    assert result(log, "--dbc", path, code=1)["signals"]["M.S"]["count"] == 3
+
+
+def test_a_short_frame_without_any_signal_is_rejected(tmp_path, dbc, result):
+    path = tmp_path / "short.log"
+    path.write_text("(1.0) can0 001#0101\n(2.0) can0 001#\n")
+    found = result(path, "--dbc", dbc, code=1)
+    assert (found["decoded"], found["rejected"]) == (1, 1)
+
+
+def test_groups_of_messages_in_one_mf4_file(whole, dbc, tmp_path):
+    asammdf = pytest.importorskip("asammdf")
+    out = tmp_path / "o.mf4"
+    assert run(whole, "--dbc", dbc, "--out", out) == 0
+    with asammdf.MDF(out) as file:
+        assert file.get("S").samples.tolist() == [0.5, 127.5]
+        assert file.get("S").unit == "km/h"
+        names = file.get("T", ignore_invalidation_bits=True)
+        assert names.samples.tolist()[0] == b"on"
 
 
 def test_a_missing_log_is_refused_with_its_name(tmp_path):
@@ -161,7 +195,7 @@ def test_several_databases_and_one_for_a_channel(tmp_path, dbc, result):
 def test_a_database_file_with_an_equals_sign_in_its_name(tmp_path, log, dbc, result):
     path = tmp_path / "x=y.dbc"
     path.write_text(DBC)
-    assert result(log, "--dbc", path, code=1)["decoded"] == 2
+    assert result(log, "--dbc", path, code=1)["decoded"] == 3
 
 
 def test_several_logs_and_a_pattern_are_one_log(tmp_path, dbc, result):

@@ -183,7 +183,7 @@ def test_a_file_that_unpacks_to_far_too_many_rows(tmp_path, monkeypatch):
     assert len(content) < 5_000
     assert len(taken(content, tmp_path / "a.parquet")[0]) == 50_000
     monkeypatch.setattr(parquet_columns, "FREE_ROWS", 20_000)
-    with pytest.raises(BrakebenchError, match="rows in .* bytes: no log"):
+    with pytest.raises(BrakebenchError, match=r"rows in \d+ bytes: no log"):
         taken(content, tmp_path / "a.parquet")
 
 

@@ -44,14 +44,27 @@ def test_a_packed_log_that_is_cut_off(tmp_path, size):
     assert account.truncated_at <= len(TEXT)
 
 
-def test_damage_within_a_packed_log(tmp_path):
+@pytest.mark.parametrize("at", [30, 0.5, 0.99, -5])
+def test_all_before_a_damage_within_a_packed_log_is_read(tmp_path, at):
+    """Damage: a reserved block type, which no inflater takes; or a wrong check value at the end."""
+    compressor = zlib.compressobj(wbits=31)
+    parts = [
+        compressor.compress(TEXT[k : k + 9200]) + compressor.flush(zlib.Z_FULL_FLUSH) for k in range(0, 460_000, 9200)
+    ]
+    whole = {30: 1, 0.5: 25, 0.99: 49, -5: 50}[at]
+    packed = b"".join(parts[:whole])
+    if at == -5:
+        packed += compressor.flush()[:-5] + bytes(5)
+    else:
+        packed += b"\x07" + b"".join(parts[whole:])
     path = tmp_path / "a.gz"
-    packed = bytearray(gzip.compress(TEXT))
-    packed[len(packed) // 2] ^= 0xFF
     path.write_bytes(packed)
     frames, account = frames_of(path)
-    assert frames > 5_000
-    assert account.truncated_at is not None
+    assert frames == whole * 400
+    assert account.truncated_at == whole * 9200
+    assert any("damaged gzip file" in note for note in account.notes)
+    frames, account = frames_of(path, limit_bytes=whole * 9200)
+    assert frames == whole * 400
 
 
 def test_no_more_than_the_limit_is_read(tmp_path):
