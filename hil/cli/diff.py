@@ -106,7 +106,7 @@ def _lines(found: LogDifference, args: argparse.Namespace, whole: dict[str, bool
     unpaired = [one for one in found.messages if not one.equal]
     notes = [
         f"{one.name}: {one.first:,} and {one.second:,} frames; {one.unpaired_first:,} and {one.unpaired_second:,} "
-        "have no partner"
+        f"have no partner, the first at {one.unpaired_s or 0.0:.3f} s"
         for one in unpaired[:SHOWN]
     ]
     if len(unpaired) > SHOWN:
@@ -168,6 +168,7 @@ def _values(found: LogDifference, args: argparse.Namespace, whole: dict[str, boo
                 "second": one.second,
                 "unpaired_first": one.unpaired_first,
                 "unpaired_second": one.unpaired_second,
+                "unpaired_s": one.unpaired_s,
             }
             for one in found.messages
         },

@@ -163,7 +163,9 @@ def panels(gathered: Signals, names: list[str]) -> list[Courses]:
         t_s = (times - gathered.first_ns) / 1e9
         texts = _names(one, y)
         if texts is not None:
-            plots.append(Courses((Course(name, t_s, y, steps=True),), "", texts))
+            values = np.array(list(texts))
+            course = Course(name, t_s, np.searchsorted(values, y).astype(np.float64), steps=True)
+            plots.append(Courses((course,), "", tuple(texts.values())))
             continue
         course = _with_gaps(Course(name, t_s, y))
         unit = one.signal.unit
@@ -177,13 +179,15 @@ def panels(gathered: Signals, names: list[str]) -> list[Courses]:
 
 
 def _names(one: Gathered, y: npt.NDArray[np.float64]) -> dict[float, str] | None:
-    """Names of the values that occur, where nearly all of them have one; None for a quantity."""
-    values = np.unique(y)
-    if not one.signal.choices or len(values) > MOST_NAMES:
-        return None
+    """Texts of the values that occur (ascending), where most of them have a name, or are bits; None for a quantity."""
+    values = np.unique(y[np.isfinite(y)])
     named = {float(value): text for value, text in named_values(one.signal, np.dtype(one.dtype)).items()}
-    found = {value: named.get(value, "") for value in values.tolist()}
-    return found if sum(map(bool, found.values())) * 2 >= len(found) else None
+    if one.signal.length == 1 and not one.signal.is_float:
+        both = [raw * float(one.signal.factor) + float(one.signal.offset) for raw in (0, 1)]
+        values = np.unique([*values, *both])
+    elif len(values) > MOST_NAMES or 2 * sum(value in named for value in values.tolist()) < max(1, len(values)):
+        return None
+    return {value: f"{named[value]}  {value:g}" if value in named else f"{value:g}" for value in values.tolist()}
 
 
 def _with_gaps(course: Course) -> Course:

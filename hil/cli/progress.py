@@ -1,8 +1,9 @@
 """Progress with the remaining time, on a terminal, where something takes long."""
 
 import sys
-import time
 from typing import IO, Self
+
+from hil.rt.clock import monotonic_ns
 
 QUIET_S = 2.0  # nothing is shown before
 EVERY_S = 0.2
@@ -32,7 +33,7 @@ class Progress:
         self._parts = parts
         self._part = 0
         self._what = "reading"
-        self._began_s = time.monotonic()
+        self._began_s = monotonic_ns() / 1e9
         self._shown_s = 0.0
         self._width = 0
 
@@ -54,7 +55,7 @@ class Progress:
         """Tell the share of this part that is done, 0 to 1."""
         if not self._live:
             return
-        now = time.monotonic()
+        now = monotonic_ns() / 1e9
         passed = now - self._began_s
         if passed < QUIET_S or now - self._shown_s < EVERY_S:
             return

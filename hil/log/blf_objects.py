@@ -4,7 +4,6 @@ A stream comes in blocks of any size and objects cross them. Where the bytes are
 what stands before that is one rejected piece. The work is linear in the size of the stream.
 """
 
-import struct
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ import numpy.typing as npt
 
 from hil.log import blf_layout as layout
 from hil.log.account import FIRST_REJECTED
+from hil.log.blf_frame import fields_of
 from hil.log.blf_layout import FULL_BODY, LEAST_BODY, OBJECT, SIGNATURE
 from hil.log.builder import FrameBuilder
 from hil.log.frames import FD_CODES, FrameFlag, FrameTable
@@ -266,7 +266,7 @@ class ObjectStream:
         if not frame:
             self._passed[kind if kind < 256 else UNKNOWN] += 1
             return end
-        used, taken = self._frame(one, header, kind)
+        used, frame_fields = fields_of(one, header, kind)
         if size > header + used:
             if len(block) < end + 3 and not final:
                 self._need = end + 3 - at
@@ -275,67 +275,19 @@ class ObjectStream:
             if found >= 0:
                 self._reject(begin, f"object of type {kind} and {size} bytes: its size is wrong")
                 return found
-        if taken is None:
+        if frame_fields is None:
             self._passed[REQUESTS] += 1
-        elif not self._add(*taken):
+        elif not self._add(layout.TIME.unpack_from(one, OBJECT.size), *frame_fields):
             self._reject(begin, f"object of type {kind}: {one[:32].hex(' ')}")
         return end
 
-    def _frame(
-        self, one: bytes, header: int, kind: int
-    ) -> tuple[int, tuple[int, int, int, int, bytes, FrameFlag] | None]:
-        """Bytes of a frame's layout that are used, and its stamp, channel, dlc, id, data bytes and flags.
-
-        None in place of these for a request to send.
-        """
-        unit, stamp = layout.TIME.unpack_from(one, OBJECT.size)
-        factor, least, most = self._units[unit == layout.TEN_US]
-        time_ns = self._start_ns + stamp * factor if least <= stamp <= most else 2**63  # which is refused
-        used, direction, size = int(FULL_BODY[kind]), 0, len(one)
-        flags, fd = FrameFlag(0), (0, 0, 0)
-        data, dlc, can_id = b"", 0, 0
-        if kind in (layout.CAN_MESSAGE, layout.CAN_MESSAGE_2):
-            channel, bits, dlc, can_id = layout.CLASSICAL.unpack_from(one, header)
-            data, direction = one[header + 8 : header + 16], bits & layout.DIRECTION
-            flags |= FrameFlag.REMOTE if bits & layout.REMOTE else FrameFlag(0)
-        elif kind == layout.CAN_FD_MESSAGE:
-            channel, bits, dlc, can_id, _, _, kinds, valid = layout.FD.unpack_from(one, header)
-            data, direction = one[header + 20 : header + 20 + valid], bits & layout.DIRECTION
-            flags |= FrameFlag.REMOTE if bits & layout.REMOTE else FrameFlag(0)
-            fd = (kinds & 1, kinds & 2, kinds & 4)
-        elif kind == layout.CAN_FD_MESSAGE_64:
-            channel, dlc, valid, _, can_id, _, kinds, *_, direction, behind, _ = layout.FD_64.unpack_from(one, header)
-            data = one[header + 40 : min(header + 40 + valid, behind or size)]
-            used = 40 + len(data)
-            flags |= FrameFlag.REMOTE if kinds & 0x10 else FrameFlag(0)
-            fd = (kinds & 0x1000, kinds & 0x2000, kinds & 0x4000)
-        elif kind == layout.CAN_ERROR:
-            (channel,) = struct.unpack_from("<H", one, header)
-            flags |= FrameFlag.ERROR
-        elif kind == layout.CAN_ERROR_EXT:
-            channel, _, _, _, _, dlc, _, can_id, more = layout.ERROR.unpack_from(one, header)
-            data, dlc, direction = one[header + 24 : header + 32], dlc & 15, bool(more & layout.ERROR_SENT)
-            flags |= FrameFlag.ERROR
-        else:
-            channel, dlc, valid, _, _, more, kinds, behind, can_id, *_ = layout.ERROR_64.unpack_from(one, header)
-            data = one[header + 44 : min(header + 44 + valid, behind or size)]
-            used = 44 + len(data)
-            dlc, direction = dlc & 15, bool(more & layout.ERROR_SENT)
-            flags |= FrameFlag.ERROR
-            fd = (kinds & layout.ERROR_FD, kinds & layout.ERROR_BRS, kinds & layout.ERROR_ESI)
-        if direction == layout.REQUESTED:
-            return used, None
-        if fd[0]:
-            flags |= FrameFlag.FD
-            flags |= FrameFlag.BIT_RATE_SWITCH if fd[1] else FrameFlag(0)
-            flags |= FrameFlag.ERROR_STATE if fd[2] else FrameFlag(0)
-        flags |= FrameFlag.SENT if direction == layout.SENT else FrameFlag(0)
-        return used, (time_ns, channel, dlc, can_id, data, flags)
-
-    def _add(self, time_ns: int, channel: int, dlc: int, can_id: int, data: bytes, flags: FrameFlag) -> bool:
+    def _add(self, time: tuple[int, int], channel: int, dlc: int, can_id: int, data: bytes, flags: FrameFlag) -> bool:
         """Add a frame: the length is the one its DLC states, data bytes that are not there read as zero."""
-        if dlc > 15:
+        unit, stamp = time
+        factor, least, most = self._units[unit == layout.TEN_US]
+        if dlc > 15 or not least <= stamp <= most:
             return False
+        time_ns = self._start_ns + stamp * factor
         length = FD_CODES[dlc] if flags & FrameFlag.FD else min(dlc, 8)
         data = b"" if flags & FrameFlag.REMOTE else data[:length].ljust(length, b"\0")
         name = f"can{max(channel, 1) - 1}"

@@ -14,11 +14,12 @@ A J1939 message (``Message.pgn_match``) stands for its parameter group whatever 
 """
 
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from dbc.contract import database_text
 from dbc.database import Database, parse_database
@@ -33,13 +34,15 @@ from hil.log.decoded import (
     TransportCount,
     Values,
 )
-from hil.log.extract import Group, Piece, pieces_of, work_out_all
+from hil.log.extract import Found, Group, pieces_of, work_out
+from hil.log.extract_compiled import extract_all
 from hil.log.frames import FrameTable, Recording
 from hil.log.j1939 import Joined, Transport
 from hil.log.lookup import Databases, Lookup
 from hil.log.signal_plan import SNA, MessagePlan, Words
 from hil.log.sources import Sources
 from hil.log.unknown_ids import KEPT, OTHERS
+from hil.log.wanted import Wanted
 
 __all__ = [
     "NOT_A_FRAME", "SNA", "TOO_SHORT", "Column", "Databases", "DecodedCounts", "DecodedLog", "Decoder", "MessageCount",
@@ -87,7 +90,6 @@ class Decoder:
 
     Attributes
     ----------
-    totals : the account of all tables so far.
     unmatched : wanted names that no message or signal of the databases has.
 
     >>> decoder = Decoder(database, wanted=["WHEELS.*"])  # doctest: +SKIP
@@ -110,7 +112,8 @@ class Decoder:
         self._fast = fast
         self._unknown_groups: set[str] = set()
         self._odd: dict[str, None] = {}
-        self.totals = DecodedCounts(notes=tuple(self._lookup.notes))
+        self._heads: dict[str, _Head] = {}
+        self._totals = DecodedCounts(notes=tuple(self._lookup.notes))
         self.unmatched = self._lookup.unmatched()
 
     def add(self, table: FrameTable) -> DecodedLog:
@@ -126,14 +129,14 @@ class Decoder:
         ValueError
             When a frame's channel is none of the table's.
         """
-        if self._fast is None and self.totals.frames + len(table) > FEW_FRAMES:
+        if self._fast is None and self._totals.frames + len(table) > FEW_FRAMES:
             self._fast = True
         fast = bool(self._fast)
         log = DecodedLog(
             recording=Recording(Path(), "", table),
             time_s=np.asarray(table.time_ns / 1e9, np.float64),
             frames=len(table),
-            notes=self.totals.notes,
+            notes=self._totals.notes,
         )
         if len(table):
             words = _words(table)
@@ -143,8 +146,17 @@ class Decoder:
             with np.errstate(over="ignore", invalid="ignore"):  # a floating-point signal may hold anything
                 self._decode(log, table, words, assigned, joined, fast)
             self._note(log)
-        self.totals.merge(log)
+        self._totals.merge(log)
         return log
+
+    @property
+    def totals(self) -> DecodedCounts:
+        """The account of all tables so far."""
+        signals: dict[str, SignalCount] = {}
+        for head in self._heads.values():
+            signals |= head.totals()
+        self._totals.signals = signals
+        return self._totals
 
     def _count_others(self, log: DecodedLog, assigned: Assigned) -> None:
         log.unknown = assigned.strangers + assigned.errors + assigned.remotes
@@ -185,10 +197,11 @@ class Decoder:
         joined: dict[int, list[Joined]],
         fast: bool,
     ) -> None:
-        parts: list[tuple[MessagePlan, list[Piece]]] = []
-        heads: list[tuple[str, int | None]] = []
-        came = set(np.flatnonzero(np.diff(assigned.starts[:-1])).tolist()) | set(joined)
-        for slot in sorted(came):
+        parts: list[tuple[MessagePlan, Group]] = []
+        heads: list[_Head] = []
+        came = np.flatnonzero(np.diff(assigned.starts[:-1]))
+        stamps = _stamps(table.time_ns, assigned, came)
+        for slot in sorted({*came.tolist(), *joined}):
             plan = self._lookup.plan(slot)
             group, too_short = _frames_of(slot, plan, table, words, assigned)
             if too_short:
@@ -203,30 +216,46 @@ class Decoder:
                 group = _with_joined(group, carried, table, words)
             if not len(group.rows):
                 continue
-            times = table.time_ns[group.rows[[0, -1]] if assigned.ascending else group.rows]
-            log.messages[plan.name] = MessageCount(
-                len(group.rows), int(times.min()), int(times.max()), short, longer, len(carried)
-            )
-            if getattr(plan.message, "pgn_match", False):
-                sources = (table.can_id[group.rows] & 0xFF).astype(np.uint8)
-                for name, source, chosen in self._sources.split(plan.name, sources):
-                    one = group if chosen is None else group.take(chosen)
-                    log.rows[name] = one.rows
-                    heads.append((name, source))
-                    parts.append((plan, pieces_of(plan, one)))
-            else:
-                log.rows[plan.name] = group.rows
-                heads.append((plan.name, None))
-                parts.append((plan, pieces_of(plan, group)))
+            if carried or too_short:
+                times = table.time_ns[group.rows]
+                stamps[slot] = int(times.min()), int(times.max())
+            log.messages[plan.name] = MessageCount(len(group.rows), *stamps[slot], short, longer, len(carried))
+            for head, one in self._by_source(plan, group, table, assigned):
+                log.rows[head.name] = one.rows
+                heads.append(head)
+                parts.append((plan, one))
         log.several_channels = self._assigner.several_channels
-        work_out_all(parts, fast, assigned.first)
-        for (name, source), (_, pieces) in zip(heads, parts, strict=True):
-            for piece in pieces:
-                signal = piece.plan.signal
-                if self._lookup.wanted.takes_from(name, signal.name):
-                    full = f"{name}.{signal.name}"
-                    log.columns[full] = Column(signal, piece.rows, piece.values, source)
-                    log.signals[full] = SignalCount(piece.n, piece.sna, piece.outside)
+        if fast:
+            found = extract_all(parts, assigned.first)
+        else:
+            found = [[work_out(piece) for piece in pieces_of(plan, group)] for plan, group in parts]
+        for head, signals in zip(heads, found, strict=True):
+            head.add(log, signals)
+
+    def _by_source(
+        self, plan: MessagePlan, group: Group, table: FrameTable, assigned: Assigned
+    ) -> Iterator[tuple["_Head", Group]]:
+        """Frames of a message by the name of their columns."""
+        if not getattr(plan.message, "pgn_match", False):
+            yield self._head(plan, plan.name, None), group
+            return
+        sources = (table.can_id[group.rows] & 0xFF).astype(np.uint8)
+        if sources.min() == sources.max():
+            source = int(sources[0])
+            yield self._head(plan, self._sources.name(plan.name, source), source), group
+            return
+        order, parts = self._sources.split(plan.name, sources)
+        sorted_group = group.take(order)
+        if group.begin is not None:  # sorted in place, so that each source is a piece of the assigned words, too
+            assigned.first[group.begin : group.begin + len(order)] = sorted_group.plane(0)
+        for part in parts:
+            begin = None if group.begin is None else group.begin + part.begin
+            yield self._head(plan, part.name, part.source), sorted_group.cut(part.begin, part.end, begin)
+
+    def _head(self, plan: MessagePlan, name: str, source: int | None) -> "_Head":
+        if name not in self._heads:
+            self._heads[name] = _Head(plan, name, source, self._lookup.wanted)
+        return self._heads[name]
 
     def _note(self, log: DecodedLog) -> None:
         for name, count in log.messages.items():
@@ -234,6 +263,48 @@ class Decoder:
                 if few:
                     self._odd.setdefault(f"{name}: frames {what} than the database says", None)
         log.notes = (*self._lookup.notes, *self._sources.notes.values(), *self._odd)
+
+
+class _Head:
+    """Columns of one message (from one source), table after table."""
+
+    def __init__(self, plan: MessagePlan, name: str, source: int | None, wanted: Wanted) -> None:
+        self.name = name
+        self._source = source
+        self._signals = [one.signal for one in plan.signals]
+        self._columns = [f"{name}.{one.name}" if wanted.takes_from(name, one.name) else None for one in self._signals]
+        self._counts = np.zeros((len(self._signals), 3), np.int64)
+
+    def add(self, log: DecodedLog, signals: list[Found]) -> None:
+        """Put the columns of a table into its result."""
+        if not signals:
+            return
+        for place, rows, values, n, sna, outside in signals:
+            name = self._columns[place]
+            if name is not None:
+                log.columns[name] = Column(self._signals[place], rows, values, self._source)
+                log.signals[name] = SignalCount(n, sna, outside)
+        self._counts[[one.place for one in signals]] += [one[3:] for one in signals]
+
+    def totals(self) -> dict[str, SignalCount]:
+        """Counts of all tables so far."""
+        named = zip(self._columns, self._counts.tolist(), strict=True)
+        return {name: SignalCount(*counts) for name, counts in named if name is not None and counts[0]}
+
+
+def _stamps(
+    time_ns: npt.NDArray[np.int64], assigned: Assigned, came: npt.NDArray[np.int64]
+) -> dict[int, tuple[int, int]]:
+    """Least and greatest stamp of the frames of each slot."""
+    if not len(came):
+        return {}
+    begins, ends = assigned.starts[came], assigned.starts[came + 1]
+    if assigned.ascending:
+        least, greatest = time_ns[assigned.rows[begins]], time_ns[assigned.rows[ends - 1]]
+    else:
+        times = time_ns[assigned.rows[: assigned.starts[-2]]]
+        least, greatest = np.minimum.reduceat(times, begins), np.maximum.reduceat(times, begins)
+    return dict(zip(came.tolist(), zip(least.tolist(), greatest.tolist(), strict=True), strict=True))
 
 
 def _words(table: FrameTable) -> Words:

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -106,8 +106,7 @@ class MessageCount:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class SignalCount:
+class SignalCount(NamedTuple):
     """How often a signal came: ``n`` frames hold it, ``sna`` of them without a value ("signal not available").
 
     ``out_of_range`` of the values lie outside the range of the database (by more than a hundredth of a step, so that
@@ -117,9 +116,6 @@ class SignalCount:
     n: int
     sna: int = 0
     out_of_range: int = 0
-
-    def __add__(self, other: "SignalCount") -> "SignalCount":
-        return SignalCount(self.n + other.n, self.sna + other.sna, self.out_of_range + other.out_of_range)
 
 
 @dataclass(slots=True)
@@ -175,7 +171,7 @@ class DecodedCounts:
     notes: tuple[str, ...] = ()
 
     def merge(self, other: "DecodedCounts") -> Self:
-        """Add the account of further frames; what is said of the whole (channels, notes, open transfers) replaces."""
+        """Add the account of further frames (not the counts of signals); notes and open transfers are the last ones."""
         self.frames += other.frames
         self.decoded += other.decoded
         self.unknown += other.unknown
@@ -184,8 +180,6 @@ class DecodedCounts:
         self.unknown_ids.update(other.unknown_ids)
         for name, message in other.messages.items():
             self.messages[name] = self.messages[name] + message if name in self.messages else message
-        for name, signal in other.signals.items():
-            self.signals[name] = self.signals[name] + signal if name in self.signals else signal
         mine, its = self.transport, other.transport
         mine.frames += its.frames
         mine.joined += its.joined

@@ -59,13 +59,14 @@ class SignalDifference:
 
 @dataclass(frozen=True, slots=True)
 class MessageDifference:
-    """Frames of one message: how many each log has, and how many have no partner in the other."""
+    """Frames of one message: how many each log has, how many have no partner in the other, and from when (s)."""
 
     name: str
     first: int
     second: int
     unpaired_first: int
     unpaired_second: int
+    unpaired_s: float | None
 
     @property
     def equal(self) -> bool:
@@ -186,7 +187,9 @@ def _compare(
 ) -> None:
     mine, theirs = pairs(one.time_ns, two.time_ns)
     n, m = len(one.time_ns), len(two.time_ns)
-    found.messages.append(MessageDifference(name, n, m, n - len(mine), m - len(theirs)))
+    alone = [_alone(one.time_ns, mine), _alone(two.time_ns, theirs)]
+    starts = [float((times[0] - begin_ns) / 1e9) for times in alone if len(times)]
+    found.messages.append(MessageDifference(name, n, m, len(alone[0]), len(alone[1]), min(starts, default=None)))
     for signal in one.signals:
         if signal in two.signals and choice.signal(name, signal):
             limit = tolerance(f"{name}.{signal}", one.signals[signal].signal)
@@ -221,6 +224,13 @@ def pairs(one: Ints, two: Ints) -> tuple[Ints, Ints]:
     single = np.concatenate(([True], np.diff(nearest[order]) != 0)) if len(order) else np.zeros(0, np.bool_)
     chosen = np.sort(order[single])
     return order_one[chosen], order_two[nearest[chosen]]
+
+
+def _alone(times: Ints, paired: Ints) -> Ints:
+    """Stamps of the frames without a partner, ascending."""
+    alone = np.ones(len(times), np.bool_)
+    alone[paired] = False
+    return np.sort(times[alone])
 
 
 def _dense(samples: Samples, n: int, frames: Ints) -> tuple[Values, npt.NDArray[np.bool_]]:

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from hil.log.decoded import Rows, Values
-from hil.log.signal_plan import FLOAT, OTHER, Ints, MessagePlan, SignalPlan, Words
+from hil.log.signal_plan import MessagePlan, SignalPlan, Words
 
 Lengths = npt.NDArray[np.integer]
 
@@ -57,26 +58,38 @@ class Group:
             group.put_plane(self._planes[0][chosen])
         return group
 
+    def cut(self, first: int, last: int, begin: int | None) -> "Group":
+        """Return the frames at positions ``first`` to ``last``."""
+        lengths = None if self.lengths is None else self.lengths[first:last]
+        at = None if self.at is None else self.at[first:last]
+        group = Group(self.rows[first:last], lengths, self.buffer, self.stride, at)
+        if 0 in self._planes:
+            group.put_plane(self._planes[0][first:last], begin)
+        return group
 
-@dataclass(slots=True, eq=False)
-class Piece:
-    """One signal at the frames that hold it, and its values once they are worked out.
 
-    Attributes
-    ----------
-    begin : where the assigned words hold ``words``; None where they do not.
-    rows : the frames, without those whose value is not available.
-    n, sna, outside : frames, values not available, values out of range.
+class Found(NamedTuple):
+    """One signal, given by its place in its message: values at ``rows``; ``n`` frames hold it, see `SignalCount`."""
+
+    place: int
+    rows: Rows
+    values: Values
+    n: int
+    sna: int
+    outside: int
+
+
+class Piece(NamedTuple):
+    """One signal, given by its place in its message, at the frames that hold it, and its words there.
+
+    ``begin`` is where the assigned words hold these words; None where they do not.
     """
 
+    place: int
     plan: SignalPlan
-    words: Words
     rows: Rows
-    begin: int | None = None
-    values: Values = field(init=False)
-    n: int = 0
-    sna: int = 0
-    outside: int = 0
+    words: Words
+    begin: int | None
 
 
 def pieces_of(plan: MessagePlan, group: Group) -> list[Piece]:
@@ -109,11 +122,11 @@ def pieces_of(plan: MessagePlan, group: Group) -> list[Piece]:
                 base = cut[short]
             there[one] = base
     pieces = []
-    for signal in plan.signals:
+    for place, signal in enumerate(plan.signals):
         group = there[signal]
         if signal.kept and len(group.rows):
             begin = group.begin if signal.word == 0 and not signal.straddles else None
-            pieces.append(Piece(signal, group.words(signal), group.rows, begin))
+            pieces.append(Piece(place, signal, group.rows, group.words(signal), begin))
     return pieces
 
 
@@ -139,86 +152,15 @@ def _selected(
     return group.take(np.sort(np.concatenate(runs)))
 
 
-def work_out(piece: Piece) -> None:
+def work_out(piece: Piece) -> Found:
     """Values of a signal, by numpy."""
-    plan = piece.plan
+    plan, rows = piece.plan, piece.rows
     raw = plan.raw(piece.words)
-    piece.n = len(raw)
+    n, sna = len(raw), 0
     if plan.sna:
         there = ~np.isin(raw, np.array(plan.sna, raw.dtype))
-        piece.sna = piece.n - int(np.count_nonzero(there))
-        if piece.sna:
-            raw, piece.rows = raw[there], piece.rows[there]
-    piece.values = plan.physical(raw)
-    piece.outside = plan.outside(piece.values)
-
-
-def work_out_all(parts: Sequence[tuple[MessagePlan, Sequence[Piece]]], fast: bool, base: Words) -> None:
-    """Values of all signals; the compiled pass takes what it can.
-
-    ``base`` holds the words of the pieces that have a ``begin``.
-    """
-    compiled: list[Piece] = []
-    numbers: list[int] = []
-    ints: list[Ints] = []
-    before = 0
-    for plan, pieces in parts:
-        index = {id(s): i for i, s in enumerate(plan.signals)}
-        ints.append(plan.ints)
-        for piece in pieces:
-            if fast and piece.plan.kind != OTHER:
-                compiled.append(piece)
-                numbers.append(before + index[id(piece.plan)])
-            else:
-                work_out(piece)
-        before += len(plan.signals)
-    if not compiled:
-        return
-    _compiled(compiled, numbers, np.concatenate(ints), np.concatenate([p.floats for p, _ in parts]), base)
-
-
-def _compiled(
-    pieces: list[Piece], numbers: list[int], ints: Ints, floats: npt.NDArray[np.float64], base: Words
-) -> None:
-    from hil.log.decode_pass import extract
-
-    jobs = np.zeros((len(pieces), 4), np.int64)
-    jobs[:, 0] = numbers
-    jobs[:, 2] = sizes = [len(p.words) for p in pieces]
-    jobs[1:, 3] = np.cumsum(sizes)[:-1]
-    out = np.empty(int(sum(sizes)), np.int64)
-    as_float = out.view(np.float64)
-    counts = np.zeros((len(pieces), 2), np.int64)
-    scratch = np.zeros(1024, np.int64)
-    further: dict[int, int] = {}  # words outside of the base, each once
-    extra: list[Words] = []
-    size = 0
-    in_base, begins = [False] * len(pieces), [0] * len(pieces)
-    for i, piece in enumerate(pieces):
-        words = piece.words
-        if piece.begin is not None:
-            begins[i] = piece.begin
-            in_base[i] = True
-            continue
-        if id(words) not in further:
-            further[id(words)] = size
-            extra.append(words)
-            size += len(words)
-        begins[i] = further[id(words)]
-    jobs[:, 1] = begins
-    inside = np.array(in_base)
-    for pool, chosen in ((base, inside), (np.concatenate([*extra, base[:0]]), ~inside)):
-        some = np.flatnonzero(chosen)
-        if not len(some):
-            continue
-        found = np.zeros((len(some), 2), np.int64)
-        done = extract(pool.view(np.int64), jobs[some], ints, floats, out, as_float, found, scratch)
-        if done != len(some):
-            raise AssertionError(f"signal {done} of {len(some)} lies outside of its frames")
-        counts[some] = found
-    for piece, (_, _, n, at), (absent, bad) in zip(pieces, jobs.tolist(), counts.tolist(), strict=True):
-        piece.n, piece.sna, piece.outside = n, absent, bad
-        piece.values = (as_float if piece.plan.kind == FLOAT else out)[at : at + n]
-        if absent:
-            there = piece.plan.raw(piece.words) != piece.plan.sna[0]
-            piece.values, piece.rows = piece.values[there], piece.rows[there]
+        sna = n - int(np.count_nonzero(there))
+        if sna:
+            raw, rows = raw[there], rows[there]
+    values = plan.physical(raw)
+    return Found(piece.place, rows, values, n, sna, plan.outside(values))

@@ -13,6 +13,7 @@ from hil.log.mdf_blocks import LENGTH_OPEN, LIST_OPEN, DamagedError, MdfFile
 from hil.log.mdf_packed import BlockBytes, Stored, open_block
 
 MAX_TRANSPOSED_BYTES = 1 << 28  # of one block; the standard recommends 4 MiB at most
+MAX_TOLD = 1 << 50  # bytes of a block, as its list tells
 MAX_RATIO = 1100  # deflate packs 1032 to 1 at best
 PLAIN = (b"DT", b"DV", b"SD")
 LISTS = (b"DL", b"LD")
@@ -29,7 +30,7 @@ class Gap:
 
 @dataclass(slots=True)
 class _Link:
-    """A data block in a list: its address, the length that the list tells (None: it does not), whether it is the last."""
+    """A data block in a list: its address, the length that the list tells (None: none), whether it is the last."""
 
     address: int
     length: int | None
@@ -205,10 +206,10 @@ class DataStream:
         n = min(n, max(0, end - begin) // 8)
         if flags & 1 and n:
             (length,) = struct.unpack("<Q", self.mdf.bytes_at(begin, 8))
-            return [length or None] * n
+            return [length if 0 < length < MAX_TOLD else None] * n
         offsets = struct.unpack(f"<{n}Q", self.mdf.bytes_at(begin, 8 * n))
         lengths = [b - a for a, b in pairwise(offsets)]
-        return [*lengths, None] if all(a > 0 for a in lengths) else [None] * n
+        return [*lengths, None] if all(0 < a < MAX_TOLD for a in lengths) else [None] * n
 
     def _visit(self, address: int) -> None:
         if address in self.mdf.seen:

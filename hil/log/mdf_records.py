@@ -1,18 +1,16 @@
 """Records of an MDF 4 file to columns of frames: strided views of whole blocks of records, no loop over frames."""
 
-from fractions import Fraction
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from hil.log.account import Account
 from hil.log.frames import FD_CODES, FD_LENGTHS, MAX_EXTENDED_ID, MAX_STANDARD_ID, FrameFlag, FrameTable
-from hil.log.mdf_blocks import KINDS, VIRTUAL, VIRTUAL_MASTER, VLSD, DamagedError, Group, Member
+from hil.log.mdf_blocks import KINDS, VIRTUAL, VLSD, DamagedError, Group, Member
+from hil.log.mdf_fields import Bytes, Mask, Numbers, data_bytes, fits, unsigned
+from hil.log.mdf_time import Clock, is_time
 
-Bytes = npt.NDArray[np.uint8]
-Mask = npt.NDArray[np.bool_]
-Numbers = npt.NDArray[Any]  # of uint8, uint16, uint32 or uint64
 MAX_CHANNEL = 255
 KIND_FLAGS = dict(zip(KINDS, (FrameFlag(0), FrameFlag.REMOTE, FrameFlag.ERROR), strict=True))
 CLASSICAL_OF_CODE = np.minimum(np.arange(16), 8).astype(np.uint8)
@@ -22,6 +20,15 @@ _BEHIND = np.arange(64) < np.arange(65)[:, None]
 KEPT_64 = np.where(_BEHIND, 0xFF, 0).astype(np.uint8).view(np.uint64)  # (65, 8): mask of the first bytes of a row
 KEPT_8 = KEPT_64[:9, 0].copy()
 SHOWN_BYTES = 32
+_READ = ("BusChannel", "ID", "IDE", "DLC", "DataLength", "DataBytes", "Dir", "EDL", "BRS", "ESI")
+
+
+class OffsetOf(Protocol):
+    """Where in the file a row stands."""
+
+    def __call__(self, row: int) -> int:
+        """Byte offset."""
+        ...
 
 
 class ValueStore(Protocol):
@@ -71,7 +78,10 @@ class Layout:
     Parameters
     ----------
     group : of CAN frames.
+    master : channel of the time.
+    time_bytes : size of the records that it stands in.
     start_ns : start time of the file.
+    zeros : records of zeros only are no frames.
 
     Raises
     ------
@@ -79,10 +89,11 @@ class Layout:
         When its records cannot be frames: what is missing.
     """
 
-    def __init__(self, group: Group, master: Member | None, start_ns: int, account: Account, zeros: bool) -> None:
+    def __init__(
+        self, group: Group, master: Member | None, time_bytes: int, start_ns: int, account: Account, zeros: bool
+    ) -> None:
         self.group = group
         self.members = group.members
-        self.start_ns = start_ns
         self.account = account
         self.zeros = zeros
         self.kind_flags = KIND_FLAGS[group.kind]
@@ -92,11 +103,11 @@ class Layout:
         missing = [name for name in wanted if name not in group.members]
         if missing:
             raise DamagedError(group.address, f"{group.kind} without {' and '.join(missing)}")
-        if master is None or not master.linear:
+        if master is None or not is_time(master, time_bytes):
             raise DamagedError(group.address, f"{group.kind} without a time that can be read")
-        self.master = master
+        self.clock = Clock(master, start_ns)
         for name, member in group.members.items():
-            if name in _READ and not _fits(member, group.data_bytes, name == "DataBytes"):
+            if name in _READ and not fits(member, group.data_bytes, name == "DataBytes"):
                 raise DamagedError(group.address, f"{group.kind}.{name} of {member.bits} bits at byte {member.byte}")
         self.data = group.members.get("DataBytes")
         self.width = min(64, self.data.bits // 8) if self.data is not None else 0
@@ -113,9 +124,9 @@ class Layout:
         times : records of the group that holds the time, where it is another one.
         """
         n = len(records)
-        time_ns, good = self._times(records if times is None else times)
+        time_ns, good = self.clock.stamps(records if times is None else times, self.rows)
         raw = self._column(records, "ID")
-        can_id = np.zeros(n, np.uint32) if raw is None else (raw & np.array(0xFFFF_FFFF, raw.dtype)).astype(np.uint32)
+        can_id = np.zeros(n, np.uint32) if raw is None else raw.astype(np.uint32)
         if raw is not None and raw.dtype.itemsize > 4:
             good &= (raw >> np.array(32, raw.dtype)) == 0
         wide = can_id > 0x7FFF_FFFF
@@ -162,7 +173,7 @@ class Layout:
         empty = (can_id == 0) & (bus == 0)
         rows = np.flatnonzero(empty)
         if len(rows):
-            empty[rows] = ~records[rows].any(1)
+            empty[rows] = np.logical_not(records[rows].any(1))
         return empty
 
     def _valid(self, records: Bytes, bit: int) -> Mask:
@@ -219,7 +230,7 @@ class Layout:
                 held, content = store.values(unsigned(records, self.data).astype(np.uint64))
                 good &= held >= 0
             else:
-                content = _data_bytes(records, self.data, self.width)
+                content = data_bytes(records, self.data, self.width)
         if stated is not None and not (remote and code is not None):
             length = np.minimum(stated, np.array(255, stated.dtype)).astype(np.uint8)
         elif code is not None and (remote or not isinstance(held, np.ndarray)):
@@ -247,122 +258,11 @@ class Layout:
         good &= code < np.array(16, code.dtype)
         narrow = (code & np.array(15, code.dtype)).astype(np.uint8)
         if edl is None:
-            return CLASSICAL_OF_CODE[narrow] if self.width <= 8 else FD_OF_CODE[narrow]
-        return np.where(edl, FD_OF_CODE[narrow], CLASSICAL_OF_CODE[narrow])
-
-    # -- time --------------------------------------------------------------------------------------------------------
-
-    def _times(self, records: Bytes) -> tuple[npt.NDArray[np.int64], Mask]:
-        """Stamps, and which of them can be one."""
-        master = self.master
-        n = len(records)
-        factor, offset = master.factor * 10**9, master.offset * 10**9
-        if master.kind == VIRTUAL_MASTER:
-            ticks = np.arange(self.rows, self.rows + n, dtype=np.int64)
-        elif master.floating:
-            kinds = {16: "f2", 32: "f4", 64: "f8"}
-            order = "<" if master.data_type == 4 else ">"
-            size = master.bits // 8
-            view = np.ascontiguousarray(records[:, master.byte : master.byte + size]).view(order + kinds[master.bits])
-            seconds = view[:, 0].astype(np.float64)
-            with np.errstate(over="ignore", invalid="ignore"):
-                if master.factor != 1 or master.offset:
-                    seconds = seconds * float(master.factor) + float(master.offset)
-                ns = np.rint(seconds * 1e9)
-            good = np.abs(ns) < 2.0**62
-            return np.where(good, ns, 0).astype(np.int64) + self.start_ns, good
+            lengths = CLASSICAL_OF_CODE if self.width <= 8 else FD_OF_CODE
+            found: Bytes = lengths[narrow]
         else:
-            raw = unsigned(records, master)
-            good = np.ones(n, np.bool_)
-            if master.data_type in (2, 3):
-                spare = 64 - master.bits
-                ticks = (raw.astype(np.uint64) << np.uint64(spare)).view(np.int64) >> np.int64(spare)
-            else:
-                good = raw < np.array(2**63, np.uint64) if raw.dtype == np.uint64 else good
-                ticks = raw.astype(np.int64)
-            return self._scaled(ticks, factor, offset, good)
-        return self._scaled(ticks, factor, offset, np.ones(n, np.bool_))
-
-    def _scaled(
-        self, ticks: npt.NDArray[np.int64], factor: Fraction, offset: Fraction, good: Mask
-    ) -> tuple[npt.NDArray[np.int64], Mask]:
-        """Whole nanoseconds, exactly: ticks * factor + offset, rounded."""
-        base = self.start_ns + round(offset)
-        top, bottom = factor.numerator, factor.denominator
-        bound = 2**62 * bottom // max(1, abs(top)) - 1
-        if abs(base) < 2**62 and bottom < 2**31 and abs(top) < 2**31:
-            good = good & (ticks >= -bound) & (ticks <= bound) if bound < 2**63 else good
-            if top == bottom:
-                fits = (ticks >= -(2**63) - min(0, base)) & (ticks <= 2**63 - 1 - max(0, base))
-                good = good & fits
-                return np.where(good, ticks, 0) + base, good
-            ticks = np.where(good, ticks, 0)
-            whole, rest = np.divmod(ticks, bottom) if bottom > 1 else (ticks, np.zeros(1, np.int64))
-            return whole * top + (rest * top + bottom // 2) // bottom + base, good
-        ns = np.rint(ticks.astype(np.longdouble) * np.longdouble(float(factor)) + np.longdouble(float(offset)))
-        good = good & (np.abs(ns) < 2.0**62)
-        return np.where(good, ns, 0).astype(np.int64) + self.start_ns, good
-
-
-class OffsetOf(Protocol):
-    """Where in the file a row stands."""
-
-    def __call__(self, row: int) -> int:
-        """Byte offset."""
-        ...
-
-
-_READ = ("BusChannel", "ID", "IDE", "DLC", "DataLength", "DataBytes", "Dir", "EDL", "BRS", "ESI")
-
-
-def _fits(member: Member, size: int, data: bool) -> bool:
-    """A member can be read out of a record."""
-    if member.kind == VIRTUAL or (not member.bits and not data):
-        whole = member.factor.denominator == 1 and member.offset.denominator == 1
-        return whole and 0 <= member.factor < 2**32 and 0 <= member.offset < 2**32
-    inside = member.byte + (member.bit + member.bits + 7) // 8 <= size
-    if data and member.kind != VLSD:
-        return inside and member.bits >= 8
-    if not (inside and 1 <= member.bits <= 64 and member.bit + member.bits <= 64):
-        return False
-    if not data and (member.data_type > 3 or not member.linear):
-        return member.data_type <= 3 and member.factor == 1 and not member.offset
-    return member.factor.denominator == 1 and member.offset.denominator == 1 and 0 <= member.factor < 2**32
-
-
-def unsigned(records: Bytes, member: Member) -> Numbers:
-    """Raw bits of a member, (n,), in the narrowest of uint8, uint16, uint32, uint64 that holds the bytes it touches."""
-    touched = (member.bit + member.bits + 7) // 8
-    big = member.data_type in (1, 3, 5)
-    value = _word(records, member.byte, touched, big)
-    if member.bit:
-        value = value >> np.array(member.bit, value.dtype)
-    if member.bits < 8 * value.dtype.itemsize:
-        value = value & np.array((1 << member.bits) - 1, value.dtype)
-    return value
-
-
-def _word(records: Bytes, first: int, n: int, big: bool) -> Numbers:
-    """``n`` bytes of every record as one number; parts of 4, 2 and 1 bytes where 1, 2, 4 or 8 do not fit."""
-    if n == 1:
-        return records[:, first]
-    if n in (2, 4, 8):
-        view = records[:, first : first + n].view(f"{'>' if big else '<'}u{n}")[:, 0]
-        return view.astype(f"u{n}")
-    kind = np.dtype("u4" if n < 4 else "u8")
-    part = 1 << (n.bit_length() - 1)
-    before, behind = _word(records, first, part, big), _word(records, first + part, n - part, big)
-    upper, lower, shift = (before, behind, 8 * (n - part)) if big else (behind, before, 8 * part)
-    return (upper.astype(kind) << np.array(shift, kind)) | lower.astype(kind)
-
-
-def _data_bytes(records: Bytes, member: Member, width: int) -> Bytes:
-    """Bytes of a fixed array, (n, width); of one that begins within a byte, shifted."""
-    first = records[:, member.byte : member.byte + width]
-    if not member.bit:
-        return first
-    behind = records[:, member.byte + 1 : member.byte + 1 + width]
-    return (first >> np.uint8(member.bit)) | (behind << np.uint8(8 - member.bit))
+            found = np.where(edl, FD_OF_CODE[narrow], CLASSICAL_OF_CODE[narrow])
+        return found
 
 
 def _masked(content: Bytes, length: npt.NDArray[np.uint8], wide: bool) -> Bytes:

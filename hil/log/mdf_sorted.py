@@ -10,7 +10,8 @@ from hil.log.account import Account
 from hil.log.frames import FrameTable
 from hil.log.mdf_blocks import CYCLES_OPEN, MAX_RECORD_BYTES, VLSD, DamagedError, DataGroup, Group, MdfFile
 from hil.log.mdf_data import DataStream
-from hil.log.mdf_records import Bytes, Layout
+from hil.log.mdf_fields import Bytes
+from hil.log.mdf_records import Layout
 from hil.log.mdf_values import SignalData
 
 OPEN_NOTE = "an unfinalised file: what its writer left open is taken from the data"
@@ -114,8 +115,8 @@ def sorted_frames(
     DamagedError
         When its records cannot be frames.
     """
-    layout = Layout(group, group.master if master_of is None else master_of[1].master, mdf.start_ns, account,
-                    not mdf.finalised)  # fmt: skip
+    timed = group if master_of is None else master_of[1]
+    layout = Layout(group, timed.master, timed.data_bytes, mdf.start_ns, account, not mdf.finalised)
     stream = DataStream(mdf, data.data)
     apart = _bits_apart(mdf, data.data)
     stride = _stride(data, group, apart)

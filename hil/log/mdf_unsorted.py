@@ -10,8 +10,9 @@ from hil.log.account import Account
 from hil.log.frames import FrameTable
 from hil.log.mdf_blocks import CYCLES_OPEN, VLSD, VLSD_OFFSETS_OPEN, DamagedError, DataGroup, MdfFile
 from hil.log.mdf_data import DataStream
+from hil.log.mdf_fields import Bytes, unsigned
 from hil.log.mdf_merge import Reordering
-from hil.log.mdf_records import Bytes, Layout, unsigned
+from hil.log.mdf_records import Layout
 from hil.log.mdf_scan import FULL, UNKNOWN, scan_records
 from hil.log.mdf_sorted import OPEN_NOTE, Share
 from hil.log.mdf_values import BATCH_ROWS, SignalData, Values, numbers_at
@@ -165,7 +166,7 @@ class _Scanner:
             if not group.kind or group.vlsd:
                 continue
             try:
-                layout = Layout(group, group.master, mdf.start_ns, account, not mdf.finalised)
+                layout = Layout(group, group.master, group.data_bytes, mdf.start_ns, account, not mdf.finalised)
             except DamagedError as error:
                 account.reject(error.offset, error.problem)
                 continue

@@ -5,7 +5,7 @@ import numpy.typing as npt
 
 from hil.log.account import Account
 from hil.log.mdf_data import DataStream
-from hil.log.mdf_records import Bytes
+from hil.log.mdf_fields import Bytes
 
 STORE_BYTES = 16 << 20  # of values that are kept for records still to come
 BATCH_ROWS = 4096

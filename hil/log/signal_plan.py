@@ -113,6 +113,7 @@ class MessagePlan:
     signals : all that are kept, and their multiplexers.
     least : bytes below which a frame holds no signal at all.
     full : bytes from which a frame holds every signal (that its multiplexers select).
+    plain : the compiled pass takes all signals, and all lie in the first word of every frame that is not short.
     ints, floats : what the compiled pass needs of each signal, see `hil.log.decode_pass`.
     """
 
@@ -121,6 +122,7 @@ class MessagePlan:
     signals: list[SignalPlan]
     least: int
     full: int
+    plain: bool
     ints: Ints
     floats: Floats
 
@@ -152,7 +154,10 @@ def plan_message(message: Message, name: str, wanted: Wanted) -> MessagePlan:
     for row, plan in enumerate(signals):
         if plan.kind != OTHER:
             ints[row], floats[row] = _numbers(plan)
-    return MessagePlan(name, message, signals, least, full, ints, floats)
+    plain = all(
+        plan.kind != OTHER and plan.parent is None and plan.word == 0 and not plan.straddles for plan in signals
+    )
+    return MessagePlan(name, message, signals, least, full, plain, ints, floats)
 
 
 def _ends(message: Message, by_name: dict[str, Signal]) -> dict[str, int]:

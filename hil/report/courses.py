@@ -47,12 +47,12 @@ class Courses:
     Attributes
     ----------
     unit : of all of them.
-    names : at the axis, in place of numbers; None for numbers.
+    names : texts at the axis in place of numbers; the values are then 0, 1, ...: indices of these. None for numbers.
     """
 
     courses: tuple[Course, ...]
     unit: str = ""
-    names: dict[float, str] | None = None
+    names: tuple[str, ...] | None = None
 
     def title(self) -> tuple[str, list[str]]:
         """Part that all names begin with (up to the dot), and what is left of each."""
@@ -81,9 +81,19 @@ def _span(plots: Sequence[Courses]) -> tuple[float, float]:
     return (float(low), float(high)) if high > low else (float(low) - 0.5, float(low) + 0.5)
 
 
-def _ticks(names: dict[float, str]) -> tuple[list[float], list[str]]:
-    places = sorted(names)
-    return places, [_cut(f"{clean(names[place])}  {place:g}") for place in places]
+def _ticks(names: tuple[str, ...]) -> list[str]:
+    return [_cut(clean(name)) for name in names]
+
+
+def _value_range(plot: Courses) -> tuple[float, float] | None:
+    """Range of an axis where the values do not give one: names, and values that never change."""
+    if plot.names is not None:
+        return -0.4, len(plot.names) - 0.6
+    finite = [course.y[np.isfinite(course.y)] for course in plot.courses]
+    low = min((float(y.min()) for y in finite if y.size), default=0.0)
+    high = max((float(y.max()) for y in finite if y.size), default=0.0)
+    room = max(1.0, 0.1 * abs(low))
+    return (low - room, low + room) if low == high else None
 
 
 def _cut(text: str) -> str:
@@ -110,10 +120,10 @@ def _write_picture(plots: Sequence[Courses], title: str, subtitle: str, path: Pa
     width = _WIDTH_IN - _LEFT_IN - _RIGHT_IN
     left = _LEFT_IN
     if any(plot.names for plot in plots):  # room for the names at the axis
-        longest = max(len(text) for plot in plots if plot.names for text in _ticks(plot.names)[1])
-        left = max(_LEFT_IN, 0.3 + 0.066 * longest)
+        longest = max(len(text) for plot in plots if plot.names for text in _ticks(plot.names))
+        left = max(_LEFT_IN, 0.3 + 0.07 * longest)
         width = _WIDTH_IN - left - _RIGHT_IN
-    legends = [_rows_of_legend(*plot.title(), int(width / 0.072)) for plot in plots]
+    legends = [_rows_of_legend(*plot.title(), int(width / 0.085)) for plot in plots]
     heights = [_panel_height(plot) for plot in plots]
     total = _TOP_IN + sum(heights) + sum(_LINE_IN * len(rows) + 0.09 + _GAP_IN for rows in legends) + _BOTTOM_IN
     figure = Figure(figsize=(_WIDTH_IN, total))
@@ -129,7 +139,7 @@ def _write_picture(plots: Sequence[Courses], title: str, subtitle: str, path: Pa
         box = (left / _WIDTH_IN, (top - height) / total, width / _WIDTH_IN, height / total)
         axes = figure.add_axes(box, sharex=shared)
         shared = axes if shared is None else shared
-        _draw(axes, plot, rows, height, width)
+        _draw(axes, plot, rows, height)
         axes.set_xlim(*span)
         axes.tick_params(labelbottom=k == len(plots) - 1)
         top -= height + _GAP_IN
@@ -142,10 +152,10 @@ def _write_picture(plots: Sequence[Courses], title: str, subtitle: str, path: Pa
 
 
 def _panel_height(plot: Courses) -> float:
-    return _PANEL_IN if not plot.names else max(0.55, min(3.0, 0.2 * len(plot.names) + 0.15))
+    return _PANEL_IN if not plot.names else max(0.35, min(3.0, 0.2 * len(plot.names)))
 
 
-def _draw(axes: "Axes", plot: Courses, rows: list[list[int]], height: float, width: float) -> None:
+def _draw(axes: "Axes", plot: Courses, rows: list[list[int]], height: float) -> None:
     axes.grid(True, color=_GRID, linewidth=0.8)
     axes.set_axisbelow(True)
     axes.tick_params(labelsize=8, colors=_SOFT, length=3, width=0.8)
@@ -160,10 +170,7 @@ def _draw(axes: "Axes", plot: Courses, rows: list[list[int]], height: float, wid
         if alone.any():
             axes.plot(t_s[alone], y[alone], color=SERIES[k % len(SERIES)], marker=".", linestyle="none", markersize=4)
     if plot.names:
-        places, texts = _ticks(plot.names)
-        axes.set_yticks(places, texts)
-        room = 0.5 if len(places) < 2 else 0.12 * (places[-1] - places[0])
-        axes.set_ylim(places[0] - room, places[-1] + room)
+        axes.set_yticks(range(len(plot.names)), _ticks(plot.names))
         for label in axes.get_yticklabels():
             label.set_parse_math(False)
     else:
@@ -171,10 +178,13 @@ def _draw(axes: "Axes", plot: Courses, rows: list[list[int]], height: float, wid
         axes.ticklabel_format(axis="y", useOffset=False)
         axes.margins(y=0.08)
         axes.set_ylabel(clean(plot.unit), fontsize=8.5, color=_SOFT, parse_math=False)
-    _legend(axes, plot, rows, height, width)
+    limits = _value_range(plot)
+    if limits is not None:
+        axes.set_ylim(*limits)
+    _legend(axes, plot, rows, height)
 
 
-def _legend(axes: "Axes", plot: Courses, rows: list[list[int]], height: float, width: float) -> None:
+def _legend(axes: "Axes", plot: Courses, rows: list[list[int]], height: float) -> None:
     from matplotlib.offsetbox import AnchoredOffsetbox, HPacker, TextArea
 
     head, names = plot.title()
@@ -185,8 +195,7 @@ def _legend(axes: "Axes", plot: Courses, rows: list[list[int]], height: float, w
         parts = parts if head and not line else []
         for k in row:
             colour = SERIES[k % len(SERIES)] if len(names) > 1 else INK
-            weight = "bold" if not head else "normal"
-            style = {"size": 9, "color": colour, "weight": weight, "parse_math": False}
+            style = {"size": 9, "color": colour, "parse_math": False}
             parts.append(TextArea(clean(names[k]), textprops=style))
         place = 1 + (0.03 + _LINE_IN * (len(rows) - 1 - line)) / height
         box = HPacker(children=parts, pad=0, sep=9)
@@ -241,7 +250,7 @@ def courses_figure(plots: Sequence[Courses]) -> dict[str, Any]:
     count = max(1, sum(len(plot.courses) for plot in plots))
     limit = min(MOST_PAGE_SAMPLES, max(1000, PAGE_SAMPLES // count))
     legends = [_rows_of_legend(*plot.title(), 150) for plot in plots]
-    heights = [_PANEL_PX if not plot.names else max(70, min(360, 22 * len(plot.names) + 20)) for plot in plots]
+    heights = [_PANEL_PX if not plot.names else max(44, min(400, 24 * len(plot.names))) for plot in plots]
     total = sum(heights) + sum(_LINE_PX * len(rows) + 8 + _GAP_PX for rows in legends)
     axis = {"zeroline": False, "ticks": "outside", "ticklen": 4, "gridcolor": _GRID, "linecolor": _RULE}
     axis |= {"tickcolor": _RULE, "automargin": True}
@@ -265,12 +274,13 @@ def courses_figure(plots: Sequence[Courses]) -> dict[str, Any]:
         key = "" if number == 1 else str(number)
         own: dict[str, Any] = {"domain": [max(0.0, (top - height) / total), top / total], "anchor": "x", "nticks": 6}
         if plot.names:
-            places, texts = _ticks(plot.names)
-            room = 0.5 if len(places) < 2 else 0.12 * (places[-1] - places[0])
-            own |= {"tickvals": places, "ticktext": [inert(text) for text in texts]}
-            own |= {"range": [places[0] - room, places[-1] + room], "nticks": 0}
+            texts = [inert(text) for text in _ticks(plot.names)]
+            own |= {"tickvals": list(range(len(texts))), "ticktext": texts}
         elif plot.unit:
             own["title"] = {"text": inert(plot.unit)}
+        limits = _value_range(plot)
+        if limits is not None:
+            own["range"] = list(limits)
         layout[f"yaxis{key}"] = axis | own
         data += [_trace(plot, k, course, f"y{key}", limit) for k, course in enumerate(plot.courses)]
         layout["annotations"].append(
@@ -307,9 +317,9 @@ def _trace(plot: Courses, k: int, course: Course, axis: str, limit: int) -> dict
         "hovertemplate": f"{inert(course.name)}  %{{y:.6~g}}{unit}<extra></extra>",
     }
     if plot.names:
-        texts = {place: inert(name) for place, name in plot.names.items()}
-        trace["customdata"] = [texts.get(value, "") for value in y.tolist()]
-        trace["hovertemplate"] = f"{inert(course.name)}  %{{y:.6~g}} %{{customdata}}<extra></extra>"
+        texts = [inert(name) for name in plot.names]
+        trace["customdata"] = [texts[int(value)] if value == value else "" for value in y.tolist()]
+        trace["hovertemplate"] = f"{inert(course.name)}  %{{customdata}}<extra></extra>"
     return trace
 
 
@@ -320,7 +330,6 @@ def _legend_text(plot: Courses, rows: list[list[int]]) -> str:
         parts = [f"<b>{inert(head)}</b>"] if head and not line else []
         for k in row:
             colour = SERIES[k % len(SERIES)] if len(names) > 1 else INK
-            name = inert(names[k]) if head else f"<b>{inert(names[k])}</b>"
-            parts.append(f'<span style="color:{colour}">{name}</span>')
+            parts.append(f'<span style="color:{colour}">{inert(names[k])}</span>')
         lines.append("   ".join(parts))
     return "<br>".join(lines)

@@ -123,11 +123,12 @@ def _frames_to_signals(frames: FrameTable) -> Row:
 
 
 def _python_can_signals(reader: Callable[[Path], Any], path: Path) -> int:
-    loaded, columns, n = database(BusName.VEHICLE), {}, 0
+    loaded, n = database(BusName.VEHICLE), 0
+    columns: dict[tuple[int, str], list[Any]] = {}
     with reader(path) as messages:
         for message in messages:
             n += 1
-            values = loaded.decode_message(message.arbitration_id, message.data, decode_choices=False)
+            values: Any = loaded.decode_message(message.arbitration_id, message.data, decode_choices=False)
             for name, value in values.items():
                 columns.setdefault((message.arbitration_id, name), []).append(value)
     return n

@@ -289,7 +289,7 @@ class Terminal(io.StringIO):
 
 def test_progress_tells_the_remaining_time_on_a_terminal_only(monkeypatch):
     now = [100.0]
-    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    monkeypatch.setattr("hil.cli.progress.monotonic_ns", lambda: int(now[0] * 1e9))
     for stream in (Terminal(), io.StringIO()):
         now[0] = 100.0
         with Progress(2, stream) as progress:

@@ -1,4 +1,6 @@
+import gzip
 import struct
+import threading
 import zlib
 from pathlib import Path
 from zoneinfo import ZoneInfo
@@ -377,3 +379,55 @@ def test_small_logs_are_read_without_the_compiled_pass_and_large_ones_with_it(tm
         with open_log(path) as log:
             assert sum(map(len, log.tables())) == copies
         assert bool(used) == compiled
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [container(NOISE, packed=damaged(zlib.compress(NOISE))), container(NOISE, size=100), container(NOISE)[:-100]],
+    ids=["damaged", "too-small", "cut"],
+)
+def test_without_isal_the_frames_are_the_same(log_of, monkeypatch, bad):
+    content = file_of(container(NOISE), bad, container(NOISE))
+    rows, account = log_of(content)
+    monkeypatch.setattr(blf_inflate, "INFLATE", zlib)
+    again, other = log_of(content)
+    assert rows[:50] == again[:50]
+    assert rows[-50:] == again[-50:]
+    assert (account.rejected, account.truncated_at) == (other.rejected, other.truncated_at)
+
+
+def test_packed_with_gzip_and_limited(tmp_path):
+    path = tmp_path / "a.blf.gz"
+    content = file_of(container(NOISE), container(NOISE), container(NOISE))
+    path.write_bytes(gzip.compress(content))
+    with open_log(path) as log:
+        assert log.format.name == "blf"
+        assert (len(log.frames()), log.account.whole) == (150, True)
+    limit = 144 + len(container(NOISE)) + 100
+    with open_log(path, limit_bytes=limit) as log:
+        assert 50 <= len(log.frames()) < 100
+        assert log.account.truncated_at == limit
+
+
+def test_reading_may_end_early(tmp_path):
+    path = tmp_path / "a.blf"
+    path.write_bytes(file_of(*[container(classical() * 3000)] * 60))
+    threads = threading.active_count()
+    with open_log(path) as log:
+        tables = log.tables()
+        assert len(next(tables)) == 65_536
+        tables.close()
+    assert threading.active_count() == threads
+    with open_log(path) as log:
+        assert len(log.frames()) == 180_000
+
+
+def test_a_log_of_many_tables_has_one_channel_numbering(tmp_path):
+    path = tmp_path / "a.blf"
+    content = b"".join(classical(channel=1 + k // 1000 % 200, can_id=k % 2048, stamp=k) for k in range(140_000))
+    path.write_bytes(file_of(*(container(content[at : at + 131_072]) for at in range(0, len(content), 131_072))))
+    with open_log(path) as log:
+        frames = log.frames()
+    assert frames.time_ns.tolist() == list(range(START_NS, START_NS + 140_000))
+    assert (frames.can_id == np.arange(140_000) % 2048).all()
+    assert [frames.channels[i] for i in frames.channel[::1000]] == [f"can{k}" for k in range(140)]
