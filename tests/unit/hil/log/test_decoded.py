@@ -144,7 +144,7 @@ def test_a_whole_identifier_and_a_group_of_two_databases():
 
 
 def test_a_long_chain_of_multiplexers_is_followed():
-    depth = 60
+    depth = 16  # the deepest that a database may nest
     lines = [' SG_ S0 M : 0|1@1+ (1,0) [0|0] "" A']
     lines += [f' SG_ S{i} m1{"M" if i < depth - 1 else ""} : {i}|1@1+ (1,0) [0|0] "" A' for i in range(1, depth)]
     chain = [f"SG_MUL_VAL_ 1 S{i} S{i - 1} 1-1;" for i in range(1, depth)]
