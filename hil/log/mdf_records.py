@@ -8,7 +8,7 @@ import numpy.typing as npt
 from hil.log.account import Account
 from hil.log.frames import FD_CODES, FD_LENGTHS, MAX_EXTENDED_ID, MAX_STANDARD_ID, FrameFlag, FrameTable
 from hil.log.mdf_blocks import KINDS, VIRTUAL, VLSD, DamagedError, Group, Member
-from hil.log.mdf_fields import Bytes, Mask, Numbers, data_bytes, fits, unsigned
+from hil.log.mdf_fields import KEPT_8, KEPT_64, Bytes, Mask, Numbers, data_bytes, fits, unsigned
 from hil.log.mdf_time import Clock, is_time
 
 MAX_CHANNEL = 255
@@ -16,9 +16,6 @@ KIND_FLAGS = dict(zip(KINDS, (FrameFlag(0), FrameFlag.REMOTE, FrameFlag.ERROR), 
 CLASSICAL_OF_CODE = np.minimum(np.arange(16), 8).astype(np.uint8)
 FD_OF_CODE = np.array(FD_CODES, np.uint8)
 FD_LENGTH = np.isin(np.arange(256), list(FD_LENGTHS))
-_BEHIND = np.arange(64) < np.arange(65)[:, None]
-KEPT_64 = np.where(_BEHIND, 0xFF, 0).astype(np.uint8).view(np.uint64)  # (65, 8): mask of the first bytes of a row
-KEPT_8 = KEPT_64[:9, 0].copy()
 SHOWN_BYTES = 32
 _READ = ("BusChannel", "ID", "IDE", "DLC", "DataLength", "DataBytes", "Dir", "EDL", "BRS", "ESI")
 

@@ -50,7 +50,7 @@ class _StreamValues:
         total = int(ends[-1]) if len(ends) else 0
         room = np.frombuffer(self.window.room(total), np.uint8)
         target = ends - size
-        for n in np.unique(size).tolist():
+        for n in _distinct(size):
             same = size == n
             whole = _pieces(room, n)
             whole[target[same]] = _pieces(buffer, n)[begin[same]]
@@ -82,6 +82,14 @@ class _StreamValues:
             part = slice(begin, begin + BATCH_ROWS)
             self.window.take(at[part], rows[part], lengths, data)
         return lengths, data
+
+
+def _distinct(sizes: npt.NDArray[np.int64]) -> list[int]:
+    if not len(sizes):
+        return []
+    if int(sizes.max()) > BLOCK_BYTES:
+        return sorted(set(sizes.tolist()))
+    return np.flatnonzero(np.bincount(sizes)).tolist()
 
 
 def _pieces(content: Bytes, n: int) -> npt.NDArray[np.void]:
@@ -199,8 +207,10 @@ class _Scanner:
             have += got
             n, at, why = scan(buffer, have, self.data.id_bytes, self.ids, self.sizes, numbers, begins)
             self._hand_out(buffer[:have], numbers[:n], begins[:n], first)
-            starts = stream.starts_between(first, first + at) - first
-            self.aligned = self.aligned and bool(np.isin(starts, begins[:n] - self.data.id_bytes).all())
+            if self.aligned:
+                firsts = np.append(begins[:n] - self.data.id_bytes, at)  # of the records, ascending
+                starts = stream.starts_between(first, first + at) - first
+                self.aligned = bool((firsts[np.searchsorted(firsts, starts)] == starts).all())
             stream.forget(first)
             yield False
             if why == UNKNOWN:
