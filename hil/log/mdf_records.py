@@ -167,7 +167,7 @@ class Layout:
 
     def _empty(self, records: Bytes, can_id: npt.NDArray[np.uint32], bus: npt.NDArray[np.int32]) -> Mask:
         """Records of zeros: space that a logger without power had set aside, or never written sectors."""
-        empty = (can_id == 0) & (bus == 0)
+        empty: Mask = (can_id == 0) & (bus == 0)
         rows = np.flatnonzero(empty)
         if len(rows):
             empty[rows] = np.logical_not(records[rows].any(1))
