@@ -143,7 +143,7 @@ class Layout:
 
         number = self._column(records, "BusChannel")
         if number is None:
-            bus = np.ones(n, np.int32)
+            bus = np.full(n, self.group.channel, np.int32)
         else:
             good &= number <= MAX_CHANNEL
             bus = number.astype(np.uint8).astype(np.int32)

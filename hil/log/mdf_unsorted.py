@@ -14,7 +14,7 @@ from hil.log.mdf_fields import Bytes, unsigned
 from hil.log.mdf_merge import Reordering
 from hil.log.mdf_records import Layout
 from hil.log.mdf_scan import END, UNKNOWN, scan_records
-from hil.log.mdf_sorted import OPEN_NOTE, Share
+from hil.log.mdf_sorted import Share
 from hil.log.mdf_values import BATCH_ROWS, SignalData, Values, numbers_at
 
 BLOCK_BYTES = 2 << 20
@@ -291,8 +291,6 @@ class _Scanner:
 
     def _close(self) -> None:
         self.stream.close()
-        if self.stream.open_end:
-            self.account.note(OPEN_NOTE)
         if self.lost or self.stream.cut or self.mdf.unfinalised & CYCLES_OPEN:
             return
         for k, part in self.parts.items():

@@ -47,6 +47,8 @@ def read_mf4(source: Source, account: Account, options: ReadOptions) -> Iterator
         raise LogError(source.path, f"MDF version {mdf.version / 100:.2f}; 4.00 to 4.20 are read: convert it to MDF 4")
     if mdf.version > LATEST:
         account.note(f"MDF version {mdf.version / 100:.2f}: what is newer than {LATEST / 100:.2f} in it is not read")
+    if not mdf.finalised:
+        account.note("an unfinalised file: lengths and counts that its writer left open are taken from the data")
     _start(mdf, account, options)
     found = _groups_of_frames(mdf, source, account)
     if mdf.cut:

@@ -403,6 +403,18 @@ def test_members_that_are_missing_have_defaults(read):
     ]
 
 
+def test_the_name_of_a_group_tells_its_channel_where_its_frames_do_not(read):
+    file = Made(start_ns=START)
+    raw = struct.pack("<dIB8s", 1, 0x10, 1, b"1")
+    for name in ("CAN2", "CAN 3 Data", "Scan4", ""):
+        channel = frame(members=[("ID", 8, 0, 32), ("DLC", 12, 0, 4)], data_byte=13)
+        _, places, _ = file.group([Cg([time(), channel], 21, 1)], file.data(raw))
+        file.patch(places[0] + 24 + 16, file.text(name))
+    account, frames = read(file)
+    assert account.whole
+    assert [row[1] for row in rows(frames)] == ["can1", "can2", "can0", "can0"]
+
+
 def test_a_constant_bus_channel_is_a_virtual_channel(read):
     channel = frame(members=[("ID", 8, 0, 32), ("DLC", 12, 0, 4)], data_byte=13)
     channel.members.append(Cn("CAN_DataFrame.BusChannel", 0, 0, 0, kind=6, linear=(3.0, 0.0)))
