@@ -8,6 +8,7 @@ import re
 import struct
 from bisect import bisect_right
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import IO
@@ -294,10 +295,8 @@ class MdfFile:
     def _channel_of(self, block: Block) -> int:
         """Number in the name of a group, or of its source: CAN2 -> 2; 1 where there is none."""
         names = [self.text(block.links[2])]
-        try:
+        with suppress(DamagedError):
             names.append(self.text(self.block(block.links[3], b"SI", 1).links[0]) if block.links[3] else "")
-        except DamagedError:
-            pass
         numbers = [int(found[1]) for name in names if (found := re.search(r"(?i)\bCAN ?([1-9]\d?)\b", name))]
         return numbers[0] if numbers else 1
 
