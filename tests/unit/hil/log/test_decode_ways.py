@@ -1,11 +1,13 @@
 """The compiled passes, numpy, and the same log in pieces: one result."""
 
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hil.log import unknown_ids
+from hil.log import decode, unknown_ids
 from hil.log.decode import Decoder, decode_log
 from hil.log.frames import FrameFlag
 
@@ -135,15 +137,16 @@ DBC = [
 ]
 
 
-def test_a_long_log_takes_the_compiled_way_by_itself():
+def test_a_long_log_takes_the_compiled_way_by_itself(monkeypatch):
+    monkeypatch.setattr(decode, "FEW_FRAMES", 20_000)
+    monkeypatch.delitem(sys.modules, "hil.log.decode_pass", raising=False)
     table = table_of([(1 + i % 3, bytes([i & 255, i >> 8 & 255, i % 16, 0, 0, 0, 0, 0])) for i in range(30_000)])
     decoder = Decoder(database_of(*DBC))
     for begin in range(0, 30_000, 7_000):
         decoder.add(table.take(slice(begin, begin + 7_000)))
+        assert ("hil.log.decode_pass" in sys.modules) == (begin >= 14_000)
     careful = Decoder(database_of(*DBC), fast=False)
     careful.add(table)
-    assert decoder._fast
-    assert careful._fast is False
     assert_same_counts(decoder.totals, careful.totals)
     assert decoder.totals.unknown_ids == {"can0 0x003": 10_000}
 
