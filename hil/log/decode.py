@@ -307,7 +307,7 @@ class _Head:
     def totals(self) -> dict[str, SignalCount]:
         """Counts of all tables so far."""
         named = zip(self._columns, self._counts.tolist(), strict=True)
-        return {name: SignalCount(*counts) for name, counts in named if name is not None and counts[0]}
+        return {name: SignalCount(*counts) for name, counts in named if name is not None}
 
 
 def _stamps(

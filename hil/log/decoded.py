@@ -199,7 +199,9 @@ class DecodedLog(DecodedCounts):
     ----------
     recording : the frames.
     time_s : time stamps of the well-formed frames, s; `Column.rows` index it.
-    columns : signals by "MESSAGE.SIGNAL"; see `hil.log.decode` for the names where that alone is not clear.
+    columns : signals by "MESSAGE.SIGNAL", an empty one too where the message came but not the signal; see
+        `hil.log.decode` for the names where that alone is not clear. The values lie in one memory that the columns
+        share: a copy of one column lets go of all others.
     rows : frames of each message (of each source of a J1939 message), ascending, by the name that its columns have
         before the point.
     """
