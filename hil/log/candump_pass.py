@@ -15,6 +15,9 @@ def take_lines(buffer, begin, names, name_lengths, columns, n):  # type: ignore[
     rows, width, size = times.shape[0], data.shape[1], buffer.shape[0]
     channel, p = 0, begin
     while p < size and n < rows:
+        if buffer[p] == 10:
+            p += 1
+            continue
         start = p
         if buffer[p] != 40:  # (
             return start, n

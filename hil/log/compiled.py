@@ -24,3 +24,10 @@ HEX = np.full(256, NO_DIGIT, np.uint8)
 for _value, _letter in enumerate(b"0123456789ABCDEF"):
     HEX[_letter] = _value
     HEX[ord(chr(_letter).lower())] = _value
+
+NO_BYTE = 256
+PAIRS = np.full(65_536, NO_BYTE, np.uint16)
+"""Value of two hexadecimal digits, by the first byte and 256 times the second; `NO_BYTE` for all other pairs."""
+_first, _second = np.meshgrid(np.arange(256), np.arange(256))
+_both = (HEX[_first] < NO_DIGIT) & (HEX[_second] < NO_DIGIT)
+PAIRS[(_first + 256 * _second)[_both]] = (16 * HEX[_first].astype(np.uint16) + HEX[_second])[_both]

@@ -12,10 +12,11 @@ from hil.log.account import Account
 from hil.log.frames import FrameTable, LogError, LogFacts
 from hil.log.source import ReadOptions, Source
 
-
 Reader = Callable[[Source, Account, ReadOptions], Iterator[FrameTable]]
-"""Yields the frames of a log in tables of bounded size that share one channel numbering; start time, rejected pieces and
-the like go to the account. Raises LogError for what is no such log."""
+"""Yields the frames of a log in tables of bounded size that share one channel numbering.
+
+Start time, rejected pieces and the like go to the account. Raises LogError for what is no such log.
+"""
 Writer = Callable[[IO[bytes], Iterable[FrameTable], LogFacts, tzinfo], None]
 """Writes frames to a file open for reading and writing; the facts are those of all tables together."""
 
@@ -123,7 +124,8 @@ def format_of(source: Source) -> Format:
     """
     head = source.head()
     if not head:
-        raise LogError(source.path, "empty: no log in it; give a log file")
+        problem = "gzip file that cannot be unpacked" if source.packed else "empty: no log in it"
+        raise LogError(source.path, f"{problem}; give a log file")
     scores = [form.told_by(head) for form in FORMATS]
     if not max(scores):
         names = ", ".join(f.name for f in FORMATS)

@@ -1,142 +1,122 @@
-"""ASAM MDF 4 bus logs (MF4) through asammdf, whole columns at once.
+"""ASAM MDF 4 bus logs (MF4): reads frames straight from the blocks of records; `write_mf4` writes sorted ones."""
 
-asammdf is an extra (``pip install brakebench[mdf]``). python-can's writer is not used: it counts time from the moment
-of writing and appends frame by frame.
-"""
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from datetime import timedelta
 
-import logging
-from datetime import UTC, datetime
-from pathlib import Path
-from typing import Any
+from hil.log.account import Account
+from hil.log.builder import ROWS
+from hil.log.frames import FrameTable, LogError
+from hil.log.mdf_blocks import DamagedError, DataGroup, Group, MdfFile
+from hil.log.mdf_frames import write_mf4
+from hil.log.mdf_merge import merged
+from hil.log.mdf_records import Channels
+from hil.log.mdf_sorted import Share, sorted_frames
+from hil.log.mdf_unsorted import unsorted_frames
+from hil.log.source import ReadOptions, Source
+from hil.log.wall_clock import EPOCH, wall_clock_ns
 
-import numpy as np
-import numpy.typing as npt
+__all__ = ["read_mf4", "write_mf4"]
 
-from hil.log.frames import FD_CODES, FrameBuilder, FrameFlag, FrameTable, LogError, Recording
-
-KINDS = ("CAN_DataFrame", "CAN_RemoteFrame", "CAN_ErrorFrame")
-FLAG_FIELDS = {"EDL": FrameFlag.FD, "BRS": FrameFlag.BIT_RATE_SWITCH, "ESI": FrameFlag.ERROR_STATE}
-KIND_FLAGS = (FrameFlag(0), FrameFlag.REMOTE, FrameFlag.ERROR)
-CODE_OF = np.zeros(65, np.uint8)
-CODE_OF[list(FD_CODES)] = range(16)
-
-
-def _asammdf(path: Path) -> Any:
-    try:
-        import asammdf
-    except ImportError as error:
-        raise LogError(path, "MF4 needs the package asammdf; install it with: pip install 'brakebench[mdf]'") from error
-    return asammdf
+MERGED_ROWS = 4 * ROWS  # of all groups together
+HELD_BYTES = 64 << 20  # of records and values, of all groups together
+LEAST_ROWS = 64
 
 
-def read_mdf(path: Path) -> Recording:
-    """Read the CAN frames of an MF4 bus log, ordered by time over its groups.
+def read_mf4(source: Source, account: Account, options: ReadOptions) -> Iterator[FrameTable]:
+    """Yield the frames of an MF4 bus log, ordered by time over its groups.
 
     Raises
     ------
     LogError
-        When asammdf is missing or cannot read the file.
+        When its header is damaged, or it has no group of CAN frames.
     """
-    asammdf = _asammdf(path)
-    if path.read_bytes()[:3] not in (b"MDF", b"UnF"):
-        raise LogError(path, "no MDF file: expected the signature MDF", 0)
-    found: list[tuple[int, str, int, bool, bytes, FrameFlag, int]] = []
-    logging.getLogger("asammdf").setLevel(logging.CRITICAL + 1)  # its tracebacks would stand beside our one message
+    file = source.random_access()
+    size = file.seek(0, 2)
+    if source.limit_bytes is not None and size > source.limit_bytes:
+        size = source.limit_bytes
+        account.note(f"only the first {size} bytes are read")
+        account.cut_at(size)
     try:
-        with asammdf.MDF(path) as mdf:
-            start_ns = round(mdf.header.start_time.timestamp() * 1e6) * 1000
-            groups = 0
-            for number, group in enumerate(mdf.groups):
-                names = {channel.name for channel in group.channels}
-                for kind, flags in zip(KINDS, KIND_FLAGS, strict=True):
-                    if kind in names and group.channel_group.cycles_nr:
-                        found += _frames(mdf.get(kind, number, raw=False), kind, flags, start_ns)
-                        groups += 1
-    except LogError:
-        raise
-    except Exception as error:  # asammdf raises whatever a damaged block trips it into
-        problem = (str(error).splitlines() or [""])[0] or type(error).__name__
-        raise LogError(path, f"asammdf cannot read it: {problem}") from error
-    if groups > 1:
-        found.sort(key=lambda frame: frame[0])
-    builder = FrameBuilder()
-    for row, frame in enumerate(found):
-        if not builder.add(*frame):
-            builder.reject(row, str(frame))
-    return builder.recording(path, "mf4")
+        mdf = MdfFile(file, size, account)
+        mdf.describe()
+    except DamagedError as error:
+        raise LogError(source.path, f"no header of MDF 4: {error.problem}", error.offset) from error
+    if mdf.version // 100 != 4:
+        raise LogError(source.path, f"MDF version {mdf.version / 100:.2f}; 4.00 to 4.20 are read: convert it to MDF 4")
+    _start(mdf, account, options)
+    found = _groups_of_frames(mdf, source, account)
+    if mdf.cut:
+        account.cut_at(size)
+    channels = Channels()
+    tables = merged(_readers(mdf, found, account, options), _share(found).rows)
+    first = next(tables, None)
+    if first is None:
+        return
+    channels.first = 0 if len(first) and int(first.channel.min()) == 0 else 1
+    if not channels.first:
+        account.note("its bus channels count from 0")
+    yield channels.numbered(first)
+    for table in tables:
+        yield channels.numbered(table)
 
 
-def _frames(
-    signal: Any, kind: str, kind_flags: FrameFlag, start_ns: int
-) -> list[tuple[int, str, int, bool, bytes, FrameFlag, int]]:
-    """Frames of one group: time, channel, id, extended, data, flags, length."""
-    n = len(signal.timestamps)
-    fields = signal.samples.dtype.names or ()
+def _start(mdf: MdfFile, account: Account, options: ReadOptions) -> None:
+    """Start time of the file to the account; a wall clock is read in the zone that was chosen."""
+    if mdf.start_ns >= 2**62:
+        account.note(f"start time of {mdf.start_ns} ns is out of range: stamps count from 1970")
+        mdf.start_ns = 0
+        return
+    if mdf.local_start:
+        wall_clock = (EPOCH + timedelta(microseconds=mdf.start_ns // 1000)).replace(tzinfo=None)
+        mdf.start_ns = wall_clock_ns(wall_clock, options.timezone, mdf.start_ns % 1000)
+        account.local_start = True
+    account.start_ns = mdf.start_ns
 
-    def column(name: str) -> list[int]:
-        return signal.samples[f"{kind}.{name}"].astype(np.int64).tolist() if f"{kind}.{name}" in fields else [0] * n
 
-    time_ns = (start_ns + np.round(signal.timestamps * 1e9).astype(np.int64)).tolist()
-    ids, ides, channels = column("ID"), column("IDE"), column("BusChannel")
-    lengths = column("DataLength" if f"{kind}.DataLength" in fields and kind != "CAN_RemoteFrame" else "DLC")
-    flag_columns = [(column(name), flag) for name, flag in FLAG_FIELDS.items()]
-    payload = f"{kind}.DataBytes"
-    data = [bytes(row) for row in signal.samples[payload]] if payload in fields else [b""] * n
+def _groups_of_frames(mdf: MdfFile, source: Source, account: Account) -> list[tuple[DataGroup, list[Group]]]:
+    """Data groups with CAN frames; all others are passed over and counted."""
     found = []
-    for row in range(n):
-        flags = kind_flags
-        for values, flag in flag_columns:
-            flags |= flag if values[row] else FrameFlag(0)
-        length = min(lengths[row], 64)
-        found.append(
-            (
-                time_ns[row],
-                f"can{channels[row]}",
-                ids[row] & 0x1FFF_FFFF,
-                bool(ides[row]) or bool(ids[row] & 0x8000_0000),
-                data[row][:length],
-                flags,
-                length,
-            )
-        )
+    others: Counter[str] = Counter()
+    for data in mdf.groups:
+        frames = [group for group in data.groups if group.kind and not group.vlsd]
+        others.update(f"{group.holds} groups" for group in data.groups if not group.kind and not group.vlsd)
+        if frames:
+            found.append((data, frames))
+    if not found:
+        held = ", ".join(f"{count} {what}" for what, count in others.items()) or "no groups"
+        cut = "; the file is cut off" if mdf.cut else ""
+        raise LogError(source.path, f"no CAN frames in it (CAN_DataFrame, ...), it holds {held}{cut}; give a bus log")
+    account.passed_over.update(others)
     return found
 
 
-def write_mdf(frames: FrameTable, path: Path, numbers: list[int]) -> None:
-    """Write an MF4 bus log, version 4.10: one group each for data, remote and error frames."""
-    asammdf = _asammdf(path)
-    from asammdf.blocks.v4_blocks import SourceInformation
-    from asammdf.blocks.v4_constants import BUS_TYPE_CAN, SOURCE_BUS
-
-    start_s = int(frames.time_ns.min()) // 10**9 if len(frames) else 0
-    remote = (frames.flags & FrameFlag.REMOTE) != 0
-    error = (frames.flags & FrameFlag.ERROR) != 0
-    with asammdf.MDF(version="4.10") as mdf:
-        mdf.header.start_time = datetime.fromtimestamp(start_s, UTC)
-        for kind, mask in zip(KINDS, (~remote & ~error, remote, error), strict=True):
-            part = frames.take(mask)
-            if len(part) or kind == KINDS[0]:
-                samples = _samples(part, kind, numbers)
-                times = (part.time_ns - start_s * 10**9) / 1e9
-                source = SourceInformation(source_type=SOURCE_BUS, bus_type=BUS_TYPE_CAN)
-                mdf.append(asammdf.Signal(samples, times, name=kind, source=source))
-        mdf.save(path, overwrite=True, compression=1)
+def _share(found: list[tuple[DataGroup, list[Group]]]) -> Share:
+    return Share(
+        max(LEAST_ROWS, min(ROWS, MERGED_ROWS // len(found))), max(4096, min(16 << 20, HELD_BYTES // len(found)))
+    )
 
 
-def _samples(part: FrameTable, kind: str, numbers: list[int]) -> npt.NDArray[np.void]:
-    width = part.data.shape[1]
-    layout: list[Any] = [(f"{kind}.BusChannel", "u1"), (f"{kind}.ID", "<u4"), (f"{kind}.IDE", "u1")]
-    layout += [(f"{kind}.{name}", "u1") for name in ("DLC", "DataLength", "Dir", *FLAG_FIELDS)]
-    if kind != "CAN_RemoteFrame":
-        layout.append((f"{kind}.DataBytes", f"({width},)u1"))
-    samples = np.zeros(len(part), np.dtype(layout))
-    samples[f"{kind}.BusChannel"] = np.array(numbers, np.uint8)[part.channel] if numbers else 0
-    samples[f"{kind}.ID"] = part.can_id
-    samples[f"{kind}.IDE"] = part.extended
-    samples[f"{kind}.DLC"] = CODE_OF[part.length]
-    for name, flag in FLAG_FIELDS.items():
-        samples[f"{kind}.{name}"] = (part.flags & flag) != 0
-    if kind != "CAN_RemoteFrame":
-        samples[f"{kind}.DataLength"] = part.length
-        samples[f"{kind}.DataBytes"] = part.data
-    return samples
+def _readers(
+    mdf: MdfFile, found: list[tuple[DataGroup, list[Group]]], account: Account, options: ReadOptions
+) -> list[Iterable[FrameTable]]:
+    by_address = {group.address: (data, group) for data in mdf.groups for group in data.groups}
+    share = _share(found)
+    readers: list[Iterable[FrameTable]] = []
+    for data, frames in found:
+        if len(data.groups) == 1:
+            group = frames[0]
+            master = by_address.get(group.master_link) if group.master_link else None
+            readers.append(_guarded(sorted_frames(mdf, data, group, share, account, master), account))
+        elif data.id_bytes:
+            readers.append(_guarded(unsorted_frames(mdf, data, share, account, options.fast), account))
+        else:
+            account.reject(data.address, f"{len(data.groups)} groups in one data group, without record ids")
+    return readers
+
+
+def _guarded(tables: Iterator[FrameTable], account: Account) -> Iterator[FrameTable]:
+    try:
+        yield from tables
+    except DamagedError as error:
+        account.reject(error.offset, error.problem)

@@ -199,7 +199,7 @@ def _plan(signal: Signal, kept: bool) -> SignalPlan:
         kind=kind,
         sna=sna,
         limits=_limits(signal),
-        ranges=_ranges(signal),
+        ranges=signal.mux_ranges,
     )
 
 
@@ -217,20 +217,6 @@ def _fits(signal: Signal) -> bool:
     if factor == 1 and offset == 0:
         return bits < 64
     return bool(min(*ends, offset, factor) >= -_TOP and max(*ends, offset, factor) < _TOP)
-
-
-def _ranges(signal: Signal) -> tuple[tuple[int, int], ...]:
-    """Raw values of the multiplexer that select the signal, as (first, last), ascending and apart."""
-    ranges = getattr(signal, "mux_ranges", None)
-    if ranges is None:
-        ranges = [(i, i) for i in sorted(signal.mux_ids)]
-    merged: list[tuple[int, int]] = []
-    for first, last in sorted(ranges):
-        if merged and first <= merged[-1][1] + 1:
-            merged[-1] = merged[-1][0], max(merged[-1][1], last)
-        else:
-            merged.append((first, last))
-    return tuple(merged)
 
 
 def _limits(signal: Signal) -> Limits | None:

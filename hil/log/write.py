@@ -15,8 +15,8 @@ MAX_CHANNEL = 255  # of formats that number their channels
 
 def channel_numbers(channels: tuple[str, ...]) -> list[int]:
     """Numbers (from 0) for formats without channel names: can3 -> 3; where names do not tell, in order."""
-    ends = [re.search(r"\d{1,2}$", name) for name in channels]
-    numbers = [int(end[0]) for end in ends if end]
+    ends = [re.search(r"\d{1,3}$", name) for name in channels]
+    numbers = [int(end[0]) for end in ends if end and int(end[0]) < MAX_CHANNEL]
     return numbers if len(set(numbers)) == len(channels) else list(range(len(channels)))
 
 
@@ -101,6 +101,7 @@ def kept(table: FrameTable, facts: LogFacts, form: Format) -> FrameTable:
         can_id = np.where(error, 0, can_id).astype(np.uint32)
         length = np.where(error, 0, length).astype(np.uint8)
         data = np.where(error[:, None], 0, data).astype(np.uint8)
+        flags = np.where(error, flags & np.uint8(FrameFlag.ERROR | FrameFlag.SENT), flags).astype(np.uint8)
     if not form.sent:
         flags = flags & np.uint8(~FrameFlag.SENT & 0xFF)
     return FrameTable(channels, time_ns, table.channel, can_id, table.extended, length, data, flags)
