@@ -109,8 +109,8 @@ class MessageCount:
 class SignalCount(NamedTuple):
     """How often a signal came: ``n`` frames hold it, ``sna`` of them without a value ("signal not available").
 
-    ``out_of_range`` of the values lie outside the range of the database (by more than a hundredth of a step, so that
-    rounding does not count; not-a-number counts).
+    ``out_of_range`` of the values lie outside the range of the database, by more than a hundredth of a step, so that
+    rounding does not count. Not-a-number counts; a value that the database names ("error") is meant to be there.
     """
 
     n: int

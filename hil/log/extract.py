@@ -163,4 +163,5 @@ def work_out(piece: Piece) -> Found:
         if sna:
             raw, rows = raw[there], rows[there]
     values = plan.physical(raw)
-    return Found(piece.place, rows, values, n, sna, plan.outside(values))
+    outside = plan.outside(values)
+    return Found(piece.place, rows, values, n, sna, outside - plan.named_among(piece.words) if outside else 0)

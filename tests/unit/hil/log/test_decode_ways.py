@@ -131,7 +131,7 @@ DBC = [
     "BO_ 1 M: 8 A",
     ' SG_ S : 0|16@1+ (0.1,0) [0|0] "m" A',
     ' SG_ G : 16|4@1+ (1,0) [0|3] "" A',
-    'VAL_ 1 G 0 "P" 1 "D" 15 "SNA" ;',
+    'VAL_ 1 G 0 "P" 1 "D" 4 "fault" 15 "SNA" ;',
     "BO_ 2 N: 8 A",
     ' SG_ S : 0|16@1- (1,0) [0|0] "" A',
 ]
@@ -199,9 +199,9 @@ def test_a_frame_on_no_channel_is_refused(fast):
 def test_counts_of_a_signal(fast):
     made = recording([(1, bytes([1, 0, g, 0, 0, 0, 0, 0])) for g in (0, 1, 3, 4, 7, 15, 15)])
     log = decode_log(made, database_of(*DBC), fast=fast)
-    assert (log.signals["M.G"].n, log.signals["M.G"].sna, log.signals["M.G"].out_of_range) == (7, 2, 2)
+    assert (log.signals["M.G"].n, log.signals["M.G"].sna, log.signals["M.G"].out_of_range) == (7, 2, 1)
     assert (log.signals["M.S"].n, log.signals["M.S"].sna, log.signals["M.S"].out_of_range) == (7, 0, 0)
-    assert log.columns["M.G"].names().tolist() == ["P", "D", None, None, None]
+    assert log.columns["M.G"].names().tolist() == ["P", "D", None, "fault", None]
 
 
 @pytest.mark.parametrize("fast", [False, True])
