@@ -65,7 +65,7 @@ class Lookup:
         if isinstance(databases, Mapping):
             for channel, some in databases.items():
                 self._by_channel[channel] = self._network(_several(some), channel)
-            self._other = self._by_channel.get(BusName.VEHICLE.value, NO_DATABASE)
+            self._other = self._by_channel.get("", self._by_channel.get(BusName.VEHICLE.value, NO_DATABASE))
         else:
             self._other = self._network(_several(databases), None)
         self.lengths = np.array([m.length for m in self.messages], np.int64)
@@ -79,7 +79,7 @@ class Lookup:
             self.notes[MAX_NOTES:] = [f"and {further} more identifiers that two databases know"]
 
     def network(self, channel: str) -> int:
-        """Network of a channel; a channel that is not named has that of "vehicle", else none."""
+        """Network of a channel; a channel that is not named has that of "" or of "vehicle", else none."""
         return self._by_channel.get(channel, self._other)
 
     def plan(self, slot: int) -> MessagePlan:

@@ -151,6 +151,16 @@ def test_a_long_log_takes_the_compiled_way_by_itself(monkeypatch):
     assert decoder.totals.unknown_ids == {"can0 0x003": 10_000}
 
 
+def test_a_database_of_many_signals_is_streamed_in_small_pieces(monkeypatch):
+    monkeypatch.setattr(decode, "MAX_CELLS", 7)
+    table = table_of([(1, bytes([i, 0, i % 3, 0, 0, 0, 0, 0])) for i in range(10)])
+    decoder = Decoder(database_of(*DBC))
+    logs = list(decoder.stream([table, table.take(slice(0, 0)), table.take(slice(0, 3))]))
+    assert [len(log.time_s) for log in logs] == [3, 3, 3, 1, 0, 3]
+    np.testing.assert_array_equal(joined_columns(logs[:4])["M.S"][1], np.arange(10) * 0.1)
+    assert decoder.totals.messages["M"].count == 13
+
+
 @pytest.mark.parametrize("fast", [False, True])
 def test_only_what_is_wanted_becomes_a_column(fast):
     made = recording([(1, b"\1\0\1\0\0\0\0\0"), (2, b"\2\0\0\0\0\0\0\0")])
