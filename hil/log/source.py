@@ -94,11 +94,12 @@ class Source:
 
     def read(self, size: int) -> bytes:
         """At most ``size`` bytes; fewer at the end of what can be read, none behind it."""
-        if self.limit_bytes is not None and self._position + size > self.limit_bytes:
+        limited = self.limit_bytes is not None and self._position + size > self.limit_bytes
+        if self.limit_bytes is not None and limited:
             size = self.limit_bytes - self._position
         try:
             content = self._stream.read(size)
-            if size == 0 and self._stream.read(1):
+            if limited and size == 0 and self._stream.read(1):
                 self.account.note(f"only the first {self.limit_bytes} bytes are read")
                 self.account.cut_at(self._position)
         except DamagedError as error:
