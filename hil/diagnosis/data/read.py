@@ -13,8 +13,7 @@ from dbc.database import Database
 from hil.diagnosis.data.brakebench_signals import own_channels
 from hil.diagnosis.data.channel_map import ChannelMap, to_si
 from hil.diagnosis.data.log import CHANNELS, Floats, Log, UnusableError, make_log
-from hil.log.decode import DecodedLog, decode_log
-from hil.log.read import read_log
+from hil.log import DecodedLog, decode_log, read_log
 
 _GRID_S = 0.01
 _TABLES = (".csv", ".parquet", ".mf4", ".mdf", ".mat")
