@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hil.log.decode import DecodedLog, Decoder, decode_log
     from hil.log.frames import FrameFlag, FrameTable, LogError, Recording
-    from hil.log.read import Log, open_log, read_log
+    from hil.log.read import Log, log_format, open_log, read_log
 
 _MODULES = {
     "DecodedLog": "decode", "Decoder": "decode", "decode_log": "decode",
     "FrameFlag": "frames", "FrameTable": "frames", "LogError": "frames", "Recording": "frames",
-    "Log": "read", "open_log": "read", "read_log": "read",
+    "Log": "read", "log_format": "read", "open_log": "read", "read_log": "read",
 }  # fmt: skip
 
 __all__ = [
-    "DecodedLog", "Decoder", "FrameFlag", "FrameTable", "Log", "LogError", "Recording", "decode_log", "open_log",
-    "read_log",
+    "DecodedLog", "Decoder", "FrameFlag", "FrameTable", "Log", "LogError", "Recording", "decode_log", "log_format",
+    "open_log", "read_log",
 ]  # fmt: skip
 
 
