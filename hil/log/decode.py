@@ -13,13 +13,15 @@ A J1939 message (``Message.pgn_match``) stands for its parameter group whatever 
 `hil.log.j1939`.
 """
 
+import gc
+import sys
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from dbc.contract import database_text
 from dbc.database import Database, parse_database
@@ -39,6 +41,7 @@ from hil.log.extract_compiled import extract_all
 from hil.log.frames import FrameTable, Recording
 from hil.log.j1939 import Joined, Transport
 from hil.log.lookup import Databases, Lookup
+from hil.log.message_frames import frames_of, stamps_of, with_joined, words_of
 from hil.log.signal_plan import SNA, MessagePlan, Words
 from hil.log.sources import Sources
 from hil.log.unknown_ids import KEPT, OTHERS
@@ -51,8 +54,10 @@ __all__ = [
 
 TOO_SHORT = "shorter than the message in the DBC"
 NOT_A_FRAME = "not a frame"
-FEW_FRAMES = 20_000
-"""Up to here numpy is done before the compiled passes are loaded."""
+FEW_FRAMES = 500_000
+"""Up to here numpy is done before the compiled passes are loaded (0.3 to 0.5 s)."""
+MAX_CELLS = 8_000_000
+"""Most values (8 bytes each) of one piece of `Decoder.stream`, about."""
 
 
 @cache
@@ -83,10 +88,12 @@ class Decoder:
     Parameters
     ----------
     databases : one for all channels; several, of which the first one that knows an identifier is used; or either by
-        channel name (a channel that is not named has that of "vehicle", or else none). None takes our own two.
+        channel name (a channel that is not named has that of "" or of "vehicle", or else none). None takes our own
+        two.
     wanted : messages ("MESSAGE") and signals ("MESSAGE.SIGNAL") that become columns, ``*`` and ``?`` stand for any
         letters; None takes all. Frames are counted either way.
-    fast : False never uses the compiled passes, True always, None from `FEW_FRAMES` on. The results are the same.
+    fast : False never uses the compiled passes, True always, None from `FEW_FRAMES` on, and from the begin where they
+        are loaded already. The results are the same.
 
     Attributes
     ----------
@@ -94,8 +101,8 @@ class Decoder:
 
     >>> decoder = Decoder(database, wanted=["WHEELS.*"])  # doctest: +SKIP
     >>> with open_log("drive.blf") as log:
-    ...     for table in log.tables():
-    ...         time_s, speed = decoder.add(table).series("WHEELS.FL")
+    ...     for piece in decoder.stream(log.tables()):
+    ...         time_s, speed = piece.series("WHEELS.FL")
     >>> decoder.totals.messages["WHEELS"].count
     """
 
@@ -129,7 +136,9 @@ class Decoder:
         ValueError
             When a frame's channel is none of the table's.
         """
-        if self._fast is None and self._totals.frames + len(table) > FEW_FRAMES:
+        if self._fast is None and (
+            self._totals.frames + len(table) > FEW_FRAMES or "hil.log.decode_pass" in sys.modules
+        ):
             self._fast = True
         fast = bool(self._fast)
         log = DecodedLog(
@@ -139,15 +148,25 @@ class Decoder:
             notes=self._totals.notes,
         )
         if len(table):
-            words = _words(table)
+            words = words_of(table)
             assigned = self._assigner.assign(table, words, fast)
             self._count_others(log, assigned)
             joined = self._joined(log, table, assigned)
-            with np.errstate(over="ignore", invalid="ignore"):  # a floating-point signal may hold anything
+            with np.errstate(over="ignore", invalid="ignore"), _uncollected():  # a float may hold anything
                 self._decode(log, table, words, assigned, joined, fast)
             self._note(log)
         self._totals.merge(log)
         return log
+
+    def stream(self, tables: Iterable[FrameTable]) -> Iterator[DecodedLog]:
+        """Decode tables one after another, in pieces where the database has so many signals that one would be large.
+
+        Columns of a piece index `DecodedLog.recording` of that piece.
+        """
+        rows = max(1, MAX_CELLS // max([1, *(len(m.signals) for m in self._lookup.messages)]))
+        for table in tables:
+            for begin in range(0, max(1, len(table)), rows):
+                yield self.add(table if len(table) <= rows else table.take(slice(begin, begin + rows)))
 
     @property
     def totals(self) -> DecodedCounts:
@@ -200,10 +219,10 @@ class Decoder:
         parts: list[tuple[MessagePlan, Group]] = []
         heads: list[_Head] = []
         came = np.flatnonzero(np.diff(assigned.starts[:-1]))
-        stamps = _stamps(table.time_ns, assigned, came)
+        stamps = stamps_of(table.time_ns, assigned, came)
         for slot in sorted({*came.tolist(), *joined}):
             plan = self._lookup.plan(slot)
-            group, too_short = _frames_of(slot, plan, table, words, assigned)
+            group, too_short = frames_of(slot, plan, table, words, assigned)
             if too_short:
                 log.rejected += too_short
                 log.reasons[TOO_SHORT] += too_short
@@ -213,7 +232,7 @@ class Decoder:
             if carried:
                 short += sum(len(one.data) < plan.message.length for one in carried)
                 longer += sum(len(one.data) > plan.message.length for one in carried)
-                group = _with_joined(group, carried, table, words)
+                group = with_joined(group, carried, table, words)
             if not len(group.rows):
                 continue
             if carried or too_short:
@@ -265,6 +284,18 @@ class Decoder:
         log.notes = (*self._lookup.notes, *self._sources.notes.values(), *self._odd)
 
 
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Spare the garbage collector a look at each of up to a hundred thousand new columns; none is in a cycle."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
 class _Head:
     """Columns of one message (from one source), table after table."""
 
@@ -289,56 +320,4 @@ class _Head:
     def totals(self) -> dict[str, SignalCount]:
         """Counts of all tables so far."""
         named = zip(self._columns, self._counts.tolist(), strict=True)
-        return {name: SignalCount(*counts) for name, counts in named if name is not None and counts[0]}
-
-
-def _stamps(
-    time_ns: npt.NDArray[np.int64], assigned: Assigned, came: npt.NDArray[np.int64]
-) -> dict[int, tuple[int, int]]:
-    """Least and greatest stamp of the frames of each slot."""
-    if not len(came):
-        return {}
-    begins, ends = assigned.starts[came], assigned.starts[came + 1]
-    if assigned.ascending:
-        least, greatest = time_ns[assigned.rows[begins]], time_ns[assigned.rows[ends - 1]]
-    else:
-        times = time_ns[assigned.rows[: assigned.starts[-2]]]
-        least, greatest = np.minimum.reduceat(times, begins), np.maximum.reduceat(times, begins)
-    return dict(zip(came.tolist(), zip(least.tolist(), greatest.tolist(), strict=True), strict=True))
-
-
-def _words(table: FrameTable) -> Words:
-    """Payloads as words, as many a frame as its row of data has."""
-    data = table.data
-    if data.shape[1] % 8:
-        data = np.pad(data, ((0, 0), (0, -data.shape[1] % 8)))
-    return np.ascontiguousarray(data).reshape(-1).view("<u8").astype(np.uint64, copy=False)
-
-
-def _frames_of(slot: int, plan: MessagePlan, table: FrameTable, words: Words, assigned: Assigned) -> tuple[Group, int]:
-    """Frames of a message that hold a signal, and how many do not."""
-    a, b = assigned.starts[slot : slot + 2].tolist()
-    group = Group(assigned.rows[a:b], None, words, len(words) // len(table))
-    group.put_plane(assigned.first[a:b], a)
-    if assigned.least[slot] >= plan.full:
-        return group, 0
-    group.lengths = table.length[group.rows]
-    if assigned.least[slot] >= plan.least:
-        return group, 0
-    group = group.take(np.flatnonzero(group.lengths >= plan.least))
-    return group, b - a - len(group.rows)
-
-
-def _with_joined(group: Group, joined: list[Joined], table: FrameTable, words: Words) -> Group:
-    """Frames of a message and those that transport frames carried, in the order of the log."""
-    padded = [one.data.ljust(-(-len(one.data) // 8) * 8, b"\0") for one in joined]
-    further = np.frombuffer(b"".join(padded), "<u8").astype(np.uint64)
-    begins = np.concatenate(([0], np.cumsum([len(one) // 8 for one in padded])))[:-1].astype(np.int64)
-    stride = len(words) // len(table)
-    own = words.reshape(-1, stride)[group.rows].reshape(-1)
-    rows = np.concatenate((group.rows, np.array([one.row for one in joined], np.int64)))
-    at = np.concatenate((np.arange(len(group.rows)) * stride, begins + len(own)))
-    sizes = np.array([len(one.data) for one in joined], np.int64)
-    lengths = np.concatenate((table.length[group.rows].astype(np.int64), sizes))
-    order = np.argsort(rows, kind="stable")
-    return Group(rows[order], lengths[order], np.concatenate((own, further)), stride, at[order])
+        return {name: SignalCount(*counts) for name, counts in named if name is not None}

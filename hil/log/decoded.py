@@ -109,8 +109,8 @@ class MessageCount:
 class SignalCount(NamedTuple):
     """How often a signal came: ``n`` frames hold it, ``sna`` of them without a value ("signal not available").
 
-    ``out_of_range`` of the values lie outside the range of the database (by more than a hundredth of a step, so that
-    rounding does not count; not-a-number counts).
+    ``out_of_range`` of the values lie outside the range of the database, by more than a hundredth of a step, so that
+    rounding does not count. Not-a-number counts; a value that the database names ("error") is meant to be there.
     """
 
     n: int
@@ -199,7 +199,9 @@ class DecodedLog(DecodedCounts):
     ----------
     recording : the frames.
     time_s : time stamps of the well-formed frames, s; `Column.rows` index it.
-    columns : signals by "MESSAGE.SIGNAL"; see `hil.log.decode` for the names where that alone is not clear.
+    columns : signals by "MESSAGE.SIGNAL", an empty one too where the message came but not the signal; see
+        `hil.log.decode` for the names where that alone is not clear. The values lie in one memory that the columns
+        share: a copy of one column lets go of all others.
     rows : frames of each message (of each source of a J1939 message), ascending, by the name that its columns have
         before the point.
     """

@@ -93,7 +93,7 @@ class Piece(NamedTuple):
 
 
 def pieces_of(plan: MessagePlan, group: Group) -> list[Piece]:
-    """Frames and words of each signal of a message that is kept.
+    """Frames (none, it may be) and words of each signal of a message that is kept.
 
     A multiplexer value that no signal lists selects none. Time is linear in what comes out: frames are sorted by the
     value of their multiplexer once.
@@ -124,7 +124,7 @@ def pieces_of(plan: MessagePlan, group: Group) -> list[Piece]:
     pieces = []
     for place, signal in enumerate(plan.signals):
         group = there[signal]
-        if signal.kept and len(group.rows):
+        if signal.kept:
             begin = group.begin if signal.word == 0 and not signal.straddles else None
             pieces.append(Piece(place, signal, group.rows, group.words(signal), begin))
     return pieces
@@ -163,4 +163,5 @@ def work_out(piece: Piece) -> Found:
         if sna:
             raw, rows = raw[there], rows[there]
     values = plan.physical(raw)
-    return Found(piece.place, rows, values, n, sna, plan.outside(values))
+    outside = plan.outside(values)
+    return Found(piece.place, rows, values, n, sna, outside - plan.named_among(piece.words) if outside else 0)

@@ -44,16 +44,15 @@ def extract_all(parts: Parts, base: Words) -> list[list[Found]]:
             for i, (signal, (absent, bad)) in enumerate(zip(plan.signals, counts, strict=True))
         ]
         for i, one in enumerate(found[number]):
-            if one.sna:
-                found[number][i] = _without_sna(
-                    one, Piece(i, plan.signals[i], rows, group.words(plan.signals[i]), None)
-                )
+            if one.sna or one.outside:
+                signal = plan.signals[i]
+                found[number][i] = _corrected(one, Piece(i, signal, rows, group.words(signal), None))
         job += len(plan.signals)
     for (number, piece), begin, (absent, bad) in zip(pieces, jobs.outs[job:], jobs.counts[job:], strict=True):
         n = len(piece.rows)
         values = (jobs.as_float if piece.plan.kind == FLOAT else jobs.as_int)[begin : begin + n]
         one = Found(piece.place, piece.rows, values, n, absent, bad)
-        found[number].append(_without_sna(one, piece) if absent else one)
+        found[number].append(_corrected(one, piece) if absent or bad else one)
     for some in found:
         some.sort(key=_place)
     return found
@@ -68,8 +67,12 @@ def _place(found: Found) -> int:
     return found.place
 
 
-def _without_sna(found: Found, piece: Piece) -> Found:
-    """Leave out the frames whose value is not available."""
+def _corrected(found: Found, piece: Piece) -> Found:
+    """Leave out frames whose value is not available, and do not count values out of range that have a name."""
+    if found.outside:
+        found = found._replace(outside=found.outside - piece.plan.named_among(piece.words))
+    if not found.sna:
+        return found
     there = piece.plan.raw(piece.words) != piece.plan.sna[0]
     return found._replace(rows=found.rows[there], values=found.values[there])
 

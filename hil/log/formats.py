@@ -107,7 +107,7 @@ FORMATS = (
     Format("busmaster", (), _first_line(rb"\*{3}\s*BUSMASTER"), writable=False),
     Format("pcap", (".pcap",), _begins(*_PCAP), writable=False),
     Format("pcapng", (".pcapng",), _begins(b"\x0a\x0d\x0d\x0a"), "pcap", channel_names=True, start_time=False),
-    Format("parquet", (".parquet",), _begins(b"PAR1"), channel_names=True, start_time=False),
+    Format("parquet", (".parquet",), _begins(b"PAR1"), channel_names=True),
 )
 BY_NAME = {form.name: form for form in FORMATS}
 WRITABLE = {suffix: form for form in FORMATS if form.writable for suffix in form.suffixes}

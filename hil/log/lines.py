@@ -11,7 +11,7 @@ from hil.log.builder import FrameBuilder
 from hil.log.frames import FrameTable
 from hil.log.source import Source
 
-BLOCK_BYTES = 2 * 1024 * 1024
+BLOCK_BYTES = 256 * 1024  # stays in the cache
 MAX_LINE_BYTES = 4096
 MAX_WAIT = 100  # lines that the careful parser takes at once where the compiled pass takes none
 FEW_BYTES = 200_000  # a log below this is read without the compiled pass, which costs half a second to load

@@ -4,9 +4,11 @@ Nothing in the file is believed: every link, length and count is held against th
 twice, so that a loop of links ends. Layouts: ASAM MDF 4.2.0, chapter 4 (associated standard for bus logging: 1.1).
 """
 
+import re
 import struct
 from bisect import bisect_right
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import IO
@@ -90,6 +92,8 @@ class Group:
     kind : one of `KINDS`, or "" where it holds no CAN frames.
     members : channels of the frame by their bare name ("ID", "DataBytes", ...).
     frame : the channel that is the whole frame.
+    holds : what it is a group of, where it holds no CAN frames.
+    channel : number of its bus channel, for frames that name none: that of its name ("CAN2").
     """
 
     number: int
@@ -105,6 +109,7 @@ class Group:
     frame: Member | None = None
     members: dict[str, Member] = field(default_factory=dict)
     holds: str = "signal"
+    channel: int = 1
 
     @property
     def vlsd(self) -> bool:
@@ -283,7 +288,17 @@ class MdfFile:
                 self._channel(channel, group)
             except DamagedError as error:
                 self.account.reject(error.offset, error.problem)
+        if group.kind and "BusChannel" not in group.members:
+            group.channel = self._channel_of(block)
         return group
+
+    def _channel_of(self, block: Block) -> int:
+        """Number in the name of a group, or of its source: CAN2 -> 2; 1 where there is none."""
+        names = [self.text(block.links[2])]
+        with suppress(DamagedError):
+            names.append(self.text(self.block(block.links[3], b"SI", 1).links[0]) if block.links[3] else "")
+        numbers = [int(found[1]) for name in names if (found := re.search(r"(?i)\bCAN ?([1-9]\d?)\b", name))]
+        return numbers[0] if numbers else 1
 
     def _channel(self, block: Block, group: Group) -> None:
         name = self.text(block.links[2])

@@ -50,7 +50,6 @@ class DataStream:
     position : bytes given so far, those of gaps included.
     gap : what should come next and cannot be read; `pass_over` goes on behind it.
     cut : the file ends before the stream does.
-    open_end : the length of the last block was not stated and is taken from where the next block or the file ends.
     """
 
     def __init__(self, mdf: MdfFile, link: int) -> None:
@@ -58,7 +57,6 @@ class DataStream:
         self.position = 0
         self.gap: Gap | None = None
         self.cut = False
-        self.open_end = False
         self._links = self._all_links(link)
         self._open: BlockBytes | None = None
         self._missing = 0  # bytes of the open block that its list tells and it has not
@@ -239,8 +237,9 @@ class DataStream:
         if ident in PLAIN:
             behind = mdf.next_block(address)
             if link.last and (length < 24 or (mdf.unfinalised & LENGTH_OPEN and not self._ends_well(address + length))):
+                if mdf.finalised:
+                    mdf.account.reject(address, f"a block of data of {length} bytes; it is read up to the next one")
                 length = behind - address
-                self.open_end = True
             told = behind - address if behind < mdf.size else length
             if link.length is not None:
                 told = min(told, 24 + link.length)

@@ -10,6 +10,9 @@ from hil.log.mdf_blocks import VIRTUAL, VLSD, Member
 Bytes = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.bool_]
 Numbers = npt.NDArray[Any]  # of uint8, uint16, uint32 or uint64
+_BEHIND = np.arange(64) < np.arange(65)[:, None]
+KEPT_64 = np.where(_BEHIND, 0xFF, 0).astype(np.uint8).view(np.uint64)  # (65, 8): mask of the first bytes of a row
+KEPT_8 = KEPT_64[:9, 0].copy()
 
 
 def fits(member: Member, size: int, data: bool) -> bool:

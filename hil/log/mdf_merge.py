@@ -26,13 +26,21 @@ class _Head:
         self.table = FrameTable.empty()
         self.keys: Keys = np.zeros(0, np.int64)
         self.latest = LEAST
+        self.first = 0  # least key that is held
         self.ended = False
+
+    @property
+    def held(self) -> int:
+        """Number of frames."""
+        return len(self.keys)
 
     def read(self, least: int) -> None:
         """Read on until ``least`` frames are there, or there are no more."""
-        parts = [self.table] if len(self.table) else []
+        n = self.held
+        if n > least or self.ended:
+            return
+        parts = [self.table] if n else []
         keys = [self.keys]
-        n = len(self.table)
         while n <= least and not self.ended:
             table = next(self.tables, None)
             if table is None:
@@ -44,11 +52,13 @@ class _Head:
                 n += len(table)
         if len(keys) > 1:
             self.table, self.keys = FrameTable.joined(parts, ()), np.concatenate(keys)
+            self.first = int(self.keys[0])
 
     def take(self, n: int) -> FrameTable:
         """Give the first frames away."""
         taken = self.table.take(slice(0, n))
         self.table, self.keys = self.table.take(slice(n, None)), self.keys[n:]
+        self.first = int(self.keys[0]) if len(self.keys) else 0
         return taken
 
 
@@ -66,17 +76,18 @@ def merged(groups: Sequence[Iterable[FrameTable]], rows: int) -> Iterator[FrameT
     while True:
         for head in heads:
             head.read(rows // 2)
-        heads = [head for head in heads if len(head.table)]
+        heads = [head for head in heads if head.held]
         if not heads:
             return
-        open_ends = [(int(head.keys[-1]), k) for k, head in enumerate(heads) if not head.ended]
+        open_ends = [(head.latest, k) for k, head in enumerate(heads) if not head.ended]
         limit, first = min(open_ends, default=(2**63 - 1, len(heads)))
         parts, keys = [], []
         for k, head in enumerate(heads):
+            if head.first > limit or (head.first == limit and k > first):
+                continue
             n = int(np.searchsorted(head.keys, limit, side="right" if k <= first else "left"))
-            if n:
-                keys.append(head.keys[:n])
-                parts.append(head.take(n))
+            keys.append(head.keys[:n])
+            parts.append(head.take(n))
         order = np.argsort(np.concatenate(keys), kind="stable")
         table = FrameTable.joined(parts, ())
         for begin in range(0, len(table), ROWS):

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from hil.log.account import Account
 from hil.log.frames import FD_CODES, FD_LENGTHS, MAX_EXTENDED_ID, MAX_STANDARD_ID, FrameFlag, FrameTable
 from hil.log.mdf_blocks import KINDS, VIRTUAL, VLSD, DamagedError, Group, Member
-from hil.log.mdf_fields import Bytes, Mask, Numbers, data_bytes, fits, unsigned
+from hil.log.mdf_fields import KEPT_8, KEPT_64, Bytes, Mask, Numbers, data_bytes, fits, unsigned
 from hil.log.mdf_time import Clock, is_time
 
 MAX_CHANNEL = 255
@@ -16,9 +16,6 @@ KIND_FLAGS = dict(zip(KINDS, (FrameFlag(0), FrameFlag.REMOTE, FrameFlag.ERROR), 
 CLASSICAL_OF_CODE = np.minimum(np.arange(16), 8).astype(np.uint8)
 FD_OF_CODE = np.array(FD_CODES, np.uint8)
 FD_LENGTH = np.isin(np.arange(256), list(FD_LENGTHS))
-_BEHIND = np.arange(64) < np.arange(65)[:, None]
-KEPT_64 = np.where(_BEHIND, 0xFF, 0).astype(np.uint8).view(np.uint64)  # (65, 8): mask of the first bytes of a row
-KEPT_8 = KEPT_64[:9, 0].copy()
 SHOWN_BYTES = 32
 _READ = ("BusChannel", "ID", "IDE", "DLC", "DataLength", "DataBytes", "Dir", "EDL", "BRS", "ESI")
 
@@ -146,7 +143,7 @@ class Layout:
 
         number = self._column(records, "BusChannel")
         if number is None:
-            bus = np.ones(n, np.int32)
+            bus = np.full(n, self.group.channel, np.int32)
         else:
             good &= number <= MAX_CHANNEL
             bus = number.astype(np.uint8).astype(np.int32)
@@ -170,7 +167,7 @@ class Layout:
 
     def _empty(self, records: Bytes, can_id: npt.NDArray[np.uint32], bus: npt.NDArray[np.int32]) -> Mask:
         """Records of zeros: space that a logger without power had set aside, or never written sectors."""
-        empty = (can_id == 0) & (bus == 0)
+        empty: Mask = (can_id == 0) & (bus == 0)
         rows = np.flatnonzero(empty)
         if len(rows):
             empty[rows] = np.logical_not(records[rows].any(1))

@@ -14,8 +14,6 @@ from hil.log.mdf_fields import Bytes
 from hil.log.mdf_records import Layout
 from hil.log.mdf_values import SignalData
 
-OPEN_NOTE = "an unfinalised file: what its writer left open is taken from the data"
-
 
 @dataclass(frozen=True, slots=True)
 class Share:
@@ -149,8 +147,6 @@ def sorted_frames(
             store.stream.close()
         if other is not None:
             other.stream.close()
-    if stream.open_end:
-        account.note(OPEN_NOTE)
     whole = not (reader.lost or stream.cut or mdf.unfinalised & CYCLES_OPEN)
     if whole and reader.count != group.cycles:
         account.reject(group.address, f"{group.kind}: {group.cycles} records are stated, the data hold {reader.count}")

@@ -13,11 +13,12 @@ from hil.log.mdf_data import DataStream
 from hil.log.mdf_fields import Bytes, unsigned
 from hil.log.mdf_merge import Reordering
 from hil.log.mdf_records import Layout
-from hil.log.mdf_scan import FULL, UNKNOWN, scan_records
-from hil.log.mdf_sorted import OPEN_NOTE, Share
+from hil.log.mdf_scan import END, UNKNOWN, scan_records
+from hil.log.mdf_sorted import Share
 from hil.log.mdf_values import BATCH_ROWS, SignalData, Values, numbers_at
 
 BLOCK_BYTES = 2 << 20
+MAX_FOUND = 1 << 17  # records that one scan finds
 FEW_BYTES = 200_000  # below this the scan is not compiled
 MAX_VALUE_BYTES = 16 << 20  # of one record
 
@@ -42,15 +43,18 @@ class _StreamValues:
         self.window = Values(most)
         self.in_order = in_order
         self.starts: npt.NDArray[np.int64] = np.zeros(0, np.int64)
+        self.broken = False  # bytes of the stream were lost; what follows can no longer be found
 
     def add(self, buffer: Bytes, begin: npt.NDArray[np.int64], size: npt.NDArray[np.int64]) -> None:
         """Add values, each with its 4 bytes of length."""
+        if self.broken:
+            return
         first = self.window.end
         ends = np.cumsum(size)
         total = int(ends[-1]) if len(ends) else 0
         room = np.frombuffer(self.window.room(total), np.uint8)
         target = ends - size
-        for n in np.unique(size).tolist():
+        for n in _distinct(size):
             same = size == n
             whole = _pieces(room, n)
             whole[target[same]] = _pieces(buffer, n)[begin[same]]
@@ -60,7 +64,7 @@ class _StreamValues:
 
     def ready(self, offsets: npt.NDArray[np.uint64], last: bool) -> int:
         """How many of the records in a row have their values."""
-        if last:
+        if last or self.broken:
             return len(offsets)
         if self.in_order:
             return min(len(offsets), len(self.starts))
@@ -82,6 +86,14 @@ class _StreamValues:
             part = slice(begin, begin + BATCH_ROWS)
             self.window.take(at[part], rows[part], lengths, data)
         return lengths, data
+
+
+def _distinct(sizes: npt.NDArray[np.int64]) -> list[int]:
+    if not len(sizes):
+        return []
+    if int(sizes.max()) > BLOCK_BYTES:
+        return sorted(set(sizes.tolist()))
+    return np.flatnonzero(np.bincount(sizes)).tolist()
 
 
 def _pieces(content: Bytes, n: int) -> npt.NDArray[np.void]:
@@ -183,66 +195,86 @@ class _Scanner:
         self.stream = DataStream(mdf, data.data)
         self.lost = False
         self.aligned = True  # blocks of data begin with a record
+        most = min(max(1, BLOCK_BYTES // (data.id_bytes + 1)), MAX_FOUND)
+        self.numbers: npt.NDArray[np.int32] = np.zeros(most, np.int32)
+        self.begins: npt.NDArray[np.int64] = np.zeros(most, np.int64)
 
     def steps(self) -> Iterator[bool]:
         """Read on, block by block; yields True at the end."""
         buffer: npt.NDArray[np.uint8] = np.zeros(BLOCK_BYTES, np.uint8)
-        scan = _compiled_scan() if self.compiled else scan_records
-        most = len(buffer) // (self.data.id_bytes + 1)
-        most = min(most, 1 << 17)
-        numbers, begins = np.zeros(most, np.int32), np.zeros(most, np.int64)
-        have = 0
         stream = self.stream
+        low = have = 0  # what is held: buffer[low:have]
         while True:
-            first = stream.position - have
+            if low:
+                have -= low
+                buffer[:have] = buffer[low : low + have].copy()
             got = stream.fill(buffer.data[have:])
             have += got
-            n, at, why = scan(buffer, have, self.data.id_bytes, self.ids, self.sizes, numbers, begins)
-            self._hand_out(buffer[:have], numbers[:n], begins[:n], first)
-            starts = stream.starts_between(first, first + at) - first
-            self.aligned = self.aligned and bool(np.isin(starts, begins[:n] - self.data.id_bytes).all())
-            stream.forget(first)
-            yield False
-            if why == UNKNOWN:
-                self._lose(stream, buffer, first, at, have)
-                have = 0
-                continue
-            have -= at
-            buffer[:have] = buffer[at : at + have].copy()
-            if why == FULL:
-                continue
+            first = stream.position - have
+            low = 0
+            while low < have:
+                at, why = self._scan(buffer[low:have], first + low)
+                yield False
+                low += at
+                if why == UNKNOWN:
+                    low = self._behind(buffer[low : low + 32], first, low, have)
+                elif why == END:
+                    break
+            stream.forget(first + low)
             if stream.gap is not None:
                 gap = stream.pass_over()
                 self.account.reject(gap.offset, gap.problem)
-                self.lost = True
-                have = 0
-            elif have == len(buffer):
-                if len(buffer) < MAX_VALUE_BYTES:
-                    buffer = np.concatenate((buffer, np.zeros(len(buffer), np.uint8)))
-                    continue
-                self._lose(stream, buffer, first + at, 0, have)
-                have = 0
+                self._lose()
+                low = have = 0
+            elif low == 0 and have == len(buffer):
+                if have < MAX_VALUE_BYTES:
+                    buffer = np.concatenate((buffer, np.zeros(have, np.uint8)))
+                else:
+                    low = self._behind(buffer[:32], first, 0, have)
             elif not got:
                 break
-        end = stream.position - have
-        if have:
-            self.account.reject(stream.offset_of(end), buffer[: min(have, 32)].tobytes().hex())
+        end = stream.position - (have - low)
+        if low < have:
+            self.account.reject(stream.offset_of(end), buffer[low : min(have, low + 32)].tobytes().hex())
             self.account.cut_at(stream.offset_of(end))
         elif stream.cut:
             self.account.cut_at(self.mdf.size)
         yield True
         self._close()
 
-    def _lose(self, stream: DataStream, buffer: Bytes, first: int, at: int, have: int) -> None:
-        """An id that no group has: the next record is the first of the next block, if blocks begin with one."""
-        offset = stream.offset_of(first + at)
-        self.account.reject(offset, f"no record: {buffer[at : min(have, at + 32)].tobytes().hex()}")
-        self.lost = True
+    def _scan(self, held: Bytes, position: int) -> tuple[int, int]:
+        """Hand the records in what is held to their groups; where they end, and why there."""
+        scan = _compiled_scan() if self.compiled else scan_records
+        id_bytes = self.data.id_bytes
+        n, at, why = scan(held, len(held), id_bytes, self.ids, self.sizes, self.numbers, self.begins)
+        begins = self.begins[:n]
+        self._hand_out(held, self.numbers[:n], begins, position)
         if self.aligned:
-            stream.next_block()
-        else:
+            firsts = np.append(begins - id_bytes, at)  # of the records, ascending
+            starts = self.stream.starts_between(position, position + at) - position
+            self.aligned = bool((firsts[np.searchsorted(firsts, starts)] == starts).all())
+        return at, why
+
+    def _behind(self, shown: Bytes, first: int, low: int, have: int) -> int:
+        """Where to go on behind an id that no group has: at the next block of data, if blocks begin with a record."""
+        stream = self.stream
+        self.account.reject(stream.offset_of(first + low), f"no record: {shown.tobytes().hex()}")
+        self._lose()
+        if not self.aligned:
             self.account.note("records behind a damaged one are lost: where they begin, nobody knows")
             stream.end()
+            return have
+        starts = stream.starts_between(first + low + 1, first + have)
+        if len(starts):
+            return int(starts[0]) - first
+        stream.next_block()
+        return have
+
+    def _lose(self) -> None:
+        """Bytes of the stream are lost: offsets of values no longer tell where these are."""
+        self.lost = True
+        for values in self.values.values():
+            values.broken = True
 
     def _hand_out(
         self, buffer: Bytes, numbers: npt.NDArray[np.int32], begins: npt.NDArray[np.int64], first: int
@@ -259,8 +291,6 @@ class _Scanner:
 
     def _close(self) -> None:
         self.stream.close()
-        if self.stream.open_end:
-            self.account.note(OPEN_NOTE)
         if self.lost or self.stream.cut or self.mdf.unfinalised & CYCLES_OPEN:
             return
         for k, part in self.parts.items():

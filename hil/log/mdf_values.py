@@ -5,7 +5,7 @@ import numpy.typing as npt
 
 from hil.log.account import Account
 from hil.log.mdf_data import DataStream
-from hil.log.mdf_fields import Bytes
+from hil.log.mdf_fields import KEPT_64, Bytes
 
 STORE_BYTES = 16 << 20  # of values that are kept for records still to come
 BATCH_ROWS = 4096
@@ -60,10 +60,11 @@ class Values:
         if not len(at):
             return
         lengths[rows] = length
-        words = data.view(np.uint64)
-        for k in range((int(length.max()) + 7) // 8):
-            words[rows, k] = numbers_at(self.content, "u8", at + 4 + 8 * k)
-        data[rows] *= np.arange(64) < length[:, None]
+        found = np.empty((len(at), (int(length.max()) + 7) // 8), np.uint64)
+        for k in range(found.shape[1]):
+            found[:, k] = numbers_at(self.content, "u8", at + (4 + 8 * k))
+        found &= KEPT_64[length, : found.shape[1]]
+        data.view(np.uint64)[rows, : found.shape[1]] = found
 
 
 def numbers_at(content: Bytes, kind: str, at: npt.NDArray[np.int64]) -> npt.NDArray[np.unsignedinteger]:

@@ -18,6 +18,7 @@ from hil.log.wall_clock import EPOCH, wall_clock_ns
 
 __all__ = ["read_mf4", "write_mf4"]
 
+LATEST = 420  # version of MDF that is read
 MERGED_ROWS = 4 * ROWS  # of all groups together
 HELD_BYTES = 64 << 20  # of records and values, of all groups together
 LEAST_ROWS = 64
@@ -44,6 +45,10 @@ def read_mf4(source: Source, account: Account, options: ReadOptions) -> Iterator
         raise LogError(source.path, f"no header of MDF 4: {error.problem}", error.offset) from error
     if mdf.version // 100 != 4:
         raise LogError(source.path, f"MDF version {mdf.version / 100:.2f}; 4.00 to 4.20 are read: convert it to MDF 4")
+    if mdf.version > LATEST:
+        account.note(f"MDF version {mdf.version / 100:.2f}: what is newer than {LATEST / 100:.2f} in it is not read")
+    if not mdf.finalised:
+        account.note("an unfinalised file: lengths and counts that its writer left open are taken from the data")
     _start(mdf, account, options)
     found = _groups_of_frames(mdf, source, account)
     if mdf.cut:

@@ -304,7 +304,7 @@ def _rows(table: FrameTable, width: int, offset_s: int, directed: bool) -> npt.N
 
     def put(at: int, values: npt.NDArray[np.generic] | int, kind: str) -> None:
         column = np.broadcast_to(np.asarray(values).astype(kind), (n,))
-        rows[:, at : at + column.itemsize] = np.ascontiguousarray(column).view(np.uint8).reshape(n, -1)
+        rows[:, at : at + column.itemsize] = np.ascontiguousarray(column).view(np.uint8).reshape(n, column.itemsize)
 
     ticks = table.time_ns.view(np.uint64) - np.uint64(offset_s * 1_000_000_000 % 2**64)  # modulo 2 ** 64: never < 0
     bits = table.flags

@@ -45,6 +45,7 @@ class SignalPlan:
     kind : `FLOAT`, `INT` or `OTHER`.
     sna : raw values that mean "not available".
     limits : stated range, where values can lie outside it.
+    named : raw values outside of that range that have a name, so that they are meant to be there.
     parent, ranges : the multiplexer and its raw values that select this signal.
     kept : it becomes a column.
     """
@@ -59,6 +60,7 @@ class SignalPlan:
     kind: int
     sna: tuple[int, ...]
     limits: Limits | None
+    named: tuple[int, ...]
     ranges: tuple[tuple[int, int], ...]
     parent: "SignalPlan | None" = None
 
@@ -93,8 +95,15 @@ class SignalPlan:
             return np.asarray(raw * np.int64(int(factor)) + np.int64(int(offset)), np.int64)
         return np.asarray(raw * float(factor) + float(offset), np.float64)
 
+    def named_among(self, words: Words) -> int:
+        """Number of values that lie outside of the range and have a name."""
+        if not self.named:
+            return 0
+        raw = self.raw(words)
+        return int(np.count_nonzero(np.isin(raw, np.array(self.named, raw.dtype))))
+
     def outside(self, values: Values) -> int:
-        """Number of values outside the stated range."""
+        """Number of values outside the stated range, named ones among them."""
         if self.limits is None:
             return 0
         if values.dtype == np.int64:
@@ -185,6 +194,7 @@ def _plan(signal: Signal, kept: bool) -> SignalPlan:
     shift = 0 if straddles else 64 - begin - signal.length if signal.big_endian else begin
     low, high = _raw_ends(signal)
     sna = () if signal.is_float else tuple(n for n, t in signal.choices.items() if t == SNA and low <= n <= high)
+    limits = _limits(signal)
     kind = OTHER
     if not signal.is_float and len(sna) < 2 and high < _TOP:
         kind = INT if signal.is_integer and _fits(signal) else FLOAT
@@ -198,7 +208,8 @@ def _plan(signal: Signal, kept: bool) -> SignalPlan:
         big=signal.big_endian and not straddles,
         kind=kind,
         sna=sna,
-        limits=_limits(signal),
+        limits=limits,
+        named=() if limits is None else _named_outside(signal, limits, sna, low, high),
         ranges=signal.mux_ranges,
     )
 
@@ -233,6 +244,19 @@ def _limits(signal: Signal) -> Limits | None:
     if low <= min(ends) and max(ends) <= high:
         return None
     return Limits(low, high)
+
+
+def _named_outside(signal: Signal, limits: Limits, sna: tuple[int, ...], low: int, high: int) -> tuple[int, ...]:
+    if signal.is_float:
+        return ()
+    exact = signal.is_integer and _fits(signal)
+    factor: float = int(signal.factor) if exact else float(signal.factor)
+    offset: float = int(signal.offset) if exact else float(signal.offset)
+    return tuple(
+        raw
+        for raw in signal.choices
+        if low <= raw <= high and raw not in sna and not limits.low <= raw * factor + offset <= limits.high
+    )
 
 
 def _bound(stated: float | None, none: float) -> float:

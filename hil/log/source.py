@@ -94,11 +94,12 @@ class Source:
 
     def read(self, size: int) -> bytes:
         """At most ``size`` bytes; fewer at the end of what can be read, none behind it."""
-        if self.limit_bytes is not None and self._position + size > self.limit_bytes:
+        limited = self.limit_bytes is not None and self._position + size > self.limit_bytes
+        if self.limit_bytes is not None and limited:
             size = self.limit_bytes - self._position
         try:
             content = self._stream.read(size)
-            if size == 0 and self._stream.read(1):
+            if limited and size == 0 and self._stream.read(1):
                 self.account.note(f"only the first {self.limit_bytes} bytes are read")
                 self.account.cut_at(self._position)
         except DamagedError as error:
@@ -182,8 +183,7 @@ class GzipStream:
                 return b""
             self._inflater = _ZLIB.decompressobj(GZIP_BITS)
             self._begin, self._given = self._raw.tell() - len(self._packed), 0
-        if not self._packed:
-            raise DamagedError("it ends early")
+        ended = not self._packed  # but content may still wait inside
         try:
             part: bytes = self._inflater.decompress(self._packed, size)
         except _ZLIB.error as error:
@@ -193,6 +193,8 @@ class GzipStream:
         self._packed = self._inflater.unconsumed_tail
         if self._inflater.eof:
             self._packed, self._inflater = self._inflater.unused_data, None
+        elif ended and not part:
+            raise DamagedError("it ends early")
         return part
 
     def _sound(self) -> bytes:

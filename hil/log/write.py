@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hil.log.candump import candump_names
 from hil.log.formats import Format, writable
 from hil.log.frames import FrameFlag, FrameTable, LogError, LogFacts
 
@@ -75,6 +76,11 @@ def losses(facts: LogFacts, form: Format) -> list[str]:
         ]
         if renamed:
             notes.append(f"{form.name} has no channel names: {', '.join(renamed)}")
+    if form.name == "candump":
+        pairs = zip(facts.channels, candump_names(facts.channels), strict=True)
+        replaced = [f"{old!r} is {new}" for old, new in pairs if old != new]
+        if replaced:
+            notes.append(f"candump has only visible ASCII letters in channel names: {', '.join(replaced)}")
     if facts.errors and not form.error_content:
         notes.append(f"{form.name} keeps neither class nor data of the {facts.errors} error frames")
     if facts.finer_than_us and form.resolution_ns >= 1000:
@@ -93,6 +99,8 @@ def kept(table: FrameTable, facts: LogFacts, form: Format) -> FrameTable:
     channels = table.channels
     if not form.channel_names:
         channels = tuple(f"can{number}" for number in channel_numbers(facts.channels))
+    elif form.name == "candump":
+        channels = candump_names(channels)
     half = form.resolution_ns // 2
     time_ns = (table.time_ns + half) // form.resolution_ns * form.resolution_ns
     error = (table.flags & FrameFlag.ERROR) != 0

@@ -45,6 +45,13 @@ TRC = ";$FILEVERSION=2.1\n;$COLUMNS=N,O,T,B,I,d,R,l,D\n"
 OURS = "time_s,channel,id,extended,flags,length,data\n"
 GVRET = "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n"
 PCAP = struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 227)
+_FRAME = struct.pack(">IB3x8x", 0x123, 8)
+_SECTION = struct.pack("<IIIHHqI", 0x0A0D0D0A, 28, 0x1A2B3C4D, 1, 0, -1, 28)
+
+
+def _record(packet: bytes) -> bytes:
+    return struct.pack("<IIII", 1, 1, len(packet), len(packet)) + packet
+
 
 LOGS: dict[str, Callable[[], bytes]] = {
     "one line of letters": lambda: LINE + _filled(b"A"),
@@ -88,8 +95,14 @@ LOGS: dict[str, Callable[[], bytes]] = {
     "mf4: signatures": lambda: b"MDF     4.10    TGT 15.0".ljust(64, b"\0") + _filled(b"##HD" + bytes(20)),
     "pcap: records of no length": lambda: PCAP + _filled(bytes(16)),
     "pcap: records of every length": lambda: PCAP + _filled(struct.pack("<IIII", 1, 1, 0xFFFFFFFF, 0xFFFFFFFF)),
-    "pcapng: sections": lambda: _filled(struct.pack("<IIIHHqI", 0x0A0D0D0A, 28, 0x1A2B3C4D, 1, 0, -1, 28)),
-    "pcapng: noise": lambda: struct.pack("<IIIHHqI", 0x0A0D0D0A, 28, 0x1A2B3C4D, 1, 0, -1, 28) + _noise(MEGABYTE),
+    "pcap: frames and damages by turns": lambda: (
+        PCAP + _filled(_record(_FRAME) + struct.pack("<IIII", 1, 1, 0xFFFF, 0xFFFF) + _FRAME)
+    ),
+    "pcap: records of one byte": lambda: PCAP + _filled(_record(b"x")),
+    "pcapng: interfaces": lambda: _SECTION + _filled(struct.pack("<IIHHII", 1, 20, 227, 0, 0, 20)),
+    "pcapng: blocks that do not end": lambda: _SECTION + _filled(struct.pack("<II", 6, 1 << 19)),
+    "pcapng: sections": lambda: _filled(_SECTION),
+    "pcapng: noise": lambda: _SECTION + _noise(MEGABYTE),
     "parquet: noise": lambda: b"PAR1" + _noise(MEGABYTE) + b"PAR1",
     "gzip: zeros": lambda: gzip.compress(bytes(900_000_000), 9),
     "gzip: frames": lambda: gzip.compress(LINE * 6_000_000, 9),

@@ -1,11 +1,13 @@
 """The compiled passes, numpy, and the same log in pieces: one result."""
 
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hil.log import unknown_ids
+from hil.log import decode, unknown_ids
 from hil.log.decode import Decoder, decode_log
 from hil.log.frames import FrameFlag
 
@@ -129,23 +131,34 @@ DBC = [
     "BO_ 1 M: 8 A",
     ' SG_ S : 0|16@1+ (0.1,0) [0|0] "m" A',
     ' SG_ G : 16|4@1+ (1,0) [0|3] "" A',
-    'VAL_ 1 G 0 "P" 1 "D" 15 "SNA" ;',
+    'VAL_ 1 G 0 "P" 1 "D" 4 "fault" 15 "SNA" ;',
     "BO_ 2 N: 8 A",
     ' SG_ S : 0|16@1- (1,0) [0|0] "" A',
 ]
 
 
-def test_a_long_log_takes_the_compiled_way_by_itself():
+def test_a_long_log_takes_the_compiled_way_by_itself(monkeypatch):
+    monkeypatch.setattr(decode, "FEW_FRAMES", 20_000)
+    monkeypatch.delitem(sys.modules, "hil.log.decode_pass", raising=False)
     table = table_of([(1 + i % 3, bytes([i & 255, i >> 8 & 255, i % 16, 0, 0, 0, 0, 0])) for i in range(30_000)])
     decoder = Decoder(database_of(*DBC))
     for begin in range(0, 30_000, 7_000):
         decoder.add(table.take(slice(begin, begin + 7_000)))
+        assert ("hil.log.decode_pass" in sys.modules) == (begin >= 14_000)
     careful = Decoder(database_of(*DBC), fast=False)
     careful.add(table)
-    assert decoder._fast
-    assert careful._fast is False
     assert_same_counts(decoder.totals, careful.totals)
     assert decoder.totals.unknown_ids == {"can0 0x003": 10_000}
+
+
+def test_a_database_of_many_signals_is_streamed_in_small_pieces(monkeypatch):
+    monkeypatch.setattr(decode, "MAX_CELLS", 7)
+    table = table_of([(1, bytes([i, 0, i % 3, 0, 0, 0, 0, 0])) for i in range(10)])
+    decoder = Decoder(database_of(*DBC))
+    logs = list(decoder.stream([table, table.take(slice(0, 0)), table.take(slice(0, 3))]))
+    assert [len(log.time_s) for log in logs] == [3, 3, 3, 1, 0, 3]
+    np.testing.assert_array_equal(joined_columns(logs[:4])["M.S"][1], np.arange(10) * 0.1)
+    assert decoder.totals.messages["M"].count == 13
 
 
 @pytest.mark.parametrize("fast", [False, True])
@@ -196,9 +209,9 @@ def test_a_frame_on_no_channel_is_refused(fast):
 def test_counts_of_a_signal(fast):
     made = recording([(1, bytes([1, 0, g, 0, 0, 0, 0, 0])) for g in (0, 1, 3, 4, 7, 15, 15)])
     log = decode_log(made, database_of(*DBC), fast=fast)
-    assert (log.signals["M.G"].n, log.signals["M.G"].sna, log.signals["M.G"].out_of_range) == (7, 2, 2)
+    assert (log.signals["M.G"].n, log.signals["M.G"].sna, log.signals["M.G"].out_of_range) == (7, 2, 1)
     assert (log.signals["M.S"].n, log.signals["M.S"].sna, log.signals["M.S"].out_of_range) == (7, 0, 0)
-    assert log.columns["M.G"].names().tolist() == ["P", "D", None, None, None]
+    assert log.columns["M.G"].names().tolist() == ["P", "D", None, "fault", None]
 
 
 @pytest.mark.parametrize("fast", [False, True])

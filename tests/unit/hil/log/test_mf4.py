@@ -403,6 +403,18 @@ def test_members_that_are_missing_have_defaults(read):
     ]
 
 
+def test_the_name_of_a_group_tells_its_channel_where_its_frames_do_not(read):
+    file = Made(start_ns=START)
+    raw = struct.pack("<dIB8s", 1, 0x10, 1, b"1")
+    for name in ("CAN2", "CAN 3 Data", "Scan4", ""):
+        channel = frame(members=[("ID", 8, 0, 32), ("DLC", 12, 0, 4)], data_byte=13)
+        _, places, _ = file.group([Cg([time(), channel], 21, 1)], file.data(raw))
+        file.patch(places[0] + 24 + 16, file.text(name))
+    account, frames = read(file)
+    assert account.whole
+    assert [row[1] for row in rows(frames)] == ["can1", "can2", "can0", "can0"]
+
+
 def test_a_constant_bus_channel_is_a_virtual_channel(read):
     channel = frame(members=[("ID", 8, 0, 32), ("DLC", 12, 0, 4)], data_byte=13)
     channel.members.append(Cn("CAN_DataFrame.BusChannel", 0, 0, 0, kind=6, linear=(3.0, 0.0)))
@@ -710,15 +722,80 @@ def test_absurd_lengths_and_counts(read, ident, field, value):
     assert len(frames) == 10 or not account.whole
 
 
-def test_lost_bytes_of_an_unsorted_stream_cost_at_most_their_block(read):
-    file, _ = unsorted(piece=None, n=30)
+def two_groups(n, per_block, aligned=True):
+    """Unsorted data of two groups in blocks; the file, and where each block begins."""
+    file = Made(start_ns=START)
+    groups = [Cg([time(), frame()], 23, n // 2, k) for k in (1, 2)]
+    dg, _, _ = file.group(groups, 0, 1)
+    content = b"".join(bytes([1 + k % 2]) + record(k * 0.001, 1 + k % 2, k, b"1").ljust(23, b"\0") for k in range(n))
+    file.patch(dg + 40, file.data(content, 24 * per_block - (not aligned)))
     raw = bytearray(bytes(file))
-    at = raw.rindex(b"##DT") + 24
-    raw[at] = 99  # no group has this id
+    return raw, [k + 24 for k in range(len(raw)) if raw[k : k + 4] == b"##DT"]
+
+
+@pytest.mark.parametrize("small", [False, True])
+def test_a_damaged_record_of_an_unsorted_stream_costs_the_rest_of_its_block(read, small, monkeypatch):
+    if small:
+        monkeypatch.setattr(mdf_unsorted, "BLOCK_BYTES", 100)
+    raw, blocks = two_groups(100, 10)
+    raw[blocks[3] + 24 * 4] = 99  # no group has this id
     account, frames = read(raw)
-    assert len(frames) == 0
-    assert account.first_rejected[0].offset == at
-    assert "no record" in account.first_rejected[0].text
+    assert frames.can_id.tolist() == [*range(34), *range(40, 100)]
+    assert account.rejected == 1
+    assert account.first_rejected[0].offset == blocks[3] + 24 * 4
+    assert "no record: 63" in account.first_rejected[0].text
+
+
+def test_where_records_cross_blocks_all_behind_a_damaged_one_are_lost(read):
+    raw, blocks = two_groups(100, 10, aligned=False)
+    raw[blocks[3] + 3 + 24 * 4] = 99
+    account, frames = read(raw)
+    assert frames.can_id.tolist() == list(range(34))
+    assert any("nobody knows" in note for note in account.notes)
+
+
+def test_no_value_is_given_to_the_wrong_frame_behind_lost_bytes(read):
+    file, made = unsorted(piece=400, n=60)
+    raw = bytearray(bytes(file))
+    blocks = [k for k in range(len(raw)) if raw[k : k + 4] == b"##DT"]
+    raw[blocks[4]] = 0  # no block of data any more
+    account, frames = read(raw)
+    assert not account.whole
+    assert set(rows(frames)) <= set(made)
+    assert len(frames) > 10
+
+
+def test_unsorted_groups_are_put_in_order_within_bounded_memory(read, monkeypatch):
+    monkeypatch.setattr(mf4, "MERGED_ROWS", 64)
+    monkeypatch.setattr(mdf_unsorted, "BLOCK_BYTES", 240)
+    file = Made(start_ns=START)
+    dg, _, _ = file.group([Cg([time(), frame()], 23, 100, k) for k in (1, 2)], 0, 1)
+    # the second group is written 10 records late
+    pieces = [(k + 20 * g, g, k) for g in (0, 1) for k in range(100)]
+    content = b"".join(
+        bytes([1 + g]) + record(k * 0.001, 1 + g, k, b"1").ljust(23, b"\0") for _, g, k in sorted(pieces)
+    )
+    file.patch(dg + 40, file.data(content))
+    account, frames = read(file)
+    assert account.whole
+    assert [row[1:3] for row in rows(frames)] == [(f"can{g}", k) for k in range(100) for g in (0, 1)]
+
+
+def test_a_part_of_a_log_and_a_packed_one(tmp_path, read):
+    import gzip
+
+    made = plain(100)
+    file, link = simple(made)
+    file.patch(link, file.data(b"".join(records(made))))
+    (tmp_path / "a.mf4.gz").write_bytes(gzip.compress(bytes(file)))
+    with open_log(tmp_path / "a.mf4.gz") as log:
+        assert log.format.name == "mf4"
+        assert rows(log.frames()) == expected(made)
+    path = tmp_path / "a.mf4"
+    path.write_bytes(bytes(file))
+    with open_log(path, limit_bytes=len(file.raw) - 23 * 50) as log:
+        assert rows(log.frames()) == expected(made)[:50]
+        assert log.account.truncated_at == len(file.raw) - 23 * 50
 
 
 def test_memory_does_not_grow_with_the_log(tmp_path):

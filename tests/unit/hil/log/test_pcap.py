@@ -335,6 +335,10 @@ def test_extreme_stamps_and_no_frame_at_all(read):
     table.time_ns[:] = (-(2**63), 2**63 - 10**9)
     assert read(written([table]))[0].time_ns.tolist() == [-(2**63), 2**63 - 10**9]
     assert len(read(written([], LogFacts()))[0]) == 0
+    assert len(read(written([FrameTable.empty()]))[0]) == 0
+    only_fd = table.take(slice(0, 1))
+    only_fd.flags[:] = FD
+    assert read(written([only_fd]))[0].flags.tolist() == [FD]
 
 
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")

@@ -25,6 +25,8 @@ def frames_of(path, **options):
 def test_a_packed_log_is_unpacked_on_the_way(tmp_path):
     frames, account = frames_of(DATA / "log.log.gz")
     assert (frames, account.whole) == (200, True)
+    frames, account = frames_of(DATA / "log.asc.gz")
+    assert (frames, account.whole) == (1, True)
     path = tmp_path / "a"
     path.write_bytes(gzip.compress(TEXT[:1000]) + gzip.compress(TEXT[1000:]))  # two members, as zcat takes them
     assert frames_of(path)[0] == 20_000
