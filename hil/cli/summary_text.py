@@ -171,12 +171,7 @@ def _notes(logs: Logs, contents: Contents, counts: DecodedCounts, summary: Summa
     found = {name: count for name, count in counts.signals.items() if name in signals}
     outside = [_outside(name, signals[name], count) for name, count in found.items() if count.out_of_range]
     yield from _some(outside, "out of range")
-    missing = [
-        f"not available: {name} in {count.sna:,} of {_count(count.n, 'frame')}"
-        for name, count in found.items()
-        if count.sna
-    ]
-    yield from _some(missing, "not available")
+    yield from _some(_missing(found), "not available")
     yield from counts.notes
     yield from _transport(counts)
     unknown = sorted((one for one in ids if _is_unknown(contents, one)), key=lambda one: -one.count)
@@ -226,6 +221,19 @@ def _protection(contents: Contents) -> Iterator[str]:
     sound = len(found) - len(bad)
     if sound:
         yield f"end-to-end protection: {_count(sound, 'message')} sound"
+
+
+def _missing(found: dict[str, SignalCount]) -> list[str]:
+    """Signals that are not available, those of one message with equal counts in one line."""
+    alike: dict[tuple[str, int, int], list[str]] = {}
+    for name, count in found.items():
+        if count.sna:
+            message, _, signal = name.rpartition(".")
+            alike.setdefault((message, count.n, count.sna), []).append(signal)
+    return [
+        f"not available: {message}.{', '.join(signals)} in {sna:,} of {_count(n, 'frame')}"
+        for (message, n, sna), signals in alike.items()
+    ]
 
 
 def _transport(counts: DecodedCounts) -> Iterator[str]:
