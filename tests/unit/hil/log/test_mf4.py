@@ -478,6 +478,47 @@ def test_the_time_may_stand_in_another_group(read):
     assert [(t - START, i) for t, _, i, *_ in rows(frames)] == [(500_000_000, 0x10), (1_500_000_000, 0x11)]
 
 
+def test_lists_of_values_with_their_invalidation_bits_apart(read):
+    made = plain(90)
+    file, link = simple(made, version=420)
+    content = b"".join(records(made))
+    parts = [content[i : i + 23 * 30] for i in range(0, len(content), 23 * 30)]
+    values = [file.data(part, None, way, 23, ident=b"DV") for part, way in zip(parts, WAYS_TO_PACK, strict=True)]
+    bits = [file.data(bytes(30), ident=b"DI") for _ in parts]
+    second = file.block(b"LD", [0, values[2], bits[2]], struct.pack("<IIQ", 0x8000_0001, 1, 30))
+    first = file.block(b"LD", [second, *values[:2], *bits[:2]], struct.pack("<IIQ", 0x8000_0001, 2, 30))
+    file.patch(link, first)
+    struct.pack_into("<I", file.raw, file.raw.index(b"##CG") + 24 + 48 + 28, 1)  # one byte of invalidation bits
+    account, frames = read(file)
+    assert account.whole
+    assert rows(frames) == expected(made)
+
+
+def test_a_frame_marked_invalid_is_rejected(read):
+    channel = frame()
+    channel.flags, channel.invalid = 2, 3
+    content = b"".join(record(k, 1, k, b"1").ljust(23, b"\0") + bytes([8 if k == 1 else 0xF7]) for k in range(3))
+    file = Made(start_ns=START)
+    file.group([Cg([time(), channel], 23, 3, inval_bytes=1)], file.data(content))
+    account, frames = read(file)
+    assert (frames.can_id.tolist(), account.rejected) == ([0, 2], 1)
+
+
+def test_what_is_newer_than_the_reader_is_said(read):
+    made = plain(3)
+    file, link = simple(made, version=430)
+    file.patch(link, file.data(b"".join(records(made))))
+    account, frames = read(file)
+    assert rows(frames) == expected(made)
+    assert "MDF version 4.30" in account.notes[0]
+    at = file.packed(b"".join(records(made)))
+    file.raw[at + 24 + 2] = 2  # another way of packing
+    file.patch(link, at)
+    account, frames = read(file)
+    assert len(frames) == 0
+    assert "packed in way 2 (MDF 4.3)" in account.first_rejected[0].text
+
+
 def test_a_local_start_time_is_read_in_the_chosen_zone(read):
     made = plain(1)
     file, link = simple(made, time_flags=1)
@@ -526,7 +567,10 @@ def test_groups_without_can_frames_are_passed_over_and_counted(read):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"MDF     3.30    ".ljust(28, b"\0") + struct.pack("<H", 330) + bytes(600), "no header of MDF 4|MDF version"),
+        (
+            b"MDF     3.30    ".ljust(28, b"\0") + struct.pack("<H", 330) + bytes(600),
+            r"MDF version 3\.30; 4\.00 to 4\.20 are read: convert it",
+        ),
         (b"MDF     4.10    ".ljust(40, b"\0"), "no header of MDF 4: 64 bytes should stand here"),
         (b"MDF     4.10    ".ljust(400, b"\0"), "no header of MDF 4: a block should stand here"),
         (bytes(Made()), "it holds no groups"),
@@ -539,6 +583,7 @@ def test_what_is_no_bus_log_is_refused(read, content, message):
 
 # -- unfinalised files -----------------------------------------------------------------------------------------------
 
+WAYS_TO_PACK = ("plain", "deflate", "transposed")
 ALL_OPEN = 0x1 | 0x4 | 0x10 | 0x20
 
 
