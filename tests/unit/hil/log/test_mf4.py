@@ -1,4 +1,5 @@
 import struct
+import zlib
 from dataclasses import replace
 from datetime import UTC
 from pathlib import Path
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 from mdf_made import Cg, Cn, Made, frame, record, time
 
-from hil.log import mdf_unsorted, mf4
+from hil.log import mdf_packed, mdf_unsorted, mf4
 from hil.log.formats import BY_NAME
 from hil.log.frames import FD_CODES, FrameFlag, FrameTable, LogError, LogFacts
 from hil.log.read import open_log
@@ -284,7 +285,12 @@ def simple(made, width=8, start_ns=START, **facts):
 @pytest.mark.parametrize("piece", [None, 1000, 23 * 10])
 @pytest.mark.parametrize("equal", [False, True])
 @pytest.mark.parametrize("width", [8, 64])
-def test_each_way_of_storing(read, way, piece, equal, width):
+@pytest.mark.parametrize("held", [True, False])
+def test_each_way_of_storing(read, way, piece, equal, width, held, monkeypatch):
+    if not held:  # as blocks too large for the memory are
+        monkeypatch.setattr(mdf_packed, "WHOLE_BYTES", 0)
+        monkeypatch.setattr(mdf_packed, "INPUT_BYTES", 64)
+        monkeypatch.setattr(mdf_packed, "inflater", zlib.decompressobj)
     made = plain(width=width)
     file, link = simple(made, width)
     file.patch(link, file.data(b"".join(records(made, width)), piece, way, 15 + width, equal))
@@ -865,6 +871,39 @@ def test_memory_does_not_grow_with_the_log(tmp_path):
         tracemalloc.stop()
     assert written < 60e6
     assert peak < 60e6
+
+
+@pytest.mark.parametrize("columns", [0, 23])
+def test_a_small_file_that_unpacks_to_much_is_read_in_bounded_memory(tmp_path, columns):
+    import tracemalloc
+
+    n = 1_500_000
+    file = Made(start_ns=START)
+    dg, _, _ = file.group([Cg([time(), frame()], 23, n)])
+    file.patch(dg + 40, file.packed(record(1.0, 1, 0x10, b"1").ljust(23, b"\0") * n, columns))
+    (tmp_path / "a.mf4").write_bytes(bytes(file))
+    assert len(file.raw) < n / 10
+    tracemalloc.start()
+    try:
+        with open_log(tmp_path / "a.mf4") as log:
+            assert sum(len(table) for table in log.tables()) == n
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 25e6
+
+
+def test_a_block_that_cannot_be_as_long_as_it_says_is_refused(read):
+    made = plain(40)
+    file, link = simple(made)
+    content = b"".join(records(made))
+    file.patch(link, file.packed(content))
+    at = bytes(file).index(b"##DZ") + 24 + 8
+    for absurd in (2**63, 2**40, 10**7):
+        file.patch(at, absurd)
+        account, frames = read(file)
+        assert not account.whole
+        assert len(frames) in (0, 40)
 
 
 # -- mutants ---------------------------------------------------------------------------------------------------------
