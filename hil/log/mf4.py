@@ -40,11 +40,12 @@ def read_mf4(source: Source, account: Account, options: ReadOptions) -> Iterator
         account.cut_at(size)
     try:
         mdf = MdfFile(file, size, account)
+        if mdf.version // 100 != 4:
+            version = f"MDF version {mdf.version / 100:.2f}; 4.00 to {LATEST / 100:.2f} are read"
+            raise LogError(source.path, f"{version}: convert it to MDF 4")
         mdf.describe()
     except DamagedError as error:
         raise LogError(source.path, f"no header of MDF 4: {error.problem}", error.offset) from error
-    if mdf.version // 100 != 4:
-        raise LogError(source.path, f"MDF version {mdf.version / 100:.2f}; 4.00 to 4.20 are read: convert it to MDF 4")
     if mdf.version > LATEST:
         account.note(f"MDF version {mdf.version / 100:.2f}: what is newer than {LATEST / 100:.2f} in it is not read")
     if not mdf.finalised:
