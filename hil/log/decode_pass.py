@@ -243,24 +243,36 @@ def extract(words, jobs, ints, floats, as_int, as_float, counts, scratch):  # ty
                 for i in range(m):
                     as_int[target + i] = scratch[i] * whole + start
             flags, none = ints[s, 10], ints[s, 9]
+            here, outside = 0, 0
             if flags & 1:
                 for i in range(m):
                     if scratch[i] == none:
-                        absent += 1
+                        here += 1
+                absent += here
             if flags & 2:
-                counted = flags & 1
                 if kind == 0:
                     low, high = floats[s, 2], floats[s, 3]
                     for i in range(m):
                         v = as_float[target + i]
-                        if not (v >= low and v <= high) and not (counted and scratch[i] == none):
-                            bad += 1
+                        if v < low or v > high:
+                            outside += 1
+                    if here and outside:
+                        for i in range(m):
+                            v = as_float[target + i]
+                            if scratch[i] == none and (v < low or v > high):
+                                outside -= 1
                 else:
                     least, most = ints[s, 7], ints[s, 8]
                     for i in range(m):
                         w = as_int[target + i]
-                        if (w < least or w > most) and not (counted and scratch[i] == none):
-                            bad += 1
+                        if w < least or w > most:
+                            outside += 1
+                    if here and outside:
+                        for i in range(m):
+                            w = as_int[target + i]
+                            if scratch[i] == none and (w < least or w > most):
+                                outside -= 1
+                bad += outside
         counts[j, 0] = absent
         counts[j, 1] = bad
     return jobs.shape[0]
