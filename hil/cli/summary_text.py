@@ -14,6 +14,7 @@ from hil.log.wall_clock import wall_clock_of
 SHOWN = 10  # of each kind of note
 SHOWN_IDS = 400
 SHOWN_UNKNOWN = 5
+SHOWN_CHANNELS = 50
 
 
 def summary_lines(
@@ -58,7 +59,7 @@ def _count(n: int, what: str) -> str:
 def _channels(summary: Summary, width: int) -> Iterator[str]:
     heads = ("channel", "frames", "error", "remote", "FD", "Tx", "seconds", "load", "worst 1 s", "at s", "bit rate")
     rows = []
-    for one in summary.channels:
+    for one in summary.channels[:SHOWN_CHANNELS]:
         load, worst = _loads(one)
         at = _seconds(one.worst_at_ns - summary.began_ns) if worst else ""
         counts = [f"{n:,}" if n else "" for n in (one.errors, one.remote, one.fd, one.sent)]
@@ -67,6 +68,8 @@ def _channels(summary: Summary, width: int) -> Iterator[str]:
             rate += f"/{_rate(one.data_bit_rate)}"
         rows.append((one.name, f"{one.frames:,}", *counts, f"{one.duration_s:.1f}", load, worst, at, rate))
     yield from columns(heads, rows, width)
+    if len(summary.channels) > SHOWN_CHANNELS:
+        yield f"and {len(summary.channels) - SHOWN_CHANNELS} more channels (all of them with --json)"
     if any(one.load is not None or one.bits_per_s is not None for one in summary.channels):
         hint = "" if all(one.bit_rate for one in summary.channels) else "; give --bitrate for the share"
         yield from wrapped(f"(bus load with all stuff bits that a frame may need{hint})", width)

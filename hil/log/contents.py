@@ -14,7 +14,7 @@ from hil.log.frames import FrameFlag, FrameTable
 from hil.log.integrity import Integrity, IntegrityCounter, has_profile_layout
 from hil.log.summary import BitRates, Statistics, Summary
 
-MAX_PROTECTED = 65_535  # identifiers, over all channels
+MAX_PROTECTED = 4096  # identifiers, over all channels
 
 
 @dataclass(slots=True)
@@ -109,6 +109,8 @@ class Contents:
 
     def _know_channels(self, channels: tuple[str, ...]) -> None:
         for number, channel in enumerate(channels[len(self._names) :], len(self._names)):
+            if len(self._protected) >= MAX_PROTECTED:
+                break
             for (can_id, extended), message in self.databases.of(channel).messages.items():
                 data_id = message.e2e_data_id
                 if data_id is not None and has_profile_layout(message) and len(self._protected) < MAX_PROTECTED:

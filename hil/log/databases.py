@@ -9,6 +9,7 @@ from hil.log.decode import Decoder, own_databases
 from hil.log.lookup import TP_CM, TP_DT, group_number
 
 NONE = Database("no database", {}, ())
+OWN_CHANNELS = frozenset(bus.value for bus in BusName)  # our recordings name their channels so
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +60,7 @@ class Databases:
 
     def bit_rate(self, channel: str) -> int | None:
         """Bit rate of a channel, bit/s; None where no database states it, or only a guessed one does."""
-        ours = channel in {bus.value for bus in BusName}  # our recordings name their channels so
-        return None if self.guessed and not ours else self.of(channel).bit_rate
+        return None if self.guessed and channel not in OWN_CHANNELS else self.of(channel).bit_rate
 
     def all(self) -> list[Database]:
         """Every one of them."""

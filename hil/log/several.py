@@ -24,7 +24,7 @@ class Part:
     ----------
     path, format : the file and its format.
     size : bytes, for the progress.
-    first_ns : stamp of its first frame, None without a frame.
+    first_ns : stamp of its first frame; None without a frame, and for a log alone.
     account : what its last reading noticed.
     frames : how many it held.
     """
@@ -67,7 +67,7 @@ class Logs:
             twice = next(path for path in paths if list(paths).count(path) > 1)
             raise LogError(twice, "is given twice; name every log once")
         try:
-            self.parts = [self._look(path, keep=len(paths) == 1 or str(path) == STDIN) for path in paths]
+            self.parts = [self._look(path, len(paths) == 1) for path in paths]
         except BaseException:
             self.close()
             raise
@@ -92,12 +92,14 @@ class Logs:
         """Nothing of any log was rejected or is missing."""
         return all(part.account.whole for part in self.parts)
 
-    def _look(self, path: Path, keep: bool) -> Part:
+    def _look(self, path: Path, alone: bool) -> Part:
         log = open_log(path, options=self.options, limit_bytes=self.limit_bytes)
+        keep = alone or str(path) == STDIN
         if keep:
             self._kept[path] = log
         try:
-            first = next((int(table.time_ns[0]) for table in log.tables() if len(table)), None)
+            stamps = (int(table.time_ns[0]) for table in log.tables() if len(table))
+            first = None if alone else next(stamps, None)
             return Part(path, log.format.name, log.source.size, first, log.account)
         finally:
             if not keep:
