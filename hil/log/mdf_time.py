@@ -3,8 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
-from hil.log.mdf_blocks import VIRTUAL_MASTER, Member
 from hil.log.mdf_fields import Bytes, Mask, unsigned
+from hil.log.mdf_layout import VIRTUAL_MASTER, Member
 
 Stamps = npt.NDArray[np.int64]
 MAX_SECONDS = 1 << 34  # of a tick, and of the first one

@@ -7,8 +7,9 @@ from datetime import timedelta
 from hil.log.account import Account
 from hil.log.builder import ROWS
 from hil.log.frames import FrameTable, LogError
-from hil.log.mdf_blocks import DamagedError, DataGroup, Group, MdfFile
+from hil.log.mdf_blocks import DamagedError, MdfFile
 from hil.log.mdf_frames import write_mf4
+from hil.log.mdf_layout import DataGroup, Group
 from hil.log.mdf_merge import merged
 from hil.log.mdf_records import Channels
 from hil.log.mdf_sorted import Share, sorted_frames
