@@ -61,7 +61,7 @@ class Clock:
         master = self.master
         size = master.bits // 8
         order = "<" if master.data_type == 4 else ">"
-        raw = np.ascontiguousarray(records[:, master.byte : master.byte + size]).view(f"{order}f{size}")
+        raw = records[:, master.byte : master.byte + size].view(f"{order}f{size}")
         seconds = raw[:, 0].astype(np.float64)
         with np.errstate(over="ignore", invalid="ignore"):
             if master.factor != 1 or master.offset:

@@ -20,6 +20,7 @@ from hil.log.wall_clock import EPOCH, wall_clock_ns
 __all__ = ["read_mf4", "write_mf4"]
 
 LATEST = 420  # version of MDF that is read
+BLOCK_ROWS = ROWS // 2  # records of a group that become frames at once: they fit a cache
 MERGED_ROWS = 4 * ROWS  # of all groups together
 HELD_BYTES = 64 << 20  # of records and values, of all groups together
 LEAST_ROWS = 64
