@@ -173,7 +173,7 @@ def compile_encoder(message: DbcMessage, fields: list[Field], data_id: int | Non
         crc = str(e2e.start_value(data_id))
         for octet in octets:
             crc = f"t[{crc} ^ {octet}]"
-        namespace |= {"t": e2e.CRC_TABLE, "check": [bytes([crc ^ 0xFF]) for crc in range(256)]}
+        namespace |= {"t": e2e.CRC_TABLE, "check": [bytes([crc]) for crc in range(256)]}
         lines += [f" _, {', '.join(octets)} = data", f" data = check[{crc}] + data[1:]"]
     return _compile("\n".join([*lines, " return data"]), "encode", namespace)
 

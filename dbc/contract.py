@@ -9,7 +9,7 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from dbc import bench_messages, messages
+from dbc import bench_messages, e2e, messages
 from dbc.codec import CRC_SIGNAL, CodecError, Field, compile_decoder, compile_encoder, field_of, payload_signals
 from dbc.frame import BusName
 from dbc.lean_cantools import Database, DbcMessage, cantools
@@ -68,9 +68,9 @@ def _enum_of(hint: Any) -> type[IntEnum] | None:
     return kinds[0] if kinds else None
 
 
-def _attribute(owner: DbcMessage | Database, name: str) -> int | None:
+def _attribute(owner: DbcMessage | Database, name: str) -> Any:
     attribute = owner.dbc.attributes.get(name) if owner.dbc else None
-    return None if attribute is None else int(attribute.value)
+    return None if attribute is None else attribute.value
 
 
 def _spec(bus: BusName, message: DbcMessage, message_type: type[Message]) -> MessageSpec:
@@ -86,6 +86,11 @@ def _spec(bus: BusName, message: DbcMessage, message_type: type[Message]) -> Mes
     data_id = _attribute(message, "E2EDataID")
     if (data_id is not None) != any(s.name == CRC_SIGNAL for s in message.signals):
         raise CodecError(f"{message.name}: a message has both a {CRC_SIGNAL} signal and an E2EDataID, or neither")
+    profile = _attribute(message, "E2EProfile")
+    if profile != (None if data_id is None else e2e.PROFILE):
+        raise CodecError(
+            f"{message.name}: E2EProfile is {profile!r}; expected {e2e.PROFILE!r} beside an E2EDataID, else nothing"
+        )
     return MessageSpec(
         bus=bus,
         name=message.name,

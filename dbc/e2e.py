@@ -1,14 +1,22 @@
 """End-to-end protection: alive counter, check value, data id.
 
-One definition for sender, checker and log decoder. The scheme is AUTOSAR-like profile 1 (variant 1A): CRC-8
-SAE J1850 (polynomial 0x1D, start 0xFF, final XOR 0xFF) over the 16-bit data id (low byte, high byte) and every
-payload byte but the first, which carries the check value; a counter 0..14 sits in the low nibble of the second
-byte. Status names follow AUTOSAR (SWS_E2ELibrary). It protects against faults, not against an attacker.
+One definition for sender, checker and log decoder: AUTOSAR E2E profile 1, variant 1A (AUTOSAR CP, Specification of
+SW-C End-to-End Communication Protection Library). The first byte is a CRC-8 (polynomial 0x1D, start and final XOR 0)
+over the 16-bit data id, low byte first, and every other byte of the payload; a counter 0..14 sits in the low nibble of
+the second byte. Status names follow AUTOSAR, which calls the first valid frame INITIAL where `Status` has SYNC. It
+protects against faults, not against an attacker.
+
+Recordings exist whose check values were made with start and final XOR 0xFF (CRC-8 SAE J1850): the *legacy* value.
 """
 
 from enum import StrEnum
 
+PROFILE = "AUTOSAR profile 1A"
+"""The DBC attribute E2EProfile of a message that is protected as here."""
+
 COUNTER_MODULUS = 15  # counts 0..14; 15 never occurs on the wire
+LEGACY = 0xFF
+"""Start and final XOR of the legacy check value; those of the profile are 0."""
 
 
 def _table(polynomial: int) -> tuple[int, ...]:
@@ -21,35 +29,43 @@ def _table(polynomial: int) -> tuple[int, ...]:
 
 
 CRC_TABLE = _table(0x1D)
-"""CRC-8 of one byte, start and final XOR 0."""
+"""CRC-8 of one byte."""
 
 
-def crc8(data: bytes, start: int = 0xFF) -> int:
-    """CRC-8 SAE J1850 of ``data``: polynomial 0x1D, start 0xFF, final XOR 0xFF; b"123456789" gives 0x4B."""
+def crc8(data: bytes, start: int = 0) -> int:
+    """CRC-8 of ``data``: polynomial 0x1D, ``start``, no final XOR; b"123456789" gives 0x37."""
     crc = start
     for byte in data:
         crc = CRC_TABLE[crc ^ byte]
-    return crc ^ 0xFF
+    return crc
 
 
-def start_value(data_id: int) -> int:
-    """CRC over the data id, without the final XOR: where the payload's begins."""
-    return CRC_TABLE[CRC_TABLE[0xFF ^ (data_id & 0xFF)] ^ (data_id >> 8)]
+def start_value(data_id: int, legacy: bool = False) -> int:
+    """CRC over the data id: where the payload's begins."""
+    return crc8(bytes((data_id & 0xFF, data_id >> 8)), LEGACY if legacy else 0)
 
 
-def check_value(data_id: int, payload: bytes | bytearray) -> int:
+def check_value(data_id: int, payload: bytes | bytearray, legacy: bool = False) -> int:
     """Check value of a payload whose first byte is left out (it holds the check value itself)."""
-    return _continued(start_value(data_id), payload)
+    return _continued(start_value(data_id, legacy), payload) ^ (LEGACY if legacy else 0)
+
+
+def legacy_difference(length: int) -> int:
+    """What the legacy check value of a payload of ``length`` bytes differs by (XOR) from the profile's.
+
+    The CRC is linear: the difference depends on nothing but the length, and is 0 for none below 254.
+    """
+    return crc8(bytes(length + 1), LEGACY) ^ LEGACY
 
 
 def _continued(crc: int, payload: bytes | bytearray) -> int:
     t = CRC_TABLE
     if len(payload) == 8:  # most are; without the loop it takes two thirds of the time
         _, a, b, c, d, e, f, g = payload
-        return t[t[t[t[t[t[t[crc ^ a] ^ b] ^ c] ^ d] ^ e] ^ f] ^ g] ^ 0xFF
+        return t[t[t[t[t[t[t[crc ^ a] ^ b] ^ c] ^ d] ^ e] ^ f] ^ g]
     for byte in payload[1:]:
         crc = t[crc ^ byte]
-    return crc ^ 0xFF
+    return crc
 
 
 def counter_of(payload: bytes | bytearray) -> int:

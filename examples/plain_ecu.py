@@ -19,13 +19,13 @@ DEMANDS = {
 }
 
 
-def crc8(data, crc=0xFF):
-    """SAE J1850: polynomial 0x1D, start and final XOR 0xFF."""
+def crc8(data, crc=0):
+    """AUTOSAR end-to-end profile 1A: polynomial 0x1D, start and final XOR 0."""
     for byte in data:
         crc ^= byte
         for _ in range(8):
             crc = (crc << 1 ^ 0x1D) & 0xFF if crc & 0x80 else crc << 1
-    return crc ^ 0xFF
+    return crc
 
 
 database = cantools.database.load_string((files("dbc") / "brake.dbc").read_text(), "dbc")

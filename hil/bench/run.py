@@ -200,7 +200,7 @@ def _write(out: Path, report: Report, signals: Signals) -> dict[str, str]:
         "figure": out / "figure.png",
         "page": out / "report.html",
     }
-    export(signals.decoded, files["signals"])
+    export(signals.decoded, files["signals"], overwrite=True)
     write_figure(report, files["figure"])
     write_html(report, files["page"])
     return {name: os.path.relpath(path) for name, path in files.items()}

@@ -9,6 +9,7 @@ are removed by whoever comes next; the last to leave removes the directory.
 """
 
 import contextlib
+import errno
 import fcntl
 import os
 import re
@@ -30,6 +31,30 @@ def base_directory() -> Path:
     """Return the directory of all this user's channels, which need not exist."""
     runtime = Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir())
     return (runtime if runtime.is_dir() else Path(tempfile.gettempdir())) / f"brakebench-{os.getuid()}"
+
+
+def live_channels() -> list[str]:
+    """Name this user's channels that somebody listens on now; it changes nothing in them."""
+    base = base_directory()
+    return sorted({path.parent.name for path in base.glob("*/*.sock") if _listens(path)})
+
+
+def _listens(path: Path) -> bool:
+    """Somebody accepts connections on a member's socket; a member of any kind just sees one come and go."""
+    kind = socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK
+    with contextlib.suppress(OSError), _short_name(path.parent) as place, socket.socket(socket.AF_UNIX, kind) as probe:
+        return probe.connect_ex(f"{place}/{path.name}") in (0, errno.EAGAIN)  # EAGAIN: its queue of joiners is full
+    return False
+
+
+@contextlib.contextmanager
+def _short_name(directory: Path) -> Iterator[str]:
+    """Give a directory a short name: a Unix socket's path may have 107 bytes only, see unix(7)."""
+    file = os.open(directory, os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        yield f"/proc/self/fd/{file}"
+    finally:
+        os.close(file)
 
 
 class Rendezvous:
@@ -55,7 +80,7 @@ class Rendezvous:
         -------
         The listening socket and a connection to each member, all non-blocking.
         """
-        with self._locked(), self._reachable() as place:
+        with self._locked(), _short_name(self._directory) as place:
             present = self._present(place)
             listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
             try:
@@ -71,7 +96,7 @@ class Rendezvous:
     def leave(self, listener: socket.socket) -> None:
         """Close and remove this member's socket, and the directory after the last member."""
         listener.close()
-        with contextlib.suppress(BusError), self._locked(), self._reachable() as place:
+        with contextlib.suppress(BusError), self._locked(), _short_name(self._directory) as place:
             self._path.unlink(missing_ok=True)
             present = self._present(place)
             for connection in present:
@@ -95,15 +120,6 @@ class Rendezvous:
                 if isinstance(error, ConnectionRefusedError):
                     path.unlink(missing_ok=True)
         return present
-
-    @contextlib.contextmanager
-    def _reachable(self) -> Iterator[str]:
-        """Give the directory a short name: a Unix socket's path may have 107 bytes only, see unix(7)."""
-        directory = os.open(self._directory, os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC)
-        try:
-            yield f"/proc/self/fd/{directory}"
-        finally:
-            os.close(directory)
 
     @contextlib.contextmanager
     def _locked(self) -> Iterator[None]:

@@ -3,10 +3,15 @@
 import argparse
 import json
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
-from hil.log.convert import convert
-from hil.log.write import FORMATS
+from hil.cli.columns import terminal_width, wrapped
+from hil.cli.log_options import LOGS, add_force, add_timezone
+from hil.cli.progress import Progress
+from hil.log.convert import Conversion, convert
+from hil.log.formats import WRITABLE
+from hil.log.source import ReadOptions
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -14,39 +19,56 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser = subparsers.add_parser(
         "convert",
         help="convert a log to another format",
-        description=f"Convert a CAN log; the suffix names the format: {', '.join(FORMATS)} (.log is candump's).",
-        epilog="The written file is read back and compared with the frames of IN before it appears as OUT.",
+        description=f"Convert a CAN log; the suffix names the format: {', '.join(WRITABLE)} (.log is candump's).",
+        epilog="The written file is read back and compared with the frames of IN before it appears as OUT. "
+        "Exit codes: 0 all of IN is in OUT; 1 something of IN was cut off or rejected; 2 unusable.",
     )
-    parser.add_argument("source", metavar="IN", type=Path, help="log to read")
+    parser.add_argument("source", metavar="IN", help=LOGS)
     parser.add_argument("target", metavar="OUT", type=Path, help="log to write")
-    parser.add_argument("--force", action="store_true", help="replace OUT where it exists")
+    add_force(parser, "OUT")
+    add_timezone(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Convert and say what happened."""
-    done = convert(args.source, args.target, args.force)
-    source = done.source
-    notes = list(done.notes)
-    if source.rejected:
-        notes.append(f"{source.rejected} lines or objects of {source.path} are no frames and were left out:")
-        notes += [f"  at byte {r.offset}: {r.text}" for r in source.first_rejected]
-    if source.truncated_at is not None:
-        notes.append(f"{source.path} is cut off at byte {source.truncated_at}")
+    with Progress() as progress:
+        progress.part(0, "converting")
+        done = convert(Path(args.source), args.target, args.force, ReadOptions(timezone=args.timezone), progress)
+    account = done.account
     if args.json:
         result = {
-            "in": str(source.path),
+            "in": str(done.source),
+            "format": done.format,
             "out": str(done.path),
-            "frames_read": len(source.frames),
+            "frames_read": done.frames_read,
             "frames_written": done.frames_written,
-            "rejected": source.rejected,
-            "truncated_at": source.truncated_at,
-            "notes": list(done.notes),
+            "rejected": account.rejected,
+            "truncated_at": account.truncated_at,
+            "passed_over": dict(account.passed_over),
+            "notes": [*done.notes, *account.notes],
         }
         print(json.dumps(result))
     else:
-        print(f"{source.path} -> {done.path}: {len(source.frames)} frames read, {done.frames_written} written, equal")
-    for note in notes:
-        print(note, file=sys.stderr if args.json else sys.stdout)
-    return 0
+        text = (
+            f"{done.source} ({done.format}) -> {done.path}: {done.frames_read:,} frames read, "
+            f"{done.frames_written:,} written, equal"
+        )
+        print("\n".join(wrapped(text, terminal_width())))
+    for note in _notes(done):
+        print("\n".join(wrapped(note, terminal_width())), file=sys.stderr if args.json else sys.stdout)
+    return 0 if account.whole else 1
+
+
+def _notes(done: Conversion) -> Iterator[str]:
+    account = done.account
+    yield from done.notes
+    yield from account.notes
+    for kind, count in account.passed_over.items():
+        yield f"{count:,} {kind} passed over"
+    if account.rejected:
+        yield f"{account.rejected:,} pieces of {done.source} are no frames and were left out:"
+        yield from (f"  at byte {one.offset}: {one.text}" for one in account.first_rejected)
+    if account.truncated_at is not None:
+        yield f"{done.source} is cut off at byte {account.truncated_at}"

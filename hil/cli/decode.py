@@ -1,110 +1,151 @@
-"""``brakebench decode``: a log's frames as signals, every frame accounted for."""
+"""``brakebench decode``: what a log holds, every frame accounted for, and its signals as tables."""
 
 import argparse
 import json
 import sys
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
-from dbc.database import Database, DatabaseError, parse_database
+from hil.cli.columns import terminal_width
+from hil.cli.log_options import (
+    LOGS,
+    add_databases,
+    add_force,
+    add_timezone,
+    bit_rates,
+    databases,
+    paths,
+    words_of,
+)
+from hil.cli.progress import Progress
+from hil.cli.summary_json import summary_values
+from hil.cli.summary_text import summary_lines
 from hil.errors import BrakebenchError
-from hil.log.decode import DecodedLog, decode_log, own_databases
-from hil.log.export import export
-from hil.log.read import read_log
-
-SHOWN = 10
+from hil.log.account import printable
+from hil.log.blocks import Block, Field, Layout, blocks_of
+from hil.log.choice import Choice, Moment
+from hil.log.contents import Contents
+from hil.log.several import Logs
+from hil.log.source import ReadOptions
+from hil.log.summary import Summary
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
     parser = subparsers.add_parser(
         "decode",
-        help="decode a log into signals",
-        description="Decode a CAN log into signals; every frame is accounted for.",
-        epilog="Without --dbc our own databases are used: bench.dbc for a channel named bench, brake.dbc for others.",
+        help="what a log holds, and its signals as tables",
+        description="Summarise a CAN log and decode it into signals; every frame is accounted for.",
+        epilog="Without --dbc our own databases are used: bench.dbc for a channel named bench, brake.dbc for others. "
+        "Exit codes: 0 the whole log was read; 1 something of it was cut off, rejected or shorter than its message; "
+        "2 unusable. More: docs/logs.md.",
     )
-    parser.add_argument("log", metavar="LOG", type=Path, help="log file: candump, ASC, BLF, TRC, MF4, CSV, Parquet")
-    parser.add_argument("--dbc", metavar="FILE", type=Path, help="database for all channels of the log")
-    parser.add_argument("--out", metavar="FILE", type=Path, help="write the signals: FILE.parquet or FILE.csv")
+    parser.add_argument("log", metavar="LOG", nargs="+", help=f"{LOGS}; several, or a quoted pattern, are one log")
+    add_databases(parser)
+    parser.add_argument("--out", metavar="FILE", help="write signals: FILE.csv, FILE.parquet, FILE.mf4 or FOLDER/")
+    add_force(parser)
+    parser.add_argument("--messages", metavar="GLOB,...", action="append", default=[], help="only these messages")
+    parser.add_argument(
+        "--signals", metavar="GLOB,...", action="append", default=[], help="only these: MESSAGE.SIGNAL or SIGNAL"
+    )
+    parser.add_argument("--channel", metavar="NAME", action="append", default=[], help="only this channel (repeatable)")
+    parser.add_argument("--from", dest="begin", metavar="TIME", help="seconds from the first frame, or a date and time")
+    parser.add_argument("--to", dest="end", metavar="TIME", help="likewise; both ends are included")
+    parser.add_argument("--resample", metavar="SECONDS", type=float, help="one raster, the last value held")
+    parser.add_argument("--names", action="store_true", help="write a column of value names beside the numbers")
+    add_timezone(parser)
+    parser.add_argument(
+        "--bitrate", metavar="[CHANNEL=]RATE[/DATA]", action="append", default=[], help="bit/s, for the bus load"
+    )
+    parser.add_argument("--limit-mb", metavar="N", type=float, help="read at most so much of each log (unpacked)")
+    parser.add_argument("--e2e-legacy", action="store_true", help="check by the check value of older recordings")
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Decode, print the account, write the table."""
-    databases = {str(args.dbc): _database(args.dbc)} if args.dbc else own_databases()
-    recording = read_log(args.log)
-    log = decode_log(recording, next(iter(databases.values())) if args.dbc else databases)
-    warnings = [w for database in databases.values() for w in database.warnings]
-    if args.out:
-        export(log, args.out)
+    """Summarise, write the signals, say what is missing."""
+    databases_, files = databases(args.dbc)
+    choice = _choice(args)
+    wanted = choice.wanted(databases_)
+    contents = Contents(databases_, wanted, bit_rates(args.bitrate), args.e2e_legacy)
+    _check_out(args)
+    limit = None if args.limit_mb is None else int(args.limit_mb * 1_000_000)
+    warnings = (*databases_.warnings, *(w for one in databases_.all() for w in one.warnings))
+    with (
+        Logs(paths(args.log), ReadOptions(timezone=args.timezone), limit) as logs,
+        Progress(2 if args.out else 1) as progress,
+    ):
+        for table in choice.frames(logs.tables(progress)):
+            contents.add(table)
+        summary = contents.summary()
+        _check_found(logs, choice, summary)
+        rows = None
+        if args.out and (summary.frames or logs.whole):
+            progress.part(1, "writing")
+            blocks = blocks_of(choice.frames(logs.tables(progress)), databases_.decoder(wanted))
+            rows = _write(args, blocks, contents, summary, [*files, *(part.path for part in logs.parts)])
     if args.json:
-        print(json.dumps(summary(log, warnings, args.out), allow_nan=False))
-        for line in _notes(log, warnings):
-            print(line, file=sys.stderr)
+        values = summary_values(logs, contents, summary, warnings)
+        print(json.dumps(values | {"out": args.out, "rows": rows}, allow_nan=False))
     else:
-        print("\n".join([*_table(log), *_notes(log, warnings)]))
-        if args.out:
-            print(f"signals: {args.out} ({len(log.time_s)} rows, {len(log.columns)} signals)")
-    return 0
+        lines = summary_lines(logs, contents, summary, args.timezone, terminal_width(), warnings)
+        if rows is not None:
+            lines += ["", f"signals: {printable(args.out)} ({rows:,} rows, {len(contents.signals)} signals)"]
+        print("\n".join(lines))
+    return _exit_code(logs, contents, summary)
 
 
-def _database(path: Path) -> Database:
-    try:
-        return parse_database(path.read_bytes(), str(path))
-    except OSError as error:
-        raise BrakebenchError(f"{path}: cannot be opened: {error.strerror or error}; give a DBC file") from error
-    except DatabaseError as error:
-        raise BrakebenchError(str(error)) from error
+def _choice(args: argparse.Namespace) -> Choice:
+    begin, end = (None if text is None else Moment.parse(text, args.timezone) for text in (args.begin, args.end))
+    return Choice(tuple(args.channel), begin, end, words_of(args.messages), words_of(args.signals))
 
 
-def summary(log: DecodedLog, warnings: list[str], out: Path | None) -> dict[str, Any]:
-    """Return the account as the plain values that ``--json`` prints."""
-    recording = log.recording
-    return {
-        "log": str(recording.path),
-        "format": recording.format,
-        "frames": log.frames,
-        "decoded": log.decoded,
-        "unknown": log.unknown,
-        "rejected": log.rejected,
-        "truncated_at": recording.truncated_at,
-        "messages": {name: {"count": m.count, "rate_hz": m.rate_hz} for name, m in log.messages.items()},
-        "unknown_ids": dict(log.unknown_ids.most_common()),
-        "rejected_reasons": dict(log.reasons),
-        "first_rejected": [{"offset": r.offset, "text": r.text} for r in recording.first_rejected],
-        "dbc_warnings": warnings,
-        "out": None if out is None else str(out),
-    }
+def _check_out(args: argparse.Namespace) -> None:
+    if args.limit_mb is not None and not args.limit_mb > 0:
+        raise BrakebenchError("--limit-mb takes a number above 0")
+    if args.out:
+        from hil.log.export_messages import check_target
+
+        check_target(args.out)
+        if Path(args.out).exists() and not args.force:
+            raise BrakebenchError(f"{args.out}: exists already; use --force to replace it, or give another name")
+    elif args.resample is not None or args.names:
+        raise BrakebenchError("--resample and --names say how signals are written; give --out as well")
+    if args.resample is not None and not args.resample > 0:
+        raise BrakebenchError("--resample takes a step above 0 s, 0.01 for 10 ms")
 
 
-def _table(log: DecodedLog) -> list[str]:
-    width = max([7, *(len(name) for name in log.messages)])
-    lines = [f"{'message':<{width}}  {'count':>9}  {'rate':>10}"]
-    for name, message in log.messages.items():
-        rate = "-" if message.rate_hz is None else f"{message.rate_hz:.1f} Hz"
-        lines.append(f"{name:<{width}}  {message.count:>9}  {rate:>10}")
-    span = log.time_s.max() - log.time_s.min() if len(log.time_s) else 0.0
-    channels = ", ".join(log.recording.frames.channels) or "none"
-    lines += [
-        "",
-        f"{log.frames} frames in {span:.1f} s (channels: {channels}): "
-        f"{log.decoded} decoded, {log.unknown} unknown, {log.rejected} rejected",
-    ]
-    return lines
+def _check_found(logs: Logs, choice: Choice, summary: Summary) -> None:
+    """Refuse a choice that leaves nothing, so that a slip of the pen is no empty result."""
+    if summary.frames or not choice.of_frames or not any(part.frames for part in logs.parts):
+        return
+    where = f"channel {', '.join(choice.channels)}" if choice.channels else "this span of time"
+    raise BrakebenchError(
+        f"{logs.parts[0].path}: none of its {sum(part.frames for part in logs.parts):,} frames is of {where}; "
+        f"its channels are {', '.join(map(printable, logs.channels))}"
+    )
 
 
-def _notes(log: DecodedLog, warnings: list[str]) -> list[str]:
-    """What the reader should know beside the counts."""
-    lines = [f"rejected: {count} {reason}" for reason, count in log.reasons.items()]
-    lines += [f"  at byte {r.offset}: {r.text}" for r in log.recording.first_rejected]
-    if log.recording.truncated_at is not None:
-        lines.append(f"the file is cut off at byte {log.recording.truncated_at}")
-    if log.unknown_ids:
-        shown = ", ".join(f"{name} ({count})" for name, count in log.unknown_ids.most_common(SHOWN))
-        more = len(log.unknown_ids) - SHOWN
-        lines.append(f"unknown: {shown}{f', and {more} more' if more > 0 else ''}")
-    lines += [f"database: {warning}" for warning in warnings[:SHOWN]]
-    if len(warnings) > SHOWN:
-        lines.append(f"database: and {len(warnings) - SHOWN} more warnings (all of them with --json)")
-    return lines
+def _write(
+    args: argparse.Namespace, blocks: Iterable[Block], contents: Contents, summary: Summary, read: list[Path]
+) -> int:
+    from hil.log.export_messages import write_signals
+    from hil.log.resample import resampled
+
+    fields = tuple(Field(one.message, one.signal, one.dtype) for one in contents.signals.values())
+    several = contents.counts.several_channels and args.resample is None
+    layout = Layout(fields, several, args.names, summary.first_ns, contents.channel_of())
+    if args.resample is not None:
+        blocks = resampled(blocks, fields, summary.first_ns, summary.last_ns, round(args.resample * 1e9))
+    return write_signals(blocks, layout, args.out, args.force, read)
+
+
+def _exit_code(logs: Logs, contents: Contents, summary: Summary) -> int:
+    """0 whole; 1 something of the log is missing; 2 no frame could be read."""
+    if logs.whole and not contents.counts.rejected:
+        return 0
+    if not summary.frames:
+        print("brakebench: no frame could be read; give a CAN log", file=sys.stderr)
+        return 2
+    return 1

@@ -18,6 +18,8 @@ COMMANDS = (
     "replay",
     "decode",
     "convert",
+    "diff",
+    "plot",
     "identify",
     "verify",
     "reproduce",

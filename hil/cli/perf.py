@@ -7,7 +7,7 @@ from dataclasses import asdict
 
 from hil.cli.options import add_json
 
-MEASUREMENTS = ("rt", "plant", "ecu", "codec", "loop", "explain")
+MEASUREMENTS = ("rt", "plant", "ecu", "codec", "loop", "decode", "explain")
 """Each is a module of hil.validation.perf with ``measure() -> list[Row]``."""
 
 

@@ -52,9 +52,10 @@ class FrameBuilder:
         self.columns = self._fresh()
 
     def _fresh(self) -> Columns:
-        table = FrameTable.empty(self.rows, self.width)
+        n = self.rows  # not zeroed: every row is written whole
         return (
-            table.time_ns, table.channel, table.can_id, table.extended, table.length, table.data, table.flags,
+            np.empty(n, np.int64), np.empty(n, np.int32), np.empty(n, np.uint32), np.empty(n, np.bool_),
+            np.empty(n, np.uint8), np.empty((n, self.width), np.uint8), np.empty(n, np.uint8),
         )  # fmt: skip
 
     @property
@@ -100,6 +101,7 @@ class FrameBuilder:
         times, channels, ids, wide, lengths, payload, bits = self.columns
         times[row], channels[row], ids[row] = time_ns, self.channel(channel), can_id
         wide[row], lengths[row], bits[row] = extended and not error, size, int(flags)
+        payload[row] = 0  # a compiled pass may have begun this row before it left the frame to the careful parser
         if not remote and size:
             payload[row, :size] = np.frombuffer(data, np.uint8)
         self.n += 1

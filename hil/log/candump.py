@@ -1,6 +1,7 @@
 """candump's log format, ``(seconds) channel ID#DATA``."""
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from datetime import tzinfo
 from typing import IO
@@ -9,13 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from hil.log.account import Account
-from hil.log.builder import FrameBuilder
+from hil.log.builder import NAME_BYTES, FrameBuilder
 from hil.log.frames import FrameFlag, FrameTable, LogFacts
+from hil.log.line_writer import channel_bytes, write_rows
 from hil.log.lines import read_lines
 from hil.log.source import ReadOptions, Source
 
 MAX_SECONDS = 9_000_000_000  # int64 nanoseconds reach a little farther
 ERROR_BIT = 0x2000_0000
+_NO_NAME_LETTER = re.compile(r"[^!-~]")
 
 # The one definition of a line; the compiled pass only takes lines that would match it.
 LINE = re.compile(
@@ -27,11 +30,14 @@ LINE = re.compile(
 
 def read_candump(source: Source, account: Account, options: ReadOptions) -> Iterator[FrameTable]:
     """Yield the frames of a candump log; every line that is not blank becomes a frame or is counted as rejected."""
-    return read_lines(source, account, CandumpParser(), options.fast)
+    return read_lines(source, account, CandumpParser(account), options.fast)
 
 
 class CandumpParser:
     """Lines of candump's log form (see `hil.log.lines.LineParser`)."""
+
+    def __init__(self, account: Account) -> None:
+        self.account = account
 
     def take(self, buffer: npt.NDArray[np.uint8], begin: int, builder: FrameBuilder) -> int:
         """Add lines of the plain form."""
@@ -43,10 +49,14 @@ class CandumpParser:
         """Add one line; only a classical frame of 8 bytes, and a remote frame, is surely whole without a line end."""
         match = LINE.fullmatch(line)
         if match is None or int(match[1]) > MAX_SECONDS:
-            if line.strip():
-                builder.reject(offset, line.rstrip(b"\r"))
+            text = line.strip()
+            if text.startswith(b"DROPCOUNT: dropped "):
+                self.account.passed_over["dropped frames"] += 1
+                self.account.note("candump says that it missed frames (DROPCOUNT)")
                 return False
-            return True
+            if text:
+                builder.reject(offset, text)
+            return not text
         can_id, wide = int(match[4], 16), len(match[4]) == 8
         flags = FrameFlag.SENT if match[10] == b"T" else FrameFlag(0)
         if wide and can_id & ERROR_BIT:
@@ -66,35 +76,33 @@ class CandumpParser:
         channel = match[3].decode("ascii", "backslashreplace")
         can_id &= ~ERROR_BIT if flags & FrameFlag.ERROR else 0xFFFF_FFFF
         if not builder.add(time_ns, channel, can_id, wide, payload, flags, length):
-            builder.reject(offset, line.rstrip(b"\r"))
+            builder.reject(offset, line.strip())
             return False
         return bool(match[5]) or len(payload) == (64 if match[7] else 8)
 
 
+def candump_names(channels: tuple[str, ...]) -> tuple[str, ...]:
+    """Channel names as a candump log can hold them.
+
+    A blank, and every letter that is no visible ASCII, becomes an underscore; a name is cut to 32 letters, and one
+    that another channel then has as well gets a number behind it.
+    """
+    held: dict[str, None] = {}
+    counts: Counter[str] = Counter()
+    for channel in channels:
+        plain = name = _NO_NAME_LETTER.sub("_", channel)[:NAME_BYTES] or "_"
+        while name in held:
+            counts[plain] += 1
+            name = f"{plain[: NAME_BYTES - 8]}_{counts[plain] + 1}"
+        held[name] = None
+    return tuple(held)
+
+
 def write_candump(file: IO[bytes], tables: Iterable[FrameTable], facts: LogFacts, zone: tzinfo) -> None:
     """Write a candump log; stamps have six digits, or nine where the log is finer."""
-    fine = facts.finer_than_us
+    from hil.log.line_pass import candump_rows
+
     directed = bool(facts.flags & FrameFlag.SENT)
     for table in tables:
-        file.write("".join(_lines(table, fine, directed)).encode())
-
-
-def _lines(frames: FrameTable, fine: bool, directed: bool) -> Iterator[str]:
-    payloads = frames.data.tobytes().hex().upper()
-    width = 2 * frames.data.shape[1]
-    columns = (frames.time_ns, frames.channel, frames.can_id, frames.extended, frames.length, frames.flags)
-    for row, (time_ns, channel, can_id, extended, length, flags) in enumerate(
-        zip(*(c.tolist() for c in columns), strict=True)
-    ):
-        seconds, rest = divmod(time_ns, 1_000_000_000)
-        stamp = f"{seconds:010d}.{rest:09d}" if fine else f"{seconds:010d}.{rest // 1000:06d}"
-        error = flags & FrameFlag.ERROR
-        name = f"{can_id | (ERROR_BIT if error else 0):08X}" if extended or error else f"{can_id:03X}"
-        payload = payloads[row * width : row * width + 2 * length]
-        if flags & FrameFlag.REMOTE:
-            payload = f"R{length}"
-        elif flags & FrameFlag.FD:
-            bits = bool(flags & FrameFlag.BIT_RATE_SWITCH) + 2 * bool(flags & FrameFlag.ERROR_STATE)
-            payload = f"#{bits:X}{payload}"
-        direction = "" if not directed else " T" if flags & FrameFlag.SENT else " R"
-        yield f"({stamp}) {frames.channels[channel]} {name}#{payload}{direction}\n"
+        names, lengths = channel_bytes(candump_names(table.channels))
+        write_rows(file, candump_rows, table, names, lengths, facts.finer_than_us, directed)

@@ -1,77 +1,63 @@
-"""Frames to signals, vectorised: grouped by identifier, cut out of 64-bit words."""
+"""Frames to signals: grouped by message, cut out of 64-bit words.
 
+Columns are called "MESSAGE.SIGNAL". Where a name alone is not clear it gets a suffix:
+
+- Two databases use one name for different messages: that of the later one is "MESSAGE@CHANNEL" (where the databases
+  are given by channel) or "MESSAGE@FILE".
+- Several nodes send one J1939 message: the columns of the first source address of the log keep the plain name, those
+  of the others are "EEC1@17.EngineSpeed" (hexadecimal), since one signal of two nodes is two signals, as in the channel
+  groups by source address of other tools. `DecodedLog.messages` counts all of them as "EEC1".
+
+A J1939 message (``Message.pgn_match``) stands for its parameter group whatever the priority, the source address and
+(below PDU format 240) the destination. On a channel with such messages transport frames are joined, see
+`hil.log.j1939`.
+"""
+
+import gc
+import sys
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from functools import cache
-from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from dbc.contract import database_text
-from dbc.database import Database, Message, Signal, parse_database
+from dbc.database import Database, parse_database
 from dbc.frame import BusName
-from hil.log.frames import FrameFlag, FrameTable, Recording
+from hil.log.assign import Assigned, Assigner
+from hil.log.decoded import (
+    Column,
+    DecodedCounts,
+    DecodedLog,
+    MessageCount,
+    SignalCount,
+    TransportCount,
+    Values,
+)
+from hil.log.extract import Found, Group, pieces_of, work_out
+from hil.log.extract_compiled import extract_all
+from hil.log.frames import FrameTable, Recording
+from hil.log.j1939 import Joined, Transport
+from hil.log.lookup import Databases, Lookup
+from hil.log.message_frames import frames_of, stamps_of, with_joined, words_of
+from hil.log.signal_plan import SNA, MessagePlan, Words
+from hil.log.sources import Sources
+from hil.log.unknown_ids import KEPT, OTHERS
+from hil.log.wanted import Wanted
 
-Values = npt.NDArray[np.float64] | npt.NDArray[np.int64] | npt.NDArray[np.uint64]
+__all__ = [
+    "NOT_A_FRAME", "SNA", "TOO_SHORT", "Column", "Databases", "DecodedCounts", "DecodedLog", "Decoder", "MessageCount",
+    "SignalCount", "TransportCount", "Values", "decode_log", "own_databases",
+]  # fmt: skip
 
-SNA = "SNA"  # a raw value of this name means "signal not available": an empty cell, not a number
 TOO_SHORT = "shorter than the message in the DBC"
 NOT_A_FRAME = "not a frame"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Column:
-    """One signal of a log: ``values`` in the DBC's own unit at the frames ``rows`` (ascending)."""
-
-    signal: Signal
-    rows: npt.NDArray[np.int64]
-    values: Values
-
-
-@dataclass(frozen=True, slots=True)
-class MessageCount:
-    """How often a message was decoded, and its mean rate (None for a single frame)."""
-
-    count: int
-    rate_hz: float | None
-
-
-@dataclass(slots=True, eq=False)
-class DecodedLog:
-    """Signals of a log, and an account of every frame: frames = decoded + unknown + rejected.
-
-    Attributes
-    ----------
-    time_s : time stamps of the well-formed frames, s; `Column.rows` index it.
-    frames : frames in the log, malformed ones included.
-    decoded : frames of a message of the database.
-    unknown : well-formed frames that the database does not describe, remote and error frames among them.
-    rejected : malformed frames, and frames shorter than their message: no signal is taken from those.
-    reasons : why frames were rejected.
-    unknown_ids : number of frames by what they are: "channel 0x123", "error frame", ...
-    messages : count and rate by message name.
-    columns : signals by "MESSAGE.SIGNAL".
-    several_channels : a message came on more than one channel.
-    """
-
-    recording: Recording
-    time_s: npt.NDArray[np.float64]
-    frames: int
-    decoded: int = 0
-    unknown: int = 0
-    rejected: int = 0
-    reasons: Counter[str] = field(default_factory=Counter)
-    unknown_ids: Counter[str] = field(default_factory=Counter)
-    messages: dict[str, MessageCount] = field(default_factory=dict)
-    columns: dict[str, Column] = field(default_factory=dict)
-    several_channels: bool = False
-
-    def series(self, name: str) -> tuple[npt.NDArray[np.float64], Values]:
-        """Times (s) and values of one column, ``MESSAGE.SIGNAL``; KeyError where the log has none."""
-        column = self.columns[name]
-        return self.time_s[column.rows], column.values
+FEW_FRAMES = 500_000
+"""Up to here numpy is done before the compiled passes are loaded (0.3 to 0.5 s)."""
+MAX_CELLS = 8_000_000
+"""Most values (8 bytes each) of one piece of `Decoder.stream`, about."""
 
 
 @cache
@@ -80,171 +66,258 @@ def own_databases() -> dict[str, Database]:
     return {bus.value: parse_database(database_text(bus), f"our {bus.value} database") for bus in BusName}
 
 
-def decode_log(recording: Recording, databases: Database | Mapping[str, Database] | None = None) -> DecodedLog:
-    """Decode a recording.
-
-    Parameters
-    ----------
-    databases : one for all channels, or one by channel name (a channel that is not named has that of "vehicle",
-        or else none); None takes our own two.
-    """
-    frames = recording.frames
-    time_s = np.asarray(frames.time_ns / 1e9, np.float64)
-    log = DecodedLog(recording, time_s, len(frames) + recording.rejected, rejected=recording.rejected)
+def decode_log(
+    recording: Recording,
+    databases: Databases | None = None,
+    wanted: Collection[str] | None = None,
+    fast: bool | None = None,
+) -> DecodedLog:
+    """Decode a recording; parameters as of `Decoder`."""
+    log = Decoder(databases, wanted, fast).add(recording.frames)
+    log.recording = recording
+    log.frames += recording.rejected
+    log.rejected += recording.rejected
     if recording.rejected:
-        log.reasons[NOT_A_FRAME] = recording.rejected
-    of_channel = _by_channel(frames.channels, own_databases() if databases is None else databases)
-    distinct = list({id(d): d for d in of_channel if d is not None}.values())
-    number = {id(d): i for i, d in enumerate(distinct)}
-    index = np.array([len(distinct) if d is None else number[id(d)] for d in of_channel], np.int64)
-
-    special = (frames.flags & (FrameFlag.REMOTE | FrameFlag.ERROR)) != 0
-    _count_special(log, frames)
-    rows = np.flatnonzero(~special)
-    if not len(rows):
-        return log
-    key = index[frames.channel[rows]] << 32 | frames.extended[rows].astype(np.int64) << 31 | frames.can_id[rows]
-    order = np.argsort(key, kind="stable")
-    rows, key = rows[order], key[order]
-    bounds = np.concatenate(([0], np.flatnonzero(np.diff(key)) + 1, [len(key)]))
-    groups: dict[tuple[int, int, bool], npt.NDArray[np.int64]] = {}
-    for a, b in pairwise(bounds):
-        whole = int(key[a])
-        groups[whole >> 32, whole & 0x1FFF_FFFF, bool(whole >> 31 & 1)] = rows[a:b]
-    with np.errstate(over="ignore", invalid="ignore"):  # a floating-point signal may hold anything
-        for i, database in enumerate(distinct):
-            for (can_id, extended), message in database.messages.items():
-                group = groups.pop((i, can_id, extended), None)
-                if group is not None:
-                    _decode_message(log, frames, message, group)
-    for (_, can_id, extended), group in groups.items():
-        _count_unknown(log, frames, can_id, extended, group)
+        log.reasons[NOT_A_FRAME] += recording.rejected
     return log
 
 
-def _by_channel(channels: tuple[str, ...], databases: Database | Mapping[str, Database]) -> list[Database | None]:
-    if isinstance(databases, Database):
-        return [databases] * len(channels)
-    other = databases.get(BusName.VEHICLE.value)
-    return [databases.get(name, other) for name in channels]
+class Decoder:
+    """Decodes a log table by table, in memory that its length does not matter for.
 
+    Parameters
+    ----------
+    databases : one for all channels; several, of which the first one that knows an identifier is used; or either by
+        channel name (a channel that is not named has that of "" or of "vehicle", or else none). None takes our own
+        two.
+    wanted : messages ("MESSAGE") and signals ("MESSAGE.SIGNAL") that become columns, ``*`` and ``?`` stand for any
+        letters; None takes all. Frames are counted either way.
+    fast : False never uses the compiled passes, True always, None from `FEW_FRAMES` on, and from the begin where they
+        are loaded already. The results are the same.
 
-def _count_special(log: DecodedLog, frames: FrameTable) -> None:
-    error = (frames.flags & FrameFlag.ERROR) != 0
-    remote = ~error & ((frames.flags & FrameFlag.REMOTE) != 0)
-    for name, mask in (("error frame", error), ("remote frame", remote)):
-        count = int(mask.sum())
-        if count:
-            log.unknown += count
-            log.unknown_ids[name] += count
+    Attributes
+    ----------
+    unmatched : wanted names that no message or signal of the databases has.
 
-
-def _count_unknown(
-    log: DecodedLog, frames: FrameTable, can_id: int, extended: bool, rows: npt.NDArray[np.int64]
-) -> None:
-    log.unknown += len(rows)
-    for channel, count in enumerate(np.bincount(frames.channel[rows])):
-        if count:
-            name = f"{can_id:#010x}" if extended else f"{can_id:#05x}"
-            log.unknown_ids[f"{frames.channels[channel]} {name}"] += int(count)
-
-
-def _decode_message(log: DecodedLog, frames: FrameTable, message: Message, rows: npt.NDArray[np.int64]) -> None:
-    long_enough = frames.length[rows] >= message.length
-    short = len(rows) - int(long_enough.sum())
-    if short:
-        log.rejected += short
-        log.reasons[TOO_SHORT] += short
-        rows = rows[long_enough]
-    if not len(rows):
-        return
-    log.decoded += len(rows)
-    channels = np.unique(frames.channel[rows])
-    log.several_channels |= len(channels) > 1
-    name = message.name
-    if name in log.messages:  # two databases use the name for different messages
-        name = f"{name}@{frames.channels[channels[0]]}"
-    log.messages[name] = MessageCount(len(rows), _rate_hz(frames.time_ns[rows]))
-
-    data = frames.data[rows]
-    raw = {s.name: _raw(data, s) for s in message.signals}
-    there = _presence(message, raw)
-    for signal in message.signals:
-        values, mask = raw[signal.name], there[signal.name]
-        for number in [n for n, text in signal.choices.items() if text == SNA and not signal.is_float]:
-            mask = (values != number) if mask is None else mask & (values != number)
-        chosen = rows if mask is None else rows[mask]
-        column = Column(signal, chosen, _physical(values if mask is None else values[mask], signal))
-        log.columns[f"{name}.{signal.name}"] = column
-
-
-def _rate_hz(time_ns: npt.NDArray[np.int64]) -> float | None:
-    span_ns = int(time_ns.max()) - int(time_ns.min())
-    return (len(time_ns) - 1) * 1e9 / span_ns if span_ns > 0 else None
-
-
-def _presence(message: Message, raw: dict[str, Values]) -> dict[str, npt.NDArray[np.bool_] | None]:
-    """Frames that hold each signal; None where all do. A multiplexer value no branch lists selects no branch."""
-    by_name = {s.name: s for s in message.signals}
-    found: dict[str, npt.NDArray[np.bool_] | None] = {}
-
-    def mask(signal: Signal) -> npt.NDArray[np.bool_] | None:
-        if signal.name not in found:
-            selected = None
-            if signal.multiplexer is not None:
-                values = raw[signal.multiplexer]
-                low, high = (0, 2**64) if values.dtype == np.uint64 else (-(2**63), 2**63)
-                selected = np.isin(values, np.array([i for i in signal.mux_ids if low <= i < high], values.dtype))
-                parent = mask(by_name[signal.multiplexer])
-                selected = selected if parent is None else selected & parent
-            found[signal.name] = selected
-        return found[signal.name]
-
-    for signal in message.signals:
-        mask(signal)
-    return found
-
-
-def _raw(data: npt.NDArray[np.uint8], signal: Signal) -> Values:
-    """Raw values of a signal: int64, uint64 (unsigned of 64 bits) or float64.
-
-    Eight bytes around the signal are read as one word of its byte order; a signal that touches nine bytes (CAN FD
-    only) takes its last bits from the ninth.
+    >>> decoder = Decoder(database, wanted=["WHEELS.*"])  # doctest: +SKIP
+    >>> with open_log("drive.blf") as log:
+    ...     for piece in decoder.stream(log.tables()):
+    ...         time_s, speed = piece.series("WHEELS.FL")
+    >>> decoder.totals.messages["WHEELS"].count
     """
-    first, length = signal.first_bit, signal.length
-    byte = min(first // 8, data.shape[1] - 8)
-    words = np.ascontiguousarray(data[:, byte : byte + 8]).view(">u8" if signal.big_endian else "<u8")
-    word = words.ravel().astype(np.uint64)
-    begin, over = first - 8 * byte, first - 8 * byte + length - 64
-    if over > 0:
-        ninth = data[:, byte + 8].astype(np.uint64)
-        if signal.big_endian:
-            word = word << np.uint64(over) | ninth >> np.uint64(8 - over)
+
+    def __init__(
+        self,
+        databases: Databases | None = None,
+        wanted: Collection[str] | None = None,
+        fast: bool | None = None,
+    ) -> None:
+        self._lookup = Lookup(own_databases() if databases is None else databases, wanted)
+        self._assigner = Assigner(self._lookup)
+        self._transport = Transport()
+        self._sources = Sources()
+        self._fast = fast
+        self._unknown_groups: set[str] = set()
+        self._odd: dict[str, None] = {}
+        self._heads: dict[str, _Head] = {}
+        self._totals = DecodedCounts(notes=tuple(self._lookup.notes))
+        self.unmatched = self._lookup.unmatched()
+
+    def add(self, table: FrameTable) -> DecodedLog:
+        """Decode further frames of the log.
+
+        Returns
+        -------
+        Signals and account of these frames; ``rows`` count from the first frame of the table. A J1939 message that
+        transport frames carry is there at the frame that completes it.
+
+        Raises
+        ------
+        ValueError
+            When a frame's channel is none of the table's.
+        """
+        if self._fast is None and (
+            self._totals.frames + len(table) > FEW_FRAMES or "hil.log.decode_pass" in sys.modules
+        ):
+            self._fast = True
+        fast = bool(self._fast)
+        log = DecodedLog(
+            recording=Recording(Path(), "", table),
+            time_s=np.asarray(table.time_ns / 1e9, np.float64),
+            frames=len(table),
+            notes=self._totals.notes,
+        )
+        if len(table):
+            words = words_of(table)
+            assigned = self._assigner.assign(table, words, fast)
+            self._count_others(log, assigned)
+            joined = self._joined(log, table, assigned)
+            with np.errstate(over="ignore", invalid="ignore"), _uncollected():  # a float may hold anything
+                self._decode(log, table, words, assigned, joined, fast)
+            self._note(log)
+        self._totals.merge(log)
+        return log
+
+    def stream(self, tables: Iterable[FrameTable]) -> Iterator[DecodedLog]:
+        """Decode tables one after another, in pieces where the database has so many signals that one would be large.
+
+        Columns of a piece index `DecodedLog.recording` of that piece.
+        """
+        rows = max(1, MAX_CELLS // max([1, *(len(m.signals) for m in self._lookup.messages)]))
+        for table in tables:
+            for begin in range(0, max(1, len(table)), rows):
+                yield self.add(table if len(table) <= rows else table.take(slice(begin, begin + rows)))
+
+    @property
+    def totals(self) -> DecodedCounts:
+        """The account of all tables so far."""
+        signals: dict[str, SignalCount] = {}
+        for head in self._heads.values():
+            signals |= head.totals()
+        self._totals.signals = signals
+        return self._totals
+
+    def _count_others(self, log: DecodedLog, assigned: Assigned) -> None:
+        log.unknown = assigned.strangers + assigned.errors + assigned.remotes
+        log.unknown_ids = self._assigner.unknown.take(self._assigner.channels, assigned.further)
+        for name, count in (("error frame", assigned.errors), ("remote frame", assigned.remotes)):
+            if count:
+                log.unknown_ids[name] = count
+
+    def _joined(self, log: DecodedLog, table: FrameTable, assigned: Assigned) -> dict[int, list[Joined]]:
+        """Messages that transport frames complete, by slot."""
+        rows = assigned.rows[assigned.starts[-2] :]
+        numbers = self._assigner.numbers(table.channels).tolist()
+        found: dict[int, list[Joined]] = {}
+        for one in self._transport.add(table, rows, numbers):
+            name = table.channels[one.channel]
+            slot = self._lookup.group_slot(self._lookup.network(name), one.can_id)
+            if slot is None:
+                group = f"{name} PGN {one.can_id >> 8 & 0x3FFFF:#06x}"
+                if len(self._unknown_groups) < KEPT:
+                    self._unknown_groups.add(group)
+                log.transport.unknown[group if group in self._unknown_groups else OTHERS] += 1
+            else:
+                found.setdefault(slot, []).append(one)
+                self._assigner.came_on(slot, numbers[one.channel])
+            log.transport.joined += 1
+        log.transport.frames = len(rows)
+        log.decoded += len(rows)
+        log.transport.broken = Counter(self._transport.broken)
+        log.transport.open = self._transport.open
+        return found
+
+    def _decode(
+        self,
+        log: DecodedLog,
+        table: FrameTable,
+        words: Words,
+        assigned: Assigned,
+        joined: dict[int, list[Joined]],
+        fast: bool,
+    ) -> None:
+        parts: list[tuple[MessagePlan, Group]] = []
+        heads: list[_Head] = []
+        came = np.flatnonzero(np.diff(assigned.starts[:-1]))
+        stamps = stamps_of(table.time_ns, assigned, came)
+        for slot in sorted({*came.tolist(), *joined}):
+            plan = self._lookup.plan(slot)
+            group, too_short = frames_of(slot, plan, table, words, assigned)
+            if too_short:
+                log.rejected += too_short
+                log.reasons[TOO_SHORT] += too_short
+            log.decoded += len(group.rows)
+            short, longer = int(assigned.short[slot]) - too_short, int(assigned.longer[slot])
+            carried = [one for one in joined.get(slot, ()) if len(one.data) >= plan.least]
+            if carried:
+                short += sum(len(one.data) < plan.message.length for one in carried)
+                longer += sum(len(one.data) > plan.message.length for one in carried)
+                group = with_joined(group, carried, table, words)
+            if not len(group.rows):
+                continue
+            if carried or too_short:
+                times = table.time_ns[group.rows]
+                stamps[slot] = int(times.min()), int(times.max())
+            log.messages[plan.name] = MessageCount(len(group.rows), *stamps[slot], short, longer, len(carried))
+            for head, one in self._by_source(plan, group, table, assigned):
+                log.rows[head.name] = one.rows
+                heads.append(head)
+                parts.append((plan, one))
+        log.several_channels = self._assigner.several_channels
+        if fast:
+            found = extract_all(parts, assigned.first)
         else:
-            word = word >> np.uint64(begin) | ninth << np.uint64(64 - begin)
-    else:
-        word = word >> np.uint64(-over if signal.big_endian else begin)
-    if signal.is_float:
-        kinds = {16: (np.uint16, np.float16), 32: (np.uint32, np.float32), 64: (np.uint64, np.float64)}
-        as_int, as_float = kinds[length]
-        return word.astype(as_int).view(as_float).astype(np.float64)
-    spare = np.uint64(64 - length)
-    word = word << spare
-    if signal.signed:
-        return word.view(np.int64) >> np.int64(64 - length)
-    word = word >> spare
-    return word if length == 64 else word.view(np.int64)
+            found = [[work_out(piece) for piece in pieces_of(plan, group)] for plan, group in parts]
+        for head, signals in zip(heads, found, strict=True):
+            head.add(log, signals)
+
+    def _by_source(
+        self, plan: MessagePlan, group: Group, table: FrameTable, assigned: Assigned
+    ) -> Iterator[tuple["_Head", Group]]:
+        """Frames of a message by the name of their columns."""
+        if not getattr(plan.message, "pgn_match", False):
+            yield self._head(plan, plan.name, None), group
+            return
+        sources = (table.can_id[group.rows] & 0xFF).astype(np.uint8)
+        if sources.min() == sources.max():
+            source = int(sources[0])
+            yield self._head(plan, self._sources.name(plan.name, source), source), group
+            return
+        order, parts = self._sources.split(plan.name, sources)
+        sorted_group = group.take(order)
+        if group.begin is not None:  # sorted in place, so that each source is a piece of the assigned words, too
+            assigned.first[group.begin : group.begin + len(order)] = sorted_group.plane(0)
+        for part in parts:
+            begin = None if group.begin is None else group.begin + part.begin
+            yield self._head(plan, part.name, part.source), sorted_group.cut(part.begin, part.end, begin)
+
+    def _head(self, plan: MessagePlan, name: str, source: int | None) -> "_Head":
+        if name not in self._heads:
+            self._heads[name] = _Head(plan, name, source, self._lookup.wanted)
+        return self._heads[name]
+
+    def _note(self, log: DecodedLog) -> None:
+        for name, count in log.messages.items():
+            for few, what in ((count.short, "shorter"), (count.longer, "longer")):
+                if few:
+                    self._odd.setdefault(f"{name}: frames {what} than the database says", None)
+        log.notes = (*self._lookup.notes, *self._sources.notes.values(), *self._odd)
 
 
-def _physical(raw: Values, signal: Signal) -> Values:
-    """Values in the DBC's unit: whole numbers stay integers where 64 bits hold them, all others are float64."""
-    if not signal.is_integer:
-        return np.asarray(raw * float(signal.factor) + float(signal.offset), np.float64)
-    factor, offset = int(signal.factor), int(signal.offset)
-    if factor == 1 and offset == 0:
-        return raw
-    bits = signal.length - signal.signed
-    ends = [factor * (-(2**bits) if signal.signed else 0) + offset, factor * (2**bits - 1) + offset]
-    if raw.dtype == np.int64 and min(*ends, offset, factor) >= -(2**63) and max(*ends, offset, factor) < 2**63:
-        return np.asarray(raw * np.int64(factor) + np.int64(offset), np.int64)
-    return np.asarray(raw * float(factor) + float(offset), np.float64)
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Spare the garbage collector a look at each of up to a hundred thousand new columns; none is in a cycle."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+class _Head:
+    """Columns of one message (from one source), table after table."""
+
+    def __init__(self, plan: MessagePlan, name: str, source: int | None, wanted: Wanted) -> None:
+        self.name = name
+        self._source = source
+        self._signals = [one.signal for one in plan.signals]
+        self._columns = [f"{name}.{one.name}" if wanted.takes_from(name, one.name) else None for one in self._signals]
+        self._counts = np.zeros((len(self._signals), 3), np.int64)
+
+    def add(self, log: DecodedLog, signals: list[Found]) -> None:
+        """Put the columns of a table into its result."""
+        if not signals:
+            return
+        for place, rows, values, n, sna, outside in signals:
+            name = self._columns[place]
+            if name is not None:
+                log.columns[name] = Column(self._signals[place], rows, values, self._source)
+                log.signals[name] = SignalCount(n, sna, outside)
+        self._counts[[one.place for one in signals]] += [one[3:] for one in signals]
+
+    def totals(self) -> dict[str, SignalCount]:
+        """Counts of all tables so far."""
+        named = zip(self._columns, self._counts.tolist(), strict=True)
+        return {name: SignalCount(*counts) for name, counts in named if name is not None}

@@ -12,10 +12,11 @@ from hil.log.account import Account
 from hil.log.frames import FrameTable, LogError, LogFacts
 from hil.log.source import ReadOptions, Source
 
-
 Reader = Callable[[Source, Account, ReadOptions], Iterator[FrameTable]]
-"""Yields the frames of a log in tables of bounded size that share one channel numbering; start time, rejected pieces and
-the like go to the account. Raises LogError for what is no such log."""
+"""Yields the frames of a log in tables of bounded size that share one channel numbering.
+
+Start time, rejected pieces and the like go to the account. Raises LogError for what is no such log.
+"""
 Writer = Callable[[IO[bytes], Iterable[FrameTable], LogFacts, tzinfo], None]
 """Writes frames to a file open for reading and writing; the facts are those of all tables together."""
 
@@ -106,7 +107,7 @@ FORMATS = (
     Format("busmaster", (), _first_line(rb"\*{3}\s*BUSMASTER"), writable=False),
     Format("pcap", (".pcap",), _begins(*_PCAP), writable=False),
     Format("pcapng", (".pcapng",), _begins(b"\x0a\x0d\x0d\x0a"), "pcap", channel_names=True, start_time=False),
-    Format("parquet", (".parquet",), _begins(b"PAR1"), channel_names=True, start_time=False),
+    Format("parquet", (".parquet",), _begins(b"PAR1"), channel_names=True),
 )
 BY_NAME = {form.name: form for form in FORMATS}
 WRITABLE = {suffix: form for form in FORMATS if form.writable for suffix in form.suffixes}
@@ -123,12 +124,19 @@ def format_of(source: Source) -> Format:
     """
     head = source.head()
     if not head:
-        raise LogError(source.path, "empty: no log in it; give a log file")
-    scores = [form.told_by(head) for form in FORMATS]
-    if not max(scores):
+        problem = "gzip file that cannot be unpacked" if source.packed else "empty: no log in it"
+        raise LogError(source.path, f"{problem}; give a log file")
+    form = told(head)
+    if form is None:
         names = ", ".join(f.name for f in FORMATS)
         raise LogError(source.path, f"no log of a known format, its first bytes are {head[:24]!r}; known are {names}")
-    return FORMATS[scores.index(max(scores))]
+    return form
+
+
+def told(head: bytes) -> Format | None:
+    """Format of a log that begins so; None where it is none of the known ones."""
+    scores = [form.told_by(head) for form in FORMATS]
+    return FORMATS[scores.index(max(scores))] if max(scores) else None
 
 
 def writable(path: Path) -> Format:

@@ -28,6 +28,9 @@ class FrameFlag(IntFlag):
     SENT = 32  # by the recorder itself (Tx)
 
 
+NO_FLAG = FrameFlag(0)
+
+
 class LogError(BrakebenchError):
     """A log that cannot be read or written: which file, where in it (byte offset, where known), and why."""
 
@@ -202,7 +205,7 @@ class LogFacts:
     first_ns: int = 0
     least_ns: int = 0
     last_ns: int = 0
-    flags: FrameFlag = FrameFlag(0)
+    flags: FrameFlag = NO_FLAG
     errors: int = 0
     finer_than_us: bool = False
     longest: int = 0

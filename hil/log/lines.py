@@ -11,8 +11,9 @@ from hil.log.builder import FrameBuilder
 from hil.log.frames import FrameTable
 from hil.log.source import Source
 
-BLOCK_BYTES = 2 * 1024 * 1024
+BLOCK_BYTES = 256 * 1024  # stays in the cache
 MAX_LINE_BYTES = 4096
+MAX_WAIT = 100  # lines that the careful parser takes at once where the compiled pass takes none
 FEW_BYTES = 200_000  # a log below this is read without the compiled pass, which costs half a second to load
 
 
@@ -43,6 +44,7 @@ def read_lines(source: Source, account: Account, parser: LineParser, fast: bool 
     fast : False never uses the compiled pass, True always; None uses it for all but small logs.
     """
     builder = FrameBuilder(account)
+    left = wait = 0  # calls of the compiled pass that took nothing, one after the other; lines to go before the next
     for offset, block in _blocks(source, account):
         end = block.rfind(b"\n") + 1
         compiled = len(block) > FEW_BYTES or offset > 0 if fast is None else fast
@@ -51,11 +53,18 @@ def read_lines(source: Source, account: Account, parser: LineParser, fast: bool 
         while at < len(block):
             if builder.full:
                 yield builder.take()
-            if compiled and at < end:
-                at = parser.take(buffer, at, builder)
+            if compiled and at < end and not wait:
+                begin, at = at, parser.take(buffer, at, builder)
+                left = left + 1 if at == begin else 0
+                wait = min(left // 4, MAX_WAIT)
                 if at >= len(block) or builder.full:
                     continue
+            wait = max(wait - 1, 0)
             stop = block.find(b"\n", at)
+            if stop - at > MAX_LINE_BYTES:
+                account.reject(offset + at, block[at : at + MAX_LINE_BYTES])
+                at = stop + 1
+                continue
             whole = parser.line(block[at:] if stop < 0 else block[at:stop], offset + at, builder)
             if stop < 0:
                 if not whole:

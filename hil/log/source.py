@@ -1,11 +1,9 @@
 """Where the bytes of a log come from: a file, a gzip file, standard input."""
 
-import gzip
 import shutil
 import sys
 import tempfile
 import zlib
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, tzinfo
 from pathlib import Path
@@ -16,7 +14,17 @@ from hil.log.frames import LogError
 
 HEAD_BYTES = 65_536  # enough to tell the format
 STDIN = "-"
+PACKED_BYTES = 16_384
+GZIP_BITS = 31  # zlib's name for a gzip frame around the stream
 _GZIP = b"\x1f\x8b"
+
+_ZLIB: Any
+try:
+    from isal import isal_zlib
+
+    _ZLIB = isal_zlib  # three times as fast
+except ImportError:
+    _ZLIB = zlib
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +70,6 @@ class Source:
             self.packed = self._raw.read(2) == _GZIP
         except OSError as error:
             raise LogError(path, f"cannot be opened: {error.strerror or error}; give a log file") from error
-        self._stream: IO[bytes] = self._raw
         self._position = 0
         self.rewind(self.account)
 
@@ -74,36 +81,33 @@ class Source:
 
     def close(self) -> None:
         """Close the file."""
-        for file in (self._stream, self._raw, self._kept):
-            if file is not None:
-                file.close()
+        self._raw.close()
+        if self._kept is not None:
+            self._kept.close()
 
     def rewind(self, account: Account) -> None:
         """Begin anew; a log that ends inside its gzip stream is noted in ``account`` as cut off."""
         self.account = account
         self._position = 0
         self._raw.seek(0)
-        self._stream = _unpacked(self._raw) if self.packed else self._raw
+        self._stream = GzipStream(self._raw) if self.packed else self._raw
 
     def read(self, size: int) -> bytes:
         """At most ``size`` bytes; fewer at the end of what can be read, none behind it."""
-        if self.limit_bytes is not None:
-            left = self.limit_bytes - self._position
-            if size > left:
-                self.account.note(f"only the first {self.limit_bytes} bytes are read")
-                self.account.cut_at(self.limit_bytes)
-                size = left
+        limited = self.limit_bytes is not None and self._position + size > self.limit_bytes
+        if self.limit_bytes is not None and limited:
+            size = self.limit_bytes - self._position
         try:
             content = self._stream.read(size)
-        except EOFError:
-            content = b""
-            self.account.cut_at(self._position)
-        except (OSError, zlib.error) as error:
-            if not self.packed:
-                raise LogError(self.path, f"cannot be read: {error}", self._position) from error
+            if limited and size == 0 and self._stream.read(1):
+                self.account.note(f"only the first {self.limit_bytes} bytes are read")
+                self.account.cut_at(self._position)
+        except DamagedError as error:
             content = b""
             self.account.note(f"damaged gzip file: {error}")
             self.account.cut_at(self._position)
+        except OSError as error:
+            raise LogError(self.path, f"cannot be read: {error}", self._position) from error
         self._position += len(content)
         return content
 
@@ -128,6 +132,7 @@ class Source:
             self._raw.seek(0)
             return self._raw
         if self._kept is None:
+            self.rewind(self.account)
             self._kept = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the source)
             while part := self.read(1 << 20):
                 self._kept.write(part)
@@ -135,16 +140,96 @@ class Source:
         return self._kept
 
 
+class DamagedError(Exception):
+    """A gzip stream that cannot be unpacked any further."""
+
+
+class GzipStream:
+    """Content of a gzip file of one or more members; what is sound before a damage is given out first."""
+
+    def __init__(self, raw: IO[bytes]) -> None:
+        self._raw = raw
+        self._inflater: Any = None
+        self._packed = b""
+        self._begin: int | None = None  # of the member, in the file
+        self._given = 0  # bytes of the member
+        self._damage: DamagedError | None = None
+        self._saved = b""  # what is sound before it
+
+    def read(self, size: int) -> bytes:
+        """At most ``size`` bytes, none at the end; raises DamagedError where the rest cannot be unpacked."""
+        content = bytearray()
+        while len(content) < size:
+            if self._saved or self._damage:
+                part, self._saved = self._saved[: size - len(content)], self._saved[size - len(content) :]
+                content += part
+                if content:
+                    break
+                raise self._damage or DamagedError
+            if not self._packed:
+                self._packed = self._raw.read(PACKED_BYTES)
+            if not self._packed and self._inflater is None:
+                break
+            try:
+                content += self._inflated(size - len(content))
+            except DamagedError as error:
+                self._damage = error
+        return bytes(content)
+
+    def _inflated(self, size: int) -> bytes:
+        if self._inflater is None:
+            if self._begin is not None and not self._packed.startswith(b"\x1f"):  # padding behind the last member
+                self._packed = b""
+                return b""
+            self._inflater = _ZLIB.decompressobj(GZIP_BITS)
+            self._begin, self._given = self._raw.tell() - len(self._packed), 0
+        ended = not self._packed  # but content may still wait inside
+        try:
+            part: bytes = self._inflater.decompress(self._packed, size)
+        except _ZLIB.error as error:
+            self._saved = self._sound()
+            raise DamagedError(str(error)) from error
+        self._given += len(part)
+        self._packed = self._inflater.unconsumed_tail
+        if self._inflater.eof:
+            self._packed, self._inflater = self._inflater.unused_data, None
+        elif ended and not part:
+            raise DamagedError("it ends early")
+        return part
+
+    def _sound(self) -> bytes:
+        """What the member holds up to its damage and was not given out: it is unpacked once more, byte by byte at last.
+
+        An inflater that meets a damage keeps what it had unpacked from the same piece to itself.
+        """
+        self._raw.seek(self._begin or 0)
+        inflater, skipped, saved = zlib.decompressobj(GZIP_BITS), self._given, bytearray()
+        while packed := self._raw.read(PACKED_BYTES):
+            before = inflater.copy()
+            try:
+                part = inflater.decompress(packed)
+            except zlib.error:
+                part = _by_bytes(before, packed)
+                packed = b""
+            saved += part[skipped:]
+            skipped -= min(skipped, len(part))
+            if not packed or inflater.eof:
+                break
+        self._raw.seek(0, 2)
+        return bytes(saved)
+
+
+def _by_bytes(inflater: Any, packed: bytes) -> bytes:
+    content = bytearray()
+    try:
+        for k in range(len(packed)):
+            content += inflater.decompress(packed[k : k + 1])
+    except zlib.error:
+        pass
+    return bytes(content)
+
+
 def _spooled(stream: IO[bytes]) -> IO[bytes]:
     file = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the source)
     shutil.copyfileobj(stream, file, 1 << 20)
     return file
-
-
-def _unpacked(raw: IO[bytes]) -> IO[bytes]:
-    try:
-        from isal import igzip
-    except ImportError:
-        return gzip.GzipFile(fileobj=raw, mode="rb")  # type: ignore[return-value]
-    opener: Callable[..., Any] = igzip.IGzipFile  # three times as fast
-    return opener(fileobj=raw, mode="rb")  # type: ignore[no-any-return]

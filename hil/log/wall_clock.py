@@ -7,6 +7,7 @@ reads (UTC when nobody chose), and never taken from the computer that reads.
 from datetime import UTC, datetime, timedelta, tzinfo
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+MAX_START_NS = 2**62  # of a start time, years 1824 to 2116: stamps that count from it fit into 64 bits
 
 
 def wall_clock_ns(wall_clock: datetime, zone: tzinfo, below_us_ns: int = 0) -> int:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hil.log.candump import candump_names
 from hil.log.formats import Format, writable
 from hil.log.frames import FrameFlag, FrameTable, LogError, LogFacts
 
@@ -15,8 +16,8 @@ MAX_CHANNEL = 255  # of formats that number their channels
 
 def channel_numbers(channels: tuple[str, ...]) -> list[int]:
     """Numbers (from 0) for formats without channel names: can3 -> 3; where names do not tell, in order."""
-    ends = [re.search(r"\d{1,2}$", name) for name in channels]
-    numbers = [int(end[0]) for end in ends if end]
+    ends = [re.search(r"\d{1,3}$", name) for name in channels]
+    numbers = [int(end[0]) for end in ends if end and int(end[0]) < MAX_CHANNEL]
     return numbers if len(set(numbers)) == len(channels) else list(range(len(channels)))
 
 
@@ -75,6 +76,11 @@ def losses(facts: LogFacts, form: Format) -> list[str]:
         ]
         if renamed:
             notes.append(f"{form.name} has no channel names: {', '.join(renamed)}")
+    if form.name == "candump":
+        pairs = zip(facts.channels, candump_names(facts.channels), strict=True)
+        replaced = [f"{old!r} is {new}" for old, new in pairs if old != new]
+        if replaced:
+            notes.append(f"candump has only visible ASCII letters in channel names: {', '.join(replaced)}")
     if facts.errors and not form.error_content:
         notes.append(f"{form.name} keeps neither class nor data of the {facts.errors} error frames")
     if facts.finer_than_us and form.resolution_ns >= 1000:
@@ -93,6 +99,8 @@ def kept(table: FrameTable, facts: LogFacts, form: Format) -> FrameTable:
     channels = table.channels
     if not form.channel_names:
         channels = tuple(f"can{number}" for number in channel_numbers(facts.channels))
+    elif form.name == "candump":
+        channels = candump_names(channels)
     half = form.resolution_ns // 2
     time_ns = (table.time_ns + half) // form.resolution_ns * form.resolution_ns
     error = (table.flags & FrameFlag.ERROR) != 0
@@ -101,6 +109,7 @@ def kept(table: FrameTable, facts: LogFacts, form: Format) -> FrameTable:
         can_id = np.where(error, 0, can_id).astype(np.uint32)
         length = np.where(error, 0, length).astype(np.uint8)
         data = np.where(error[:, None], 0, data).astype(np.uint8)
+        flags = np.where(error, flags & np.uint8(FrameFlag.ERROR | FrameFlag.SENT), flags).astype(np.uint8)
     if not form.sent:
         flags = flags & np.uint8(~FrameFlag.SENT & 0xFF)
     return FrameTable(channels, time_ns, table.channel, can_id, table.extended, length, data, flags)

@@ -10,7 +10,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -179,6 +179,48 @@ class Child:
             self._process.kill()
             self._process.wait()
         self._ready.close()
+
+
+class Piped:
+    """A command whose standard output is read while it runs; it hears nothing and says nothing else.
+
+    It ends with us, and at the latest with `close`.
+
+    Parameters
+    ----------
+    command : program and arguments.
+    environment : variables beside our own.
+    handed : file descriptors that it may use.
+    """
+
+    def __init__(
+        self, command: Sequence[str], environment: Mapping[str, str] | None = None, handed: Sequence[int] = ()
+    ) -> None:
+        self._process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, **(environment or {})},
+            pass_fds=tuple(handed),
+            start_new_session=True,
+        )
+        self._output = self._process.stdout.fileno() if self._process.stdout else -1
+
+    def read(self, size: int, timeout_s: float) -> bytes | None:
+        """Up to ``size`` bytes, none at the end; None where nothing came in ``timeout_s``."""
+        readable, _, _ = select.select([self._output], [], [], max(timeout_s, 0))
+        return os.read(self._output, size) if readable else None
+
+    def close(self) -> int:
+        """Kill it where it still runs; the exit code, negative for the signal that ended it."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(0.05)
+        self._process.kill()  # nothing happens where it has ended
+        code = self._process.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+        return code
 
 
 def say_ready(ready_fd: int | None) -> None:

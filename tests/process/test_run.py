@@ -180,7 +180,7 @@ def test_nodes_started_separately_find_each_other(start, channel, tmp_path, shor
     log = tmp_path / "apart.log"
 
     def stopped():
-        if not log.exists():
+        if not log.exists() or not log.stat().st_size:
             return False
         speed = Signals(log).get("TRUTH_MOTION.SPEED")[1]
         return len(speed) and speed[-1] < 0.05

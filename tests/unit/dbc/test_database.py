@@ -51,8 +51,8 @@ def test_a_sound_signal_comes_with_everything():
         (['BO_ 1099511627776 M: 8 A', ' SG_ S : 0|8@1+ (1,0) [0|0] "" B'], ("message M", "identifier")),
         (['BO_ 2048 M: 8 A', ' SG_ S : 0|8@1+ (1,0) [0|0] "" B'], ("message M", "identifier 0x800")),
         (['BO_ 1 M: 1785 A', ' SG_ S : 0|8@1+ (1,0) [0|0] "" B'], ("message M", "1785 bytes")),
-        (['BO_ 1 M: 8 A', ' SG_ S : what@1+'], ("cannot be read",)),
-        (['BO_ 1 M: 8 A', ' SG_ S : 0|8@1+ (nan,0) [0|0] "" B'], ("message M", "left out")),
+        (['BO_ 1 M: 8 A', ' SG_ S : what@1+'], ("line 8", "SG_ S : what@1+", "expected SG_ NAME")),
+        (['BO_ 1 M: 8 A', ' SG_ S : 0|8@1+ (nan,0) [0|0] "" B'], ("line 8", "M.S", "factor nan", "left out")),
         (
             ['BO_ 1 M: 8 A', ' SG_ P m0M : 0|8@1+ (1,0) [0|0] "" B', ' SG_ S m0M : 8|8@1+ (1,0) [0|0] "" B',
              "SG_MUL_VAL_ 1 S P 0-0;", "SG_MUL_VAL_ 1 P S 0-0;"],
@@ -72,8 +72,8 @@ def test_an_unsound_signal_or_message_is_left_out_and_said(lines, words):
     [
         (['BO_ 1 M: 8 A', ' SG_ S : 0|8@1+ (1,0) [0|0] "" B', 'VAL_ 1 T 0 "x" ;'], ("VAL_", "no such signal")),
         (['BO_ 1 M: 8 A', "SIG_VALTYPE_ 7 S : 1;"], ("SIG_VALTYPE_", "no such signal")),
-        (['BA_ "NoSuchAttribute" 5;'], ("cannot be read",)),
-        (['CM_ "never closed'], ("cannot be read",)),
+        (['BA_ "Empty";'], ("line 7", "cannot be read")),
+        (['CM_ "never closed'], ("line 7", "never closed")),
         (
             ['BO_ 1 M: 8 A', ' SG_ P M : 0|8@1+ (1,0) [0|0] "" B', ' SG_ S m0 : 8|8@1+ (1,0) [0|0] "" B',
              "SG_MUL_VAL_ 1 S P 0-99999999999;"],
@@ -111,7 +111,7 @@ def test_branches_of_a_multiplexer_may_overlap():
     )  # fmt: skip
     assert database.warnings == ()
     by_name = {s.name: s for s in database.messages[1, False].signals}
-    assert (by_name["T"].multiplexer, by_name["T"].mux_ids) == ("P", {1})
+    assert (by_name["T"].multiplexer, by_name["T"].mux_ranges) == ("P", ((1, 1),))
     database = parse(
         'BO_ 1 M: 8 A', ' SG_ P M : 0|8@1+ (1,0) [0|0] "" B', ' SG_ S m0 : 8|8@1+ (1,0) [0|0] "" B',
         ' SG_ T m0 : 12|8@1+ (1,0) [0|0] "" B', ' SG_ U : 16|8@1+ (1,0) [0|0] "" B',

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from dbc.contract import contract
 from dbc.frame import BusName, Frame, LinkEvent, LinkState
 from hil.bench.playback import LISTEN_NS, STALL_NS, Replay, ReplayError, select
-from hil.log.frames import FrameBuilder, FrameFlag
+from hil.log.builder import FrameBuilder
+from hil.log.frames import FrameFlag
 from hil.rt.clock import VirtualClock
 from hil.rt.loop import GRID_NS
 

@@ -21,17 +21,18 @@ def log(tmp_path):
     return path
 
 
-def test_text_counts_both_sides(log, tmp_path, capsys):
-    assert run(log, tmp_path / "a.csv") == 0
-    out = capsys.readouterr().out
+def test_text_counts_both_sides_and_the_exit_code_tells_what_is_missing(log, tmp_path, capsys):
+    assert run(log, tmp_path / "b.log") == 1
+    out = " ".join(capsys.readouterr().out.split())
     assert "2 frames read, 2 written, equal" in out
-    assert "2 lines or objects" in out
+    assert "2 pieces of" in out
     assert "at byte 20: bad" in out
     assert "cut off at byte" in out
+    assert run(tmp_path / "b.log", tmp_path / "c.log") == 0
 
 
 def test_json_is_one_object_alone_on_stdout(log, tmp_path, capsys):
-    assert run(log, tmp_path / "a.blf", "--json") == 0
+    assert run(log, tmp_path / "a.blf", "--json") == 1
     captured = capsys.readouterr()
     result = json.loads(captured.out)
     assert (result["frames_read"], result["frames_written"], result["rejected"]) == (2, 2, 2)
@@ -40,11 +41,26 @@ def test_json_is_one_object_alone_on_stdout(log, tmp_path, capsys):
     assert "vehicle is channel 2" in captured.err
 
 
-def test_an_existing_file_needs_force(log, tmp_path):
-    (tmp_path / "a.asc").write_text("mine")
+def test_an_existing_file_needs_force_and_the_source_is_never_replaced(log, tmp_path):
+    target = tmp_path / "b.log"
+    target.write_text("mine")
     with pytest.raises(BrakebenchError, match="--force"):
-        run(log, tmp_path / "a.asc")
-    assert run(log, tmp_path / "a.asc", "--force") == 0
+        run(log, target)
+    assert target.read_text() == "mine"
+    assert run(log, target, "--force") == 1
+    before = log.read_bytes()
+    link = tmp_path / "link.log"
+    link.symlink_to(log)
+    for same in (log, link):
+        with pytest.raises(BrakebenchError, match="read by this command"):
+            run(log, same, "--force")
+    assert log.read_bytes() == before
+
+
+def test_a_zone_that_is_none_is_refused(log, tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        run(log, tmp_path / "b.log", "--timezone", "Mars/Olympus")
+    assert "is no time zone" in capsys.readouterr().err
 
 
 def test_an_unknown_suffix_is_refused(log, tmp_path):

@@ -78,18 +78,19 @@ def _by_a_whole_factor(signal):
     return not signal.is_float and float(signal.scale).is_integer()
 
 
-@example((
+@example(case=(
     dbc_of('BO_ 257 M1: 12 A\n SG_ S : 24|57@1+ (1000,-67.67) [0|0] "u" A'),
     [(257, bytes.fromhex("000000050000000000000100"))],
 ))  # fmt: skip
+@pytest.mark.parametrize("fast", [False, True])
 @settings(max_examples=120)
-@given(database_and_frames())
-def test_values_equal_cantools(case):
+@given(case=database_and_frames())
+def test_values_equal_cantools(case, fast):
     text, frames = case
     oracle = cantools.database.load_string(text, database_format="dbc", strict=False)
     database = parse_database(text)
     assert not database.warnings
-    log = decode_log(recording(frames), database)
+    log = decode_log(recording(frames), database, fast=fast)
     assert log.decoded == len(frames)
     cells = {}
     for name, column in log.columns.items():
@@ -144,7 +145,8 @@ def test_every_frame_is_accounted_for():
     frames = [
         (256, b"\1\0\0\0"),
         (256, b"\1\0\0\0\0\0"),  # longer than the DBC says: the message is there
-        (256, b"\1\0\0"),
+        (256, b"\2\0\0"),  # shorter: what it has is there
+        (256, b""),
         (257, b"\1"),
         (0x18000100, b"\1\0\0\0"),
         (256, b"", FrameFlag.REMOTE),
@@ -152,14 +154,15 @@ def test_every_frame_is_accounted_for():
     ]
     made = recording(frames)
     log = decode_log(Recording(made.path, made.format, made.frames, rejected=3), parse_database(text))
-    assert (log.frames, log.decoded, log.unknown, log.rejected) == (10, 2, 4, 4)
+    assert (log.frames, log.decoded, log.unknown, log.rejected) == (11, 3, 4, 4)
     assert log.reasons == {NOT_A_FRAME: 3, TOO_SHORT: 1}
     assert log.unknown_ids == {"can0 0x101": 1, "can0 0x18000100": 1, "remote frame": 1, "error frame": 1}
-    assert log.messages["M"].count == 2
+    assert (log.messages["M"].count, log.messages["M"].short, log.messages["M"].longer) == (3, 1, 1)
     assert log.messages["M"].rate_hz == pytest.approx(100.0)
+    assert log.notes == ("M: frames shorter than the database says", "M: frames longer than the database says")
     t, values = log.series("M.S")
-    assert t.tolist() == [0.0, 0.01]
-    assert values.tolist() == [1, 1]
+    assert t.tolist() == [0.0, 0.01, 0.02]
+    assert values.tolist() == [1, 1, 2]
 
 
 def test_signal_not_available_is_an_empty_cell():

@@ -7,10 +7,10 @@ import pytest
 
 from dbc.database import parse_database
 from hil.log import export as export_module
-from hil.log.candump import read_candump
 from hil.log.decode import decode_log
 from hil.log.export import export
 from hil.log.frames import LogError
+from hil.log.read import read_log
 
 DBC = """VERSION ""
 BU_: A
@@ -29,7 +29,7 @@ def decode(tmp_path):
     def decode(text=LOG):
         path = tmp_path / "a.log"
         path.write_text(text)
-        return decode_log(read_candump(path), parse_database(DBC))
+        return decode_log(read_log(path), parse_database(DBC))
 
     return decode
 
@@ -70,9 +70,9 @@ def test_channels_are_told_apart_where_a_message_came_on_two(tmp_path, decode):
 
 
 def test_a_log_without_frames_is_an_empty_table(tmp_path, decode):
-    export(decode(""), tmp_path / "a.parquet")
+    export(decode("(1.0) can0 1#"), tmp_path / "a.parquet")
     assert pyarrow.parquet.read_table(tmp_path / "a.parquet").shape == (0, 1)
-    export(decode(""), tmp_path / "a.csv")
+    export(decode("(1.0) can0 1#"), tmp_path / "a.csv")
     assert (tmp_path / "a.csv").read_text() == "time\n"
 
 

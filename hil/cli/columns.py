@@ -1,0 +1,63 @@
+"""Aligned columns of text that fit the width they are given."""
+
+import shutil
+from collections.abc import Sequence
+
+from hil.log.account import printable
+
+LEAST_WIDTH, MOST_WIDTH = 60, 160
+LEAST_NAME = 8
+
+
+def terminal_width() -> int:
+    """Letters of a line: those of the terminal (or of COLUMNS), 100 where there is none."""
+    return max(LEAST_WIDTH, min(MOST_WIDTH, shutil.get_terminal_size((100, 24)).columns))
+
+
+def cut(text: str, width: int) -> str:
+    """Text of at most ``width`` letters; ``~`` stands for what is left out."""
+    return text if len(text) <= width else text[: max(0, width - 1)] + "~"
+
+
+def columns(heads: Sequence[str], rows: Sequence[Sequence[str]], width: int, left: Sequence[int] = (0,)) -> list[str]:
+    """Lines of a table, two spaces between columns; what is too wide is taken from the widest left column.
+
+    Parameters
+    ----------
+    heads : a column without any entry is left out, and so is its head.
+    left : columns that are aligned on the left: names; the others are numbers.
+    """
+    used = [k for k in range(len(heads)) if any(row[k] for row in rows)]
+    shown = [[printable(row[k]) for k in used] for row in [heads, *rows]]
+    widths = [max(len(row[k]) for row in shown) for k in range(len(used))]
+    names = [k for k, column in enumerate(used) if column in left]
+    over = sum(widths) + 2 * (len(widths) - 1) - width
+    while over > 0 and names:
+        k = max(names, key=lambda name: widths[name])
+        others = max((widths[name] for name in names if name != k), default=LEAST_NAME)
+        take = min(over, max(1, widths[k] - max(others, LEAST_NAME)))
+        if widths[k] - take < LEAST_NAME:
+            break
+        widths[k] -= take
+        over -= take
+    lines = []
+    for row in shown:
+        cells = [
+            cut(cell, widths[k]).ljust(widths[k]) if k in names else cell.rjust(widths[k]) for k, cell in enumerate(row)
+        ]
+        lines.append("  ".join(cells).rstrip())
+    return lines
+
+
+def wrapped(text: str, width: int, indent: str = "  ") -> list[str]:
+    """Lines of a note, safe on a terminal, broken between words, further lines indented."""
+    text = printable(text)
+    line = text[: len(text) - len(text.lstrip())]
+    lines: list[str] = []
+    for word in text.split():
+        if line.strip() and len(line) + 1 + len(word) > width:
+            lines.append(line)
+            line = indent + word
+        else:
+            line = f"{line} {word}" if line.strip() else line + word
+    return [*lines, line]

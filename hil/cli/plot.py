@@ -1,0 +1,216 @@
+"""``brakebench plot``: signals of a log over time, as a picture or a page."""
+
+import argparse
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from datetime import tzinfo
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from dbc.database import Signal
+from hil.cli.log_options import LOGS, add_databases, add_force, add_timezone, databases, paths, words_of
+from hil.cli.progress import Progress
+from hil.errors import BrakebenchError
+from hil.log.atomic_write import atomic_write
+from hil.log.choice import Choice, Moment, matches
+from hil.log.decode import Decoder
+from hil.log.decoded import Column, Values
+from hil.log.frames import FrameTable
+from hil.log.several import UNDATED_NS, Logs
+from hil.log.source import ReadOptions
+from hil.log.wall_clock import wall_clock_of
+from hil.report.courses import Course, Courses, write_courses
+from hil.report.thin import thinned
+
+SUFFIXES = (".html", ".png", ".svg", ".pdf")
+MOST_SAMPLES, KEPT_SAMPLES = 1_000_000, 250_000  # of one signal in memory; beyond, peaks are kept
+MOST_SIGNALS, MOST_TOGETHER, MOST_NAMES = 60, 8, 24
+SILENCE = 10.0  # cycles without a frame leave a gap in the line
+
+
+def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "plot",
+        help="signals of a log over time, as a picture or a page",
+        description="Draw signals of a CAN log over one time axis; long logs are thinned, peaks stay.",
+        epilog="Signals of one unit share a plot; signals whose values have names are drawn as steps with the names "
+        "at the axis. Exit codes: 0 drawn, 1 drawn, but something of the log was cut off or rejected, 2 unusable.",
+    )
+    parser.add_argument("log", metavar="LOG", help=f"{LOGS}; a quoted pattern is one log")
+    parser.add_argument("signal", metavar="SIGNAL", nargs="+", help="MESSAGE.SIGNAL or SIGNAL, with * and ?")
+    parser.add_argument("--out", metavar="FILE", type=Path, required=True, help=f"file: {', '.join(SUFFIXES)}")
+    add_databases(parser)
+    add_force(parser)
+    parser.add_argument("--channel", metavar="NAME", action="append", default=[], help="only this channel (repeatable)")
+    parser.add_argument("--from", dest="begin", metavar="TIME", help="seconds from the first frame, or a date and time")
+    parser.add_argument("--to", dest="end", metavar="TIME", help="likewise; both ends are included")
+    add_timezone(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Read the signals and draw them."""
+    if args.out.suffix not in SUFFIXES:
+        raise BrakebenchError(f"{args.out}: plots are written as {', '.join(SUFFIXES)}")
+    databases_, files = databases(args.dbc)
+    begin, end = (None if text is None else Moment.parse(text, args.timezone) for text in (args.begin, args.end))
+    choice = Choice(tuple(args.channel), begin, end, signals=words_of(args.signal))
+    decoder = databases_.decoder(choice.wanted(databases_))
+    with Logs(paths([args.log]), ReadOptions(timezone=args.timezone)) as logs, Progress() as progress:
+        gathered = gather(logs, decoder, choice, progress)
+        whole = logs.whole
+        read = [*files, *(part.path for part in logs.parts)]
+    if not gathered.signals:
+        raise BrakebenchError(f"{args.log}: no frame of {', '.join(args.signal)} in it")
+    plots = panels(gathered, order_of(choice, list(gathered.signals)))
+    samples = sum(signal.count for signal in gathered.signals.values())
+    subtitle = _subtitle(gathered, samples, args.timezone)
+    with atomic_write(args.out, args.force, read) as temporary:
+        write_courses(plots, Path(args.log).name, subtitle, temporary)
+    print(f"{args.out}: {len(gathered.signals)} signals, {samples:,} values")
+    if not whole:
+        print("something of the log was cut off or rejected; brakebench decode tells what")
+    return 0 if whole else 1
+
+
+@dataclass(slots=True)
+class Gathered:
+    """One signal being gathered; ``parts`` are stamps and values, thinned when there are many."""
+
+    signal: Signal
+    dtype: np.dtype[np.generic]
+    count: int = 0
+    held: int = 0
+    parts: list[tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]] = field(default_factory=list)
+
+    def add(self, time_ns: npt.NDArray[np.int64], values: Values) -> None:
+        """Add further values."""
+        self.count += len(values)
+        self.held += len(values)
+        self.parts.append((time_ns, values.astype(np.float64)))
+        if self.held > MOST_SAMPLES:
+            times, y = self.joined()
+            kept = thinned(y, KEPT_SAMPLES)
+            self.parts = [(times[kept], y[kept])]
+            self.held = len(kept)
+
+    def joined(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
+        """Stamps, ascending, and values."""
+        times = np.concatenate([part[0] for part in self.parts])
+        values = np.concatenate([part[1] for part in self.parts])
+        order = np.argsort(times, kind="stable")
+        return times[order], values[order]
+
+
+@dataclass(slots=True)
+class Signals:
+    """Signals by ``MESSAGE.SIGNAL``, and the stamp of the log's first frame."""
+
+    signals: dict[str, Gathered] = field(default_factory=dict)
+    first_ns: int = 0
+
+
+def gather(logs: Logs, decoder: Decoder, choice: Choice, progress: Progress) -> Signals:
+    """Read the chosen signals of a log."""
+    found = Signals()
+
+    def noted(tables: Iterable[FrameTable]) -> Iterable[FrameTable]:
+        first = True
+        for table in tables:
+            if first and len(table):
+                found.first_ns, first = int(table.time_ns[0]), False
+            yield table
+
+    for table in choice.frames(noted(logs.tables(progress))):
+        for name, column in decoder.add(table).columns.items():
+            if not len(column.rows):
+                continue
+            if name not in found.signals:
+                if len(found.signals) >= MOST_SIGNALS:
+                    raise BrakebenchError(f"more than {MOST_SIGNALS} signals; name fewer to see something")
+                found.signals[name] = Gathered(column.signal, column.values.dtype)
+            found.signals[name].add(table.time_ns[column.rows], column.values)
+    return found
+
+
+def order_of(choice: Choice, names: list[str]) -> list[str]:
+    """Names in the order in which they were asked for."""
+    ordered: dict[str, None] = {}
+    for pattern in choice.signals:
+        ordered |= dict.fromkeys(name for name in names if matches(*_parts(name), pattern))
+    return list(ordered | dict.fromkeys(names))
+
+
+def _parts(name: str) -> tuple[str, str]:
+    message, _, signal = name.rpartition(".")
+    return message, signal
+
+
+def panels(gathered: Signals, names: list[str]) -> list[Courses]:
+    """Signals of one unit together, signals with named values alone."""
+    plots: list[Courses] = []
+    open_plots: dict[str, int] = {}
+    for name in names:
+        one = gathered.signals[name]
+        times, y = one.joined()
+        t_s = (times - gathered.first_ns) / 1e9
+        texts = _names(one, y)
+        if texts is not None:
+            values = np.array(list(texts))
+            course = Course(name, t_s, np.searchsorted(values, y).astype(np.float64), steps=True)
+            plots.append(Courses((course,), "", tuple(texts.values())))
+            continue
+        course = _with_gaps(Course(name, t_s, y))
+        unit = one.signal.unit
+        place = open_plots.get(unit) if unit else None
+        if place is not None and len(plots[place].courses) < MOST_TOGETHER:
+            plots[place] = Courses((*plots[place].courses, course), unit)
+            continue
+        open_plots[unit] = len(plots)
+        plots.append(Courses((course,), unit))
+    return plots
+
+
+def _names(one: Gathered, y: npt.NDArray[np.float64]) -> dict[float, str] | None:
+    """Texts of the values that occur (ascending), where most of them have a name, or are bits; None for a quantity."""
+    values = np.unique(y[np.isfinite(y)])
+    if one.signal.length == 1 and not one.signal.is_float:
+        both = [raw * float(one.signal.factor) + float(one.signal.offset) for raw in (0, 1)]
+        values = np.unique([*values, *both])
+    elif len(values) > MOST_NAMES or 2 * len(_named(one, values)) < max(1, len(values)):
+        return None
+    named = _named(one, values)
+    return {value: f"{named[value]}  {value:g}" if value in named else f"{value:g}" for value in values.tolist()}
+
+
+def _named(one: Gathered, values: npt.NDArray[np.float64]) -> dict[float, str]:
+    """Names of those values that have one."""
+    if not one.signal.choices:
+        return {}
+    given: Any = values.astype(one.dtype)
+    texts = Column(one.signal, np.arange(len(values)), given).names()
+    return {value: text for value, text in zip(values.tolist(), texts.tolist(), strict=True) if text is not None}
+
+
+def _with_gaps(course: Course) -> Course:
+    """Leave the line out where a signal that comes cyclically is silent."""
+    steps = np.diff(course.t_s)
+    if len(steps) < 3:
+        return course
+    median = float(np.median(steps))
+    cyclic = np.mean(np.abs(steps - median) <= 0.75 * median) >= 0.7
+    silent = np.flatnonzero(steps > SILENCE * max(median, 0.01)) if cyclic else np.zeros(0, np.int64)
+    t_s = np.insert(course.t_s, silent + 1, course.t_s[silent])
+    return Course(course.name, t_s, np.insert(course.y, silent + 1, np.nan), course.steps)
+
+
+def _subtitle(gathered: Signals, samples: int, zone: tzinfo) -> str:
+    when = ""
+    if gathered.first_ns >= UNDATED_NS:
+        stamp = wall_clock_of(gathered.first_ns, zone).isoformat(" ", "milliseconds")
+        when = f" · 0 s is {stamp} {zone}"
+    return f"{len(gathered.signals)} signals, {samples:,} values{when}"

@@ -1,0 +1,68 @@
+"""Progress with the remaining time, on a terminal, where something takes long."""
+
+import sys
+from typing import IO, Self
+
+from hil.rt.clock import monotonic_ns
+
+QUIET_S = 2.0  # nothing is shown before
+EVERY_S = 0.2
+
+
+def duration_text(seconds: float) -> str:
+    """Time to go: ``45 s``, ``3 min 05 s``, ``2 h 10 min``."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+
+
+class Progress:
+    """Shows on standard error which share is done; says nothing where that is no terminal.
+
+    Parameters
+    ----------
+    parts : how often the whole is gone through (`part`).
+    """
+
+    def __init__(self, parts: int = 1, stream: IO[str] | None = None) -> None:
+        self._stream = sys.stderr if stream is None else stream
+        self._live = self._stream.isatty()
+        self._parts = parts
+        self._part = 0
+        self._what = "reading"
+        self._began_s = monotonic_ns() / 1e9
+        self._shown_s = 0.0
+        self._width = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._width:
+            self._stream.write("\r" + " " * self._width + "\r")
+            self._stream.flush()
+            self._width = 0
+
+    def part(self, number: int, what: str) -> Self:
+        """Go on to a part, counted from 0; ``what`` is being done in it."""
+        self._part, self._what = number, what
+        return self
+
+    def __call__(self, done: float) -> None:
+        """Tell the share of this part that is done, 0 to 1."""
+        if not self._live:
+            return
+        now = monotonic_ns() / 1e9
+        passed = now - self._began_s
+        if passed < QUIET_S or now - self._shown_s < EVERY_S:
+            return
+        self._shown_s = now
+        share = min(1.0, (self._part + done) / self._parts)
+        left = f", {duration_text(passed / share * (1 - share))} left" if share > 0.005 else ""
+        line = f"{self._what}  {100 * share:3.0f} %{left}"
+        self._stream.write("\r" + line.ljust(self._width))
+        self._stream.flush()
+        self._width = max(self._width, len(line))

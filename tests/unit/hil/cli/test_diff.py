@@ -1,0 +1,130 @@
+import argparse
+import json
+
+import numpy as np
+import pytest
+
+from hil.cli import diff
+from hil.errors import BrakebenchError
+from hil.log.diff import pairs
+
+DBC = """VERSION ""
+BU_: A
+BO_ 1 M: 8 A
+ SG_ S : 0|16@1+ (0.5,0) [0|0] "km/h" A
+ SG_ T : 16|8@1+ (1,0) [0|0] "" A
+ SG_ B : 24|1@1+ (1,0) [0|0] "" A
+ SG_ F : 32|32@1- (1,0) [0|0] "" A
+BO_ 2 N: 1 A
+ SG_ U : 0|8@1+ (1,0) [0|0] "" A
+VAL_ 1 T 0 "off" 1 "on" 255 "SNA" ;
+SIG_VALTYPE_ 1 F : 1;
+"""
+
+
+def run(*words):
+    parser = argparse.ArgumentParser()
+    diff.add_parser(parser.add_subparsers())
+    args = parser.parse_args(["diff", *map(str, words)])
+    return args.run(args)
+
+
+def lines(values, start=1000.0):
+    for k, (s, t, b, f) in enumerate(values):
+        payload = int(s).to_bytes(2, "little") + bytes([t, b]) + np.float32(f).tobytes()
+        yield f"({start + k / 100:.6f}) can0 001#{payload.hex().upper()}\n"
+
+
+@pytest.fixture
+def compare(tmp_path, capsys):
+    dbc = tmp_path / "a.dbc"
+    dbc.write_text(DBC)
+
+    def compare(one, two, *words, code):
+        for name, text in (("a.log", one), ("b.log", two)):
+            (tmp_path / name).write_text("".join(text))
+        assert run(tmp_path / "a.log", tmp_path / "b.log", "--dbc", dbc, "--json", *words) == code
+        found = json.loads(capsys.readouterr().out)
+        assert run(tmp_path / "a.log", tmp_path / "b.log", "--dbc", dbc, *words) == code
+        return found, capsys.readouterr().out
+
+    return compare
+
+
+SAME = [(100 + k, 1, 0, 1.5) for k in range(50)]
+
+
+def test_a_log_equals_itself(compare):
+    found, out = compare(lines(SAME), lines(SAME), code=0)
+    assert found["equal"]
+    assert found["signals"]["M.S"]["compared"] == 50
+    assert " ".join(out.split()).endswith("4 signals of 1 messages compared, 0 differ")
+
+
+def test_one_raw_step_is_tolerated_but_no_bit_name_or_float(compare):
+    near = [(s + 1, t, b, f * (1 + 1e-7)) for s, t, b, f in SAME]
+    assert compare(lines(SAME), lines(near), code=0)[0]["equal"]
+    for k, changed in enumerate(([102, 1, 0, 1.5], [100, 0, 0, 1.5], [100, 1, 1, 1.5], [100, 1, 0, 1.51])):
+        found, _ = compare(lines(SAME), lines([tuple(changed), *SAME[1:]]), code=1)
+        different = [name for name, one in found["signals"].items() if one["differing"]]
+        assert different == [("M.S", "M.T", "M.B", "M.F")[k]]
+
+
+def test_from_when_and_by_how_much(compare):
+    other = [(s + (10 if k >= 20 else 0) + (6 if k == 30 else 0), t, b, f) for k, (s, t, b, f) in enumerate(SAME)]
+    found, out = compare(lines(SAME), lines(other), code=1)
+    one = found["signals"]["M.S"]
+    assert (one["differing"], one["first_s"], one["greatest"], one["greatest_s"]) == (30, 0.2, 8.0, 0.3)
+    assert one["rms"] == pytest.approx(np.sqrt((29 * 25 + 64) / 50))
+    assert "M.S" in out
+    assert "0.200" in out
+    compare(lines(SAME), lines(other), "--tolerance", "M.*=5", code=1)
+    compare(lines(SAME), lines(other), "--tolerance", "M.*=5", "--tolerance", "S=8", code=0)
+
+
+def test_a_value_that_one_log_lacks_is_a_difference(compare):
+    found, _ = compare(lines(SAME), lines([*SAME[:10], (110, 255, 0, 1.5), *SAME[11:]]), code=1)
+    assert found["signals"]["M.T"]["only_first"] == 1
+    assert found["signals"]["M.T"]["first_s"] == 0.1
+
+
+def test_lost_frames_do_not_shift_the_others(compare):
+    kept = list(lines(SAME))
+    del kept[20:23]
+    found, out = compare(lines(SAME), kept, code=1)
+    assert found["messages"]["M"] == {
+        "first": 50, "second": 47, "unpaired_first": 3, "unpaired_second": 0, "unpaired_s": 0.2
+    }  # fmt: skip
+    assert all(one["differing"] == 0 for one in found["signals"].values())
+    assert "50 and 47 frames" in out
+
+
+def test_logs_of_another_time_are_compared_from_their_first_frames(compare):
+    found, _ = compare(lines(SAME), lines(SAME, start=5000.0), code=0)
+    assert not found["same_clock"]
+
+
+def test_messages_and_identifiers_of_one_log_only(compare):
+    extra = ["(1000.1) can0 002#01\n", "(1000.2) can0 7FF#01\n"]
+    found, out = compare(lines(SAME), [*lines(SAME), *extra], code=1)
+    assert found["only_second"] == {"N": 1}
+    assert found["unknown"] == {"0x7ff": [0, 1]}
+    assert "only in" in out
+    compare(lines(SAME), [*lines(SAME), *extra], "--messages", "M", code=0)
+
+
+def test_wrong_use_is_refused(tmp_path, compare):
+    with pytest.raises(BrakebenchError, match="expected a name and a number"):
+        compare(lines(SAME), lines(SAME), "--tolerance", "S", code=2)
+    with pytest.raises(BrakebenchError, match="no signal"):
+        compare(lines(SAME), lines(SAME), "--signals", "Q", code=2)
+
+
+def test_pairs_are_one_to_one_and_near():
+    rng = np.random.default_rng(5)
+    one = np.sort(rng.integers(0, 10_000, 300))
+    two = np.sort(np.concatenate((one[::2] + rng.integers(-2, 3, 150), rng.integers(0, 10_000, 40))))
+    a, b = pairs(one, two)
+    assert len(np.unique(a)) == len(a) == len(np.unique(b))
+    assert (np.abs(one[a] - two[b]) <= np.median(np.diff(one)) / 2).all()
+    assert len(a) > 140

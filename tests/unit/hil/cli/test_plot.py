@@ -1,0 +1,115 @@
+import argparse
+import json
+import re
+
+import numpy as np
+import plotly.graph_objects
+import pytest
+from matplotlib.image import imread
+
+from hil.cli import plot
+from hil.errors import BrakebenchError
+from hil.report.courses import Course, Courses, courses_figure
+
+DBC = """VERSION ""
+BU_: A
+BO_ 1 M: 3 A
+ SG_ S : 0|8@1+ (0.5,0) [0|0] "km/h" A
+ SG_ R : 16|8@1+ (0.5,0) [0|0] "km/h" A
+ SG_ T : 8|7@1+ (1,0) [0|0] "" A
+ SG_ B : 15|1@1+ (1,0) [0|0] "" A
+VAL_ 1 T 0 "off <b>" 1 "on" 9 "failed" ;
+"""
+
+
+def run(*words):
+    parser = argparse.ArgumentParser()
+    plot.add_parser(parser.add_subparsers())
+    args = parser.parse_args(["plot", *map(str, words)])
+    return args.run(args)
+
+
+@pytest.fixture
+def log(tmp_path):
+    path = tmp_path / "a.log"
+    times = [1_700_000_000 + k / 100 + (5 if k >= 200 else 0) for k in range(400)]
+    names = [0, 1, 9]
+    path.write_text("".join(f"({t:.6f}) can0 001#{k % 100:02X}{names[k // 150]:02X}50\n" for k, t in enumerate(times)))
+    (tmp_path / "a.dbc").write_text(DBC)
+    return path
+
+
+def figure_of(page):
+    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)[1])
+
+
+def test_a_page_has_units_names_and_gaps(log, tmp_path, capsys):
+    out = tmp_path / "a.html"
+    assert run(log, "S", "M.R", "T", "B", "--dbc", tmp_path / "a.dbc", "--out", out) == 0
+    assert "4 signals, 1,600 values" in capsys.readouterr().out
+    page = out.read_text()
+    assert "2023-11-14 22:13:20.000 UTC" in page
+    assert "off <b>" not in page
+    figure = figure_of(page)
+    plotly.graph_objects.Figure(figure)  # plotly knows every key of it
+    speed, other, state, bit = figure["data"]
+    assert speed["yaxis"] == other["yaxis"] == "y"
+    assert figure["layout"]["yaxis"]["title"]["text"] == "km/h"
+    assert None in speed["y"]  # 5 s of silence are no line
+    assert state["line"]["shape"] == "hv"
+    assert figure["layout"]["yaxis2"]["ticktext"] == ["off &lt;b&gt;  0", "on  1", "failed  9"]
+    assert set(state["y"]) == {0, 1, 2}
+    assert figure["layout"]["yaxis3"]["ticktext"] == ["0", "1"]
+    assert set(bit["y"]) == {0}
+
+
+def test_a_picture(log, tmp_path):
+    out = tmp_path / "a.png"
+    assert run(log, "M.*", "--dbc", tmp_path / "a.dbc", "--out", out, "--from", "1") == 0
+    picture = imread(out)
+    assert picture.shape[1] == 1560
+    assert (picture[:, :, :3].min(axis=2) < 0.5).sum() > 5000  # something is drawn on it
+    with pytest.raises(BrakebenchError, match="--force"):
+        run(log, "M.*", "--dbc", tmp_path / "a.dbc", "--out", out)
+
+
+def test_what_cannot_be_drawn_is_refused(log, tmp_path):
+    with pytest.raises(BrakebenchError, match="no signal"):
+        run(log, "Q", "--dbc", tmp_path / "a.dbc", "--out", tmp_path / "a.png")
+    with pytest.raises(BrakebenchError, match="plots are written as"):
+        run(log, "S", "--dbc", tmp_path / "a.dbc", "--out", tmp_path / "a.txt")
+    (tmp_path / "other.log").write_text("(1.0) can0 002#00\n")
+    with pytest.raises(BrakebenchError, match="no frame of S"):
+        run(tmp_path / "other.log", "S", "--dbc", tmp_path / "a.dbc", "--out", tmp_path / "a.png")
+
+
+def test_a_damaged_log_is_drawn_and_told(log, tmp_path, capsys):
+    with log.open("a") as file:
+        file.write("rubbish\n")
+    assert run(log, "S", "--dbc", tmp_path / "a.dbc", "--out", tmp_path / "a.svg") == 1
+    assert "cut off or rejected" in capsys.readouterr().out
+
+
+def test_many_values_are_thinned_and_the_peak_stays():
+    rng = np.random.default_rng(4)
+    y = rng.normal(size=500_000)
+    y[123_456], y[400_000] = 50.0, -60.0
+    course = Course("M.S", np.arange(500_000) / 100, y)
+    (trace,) = courses_figure([Courses((course,), "bar")])["data"]
+    assert len(trace["y"]) <= 40_000
+    assert (max(trace["y"]), min(trace["y"])) == (50.0, -60.0)
+
+
+def test_gathering_keeps_peaks_in_bounded_memory(monkeypatch):
+    monkeypatch.setattr(plot, "MOST_SAMPLES", 1000)
+    monkeypatch.setattr(plot, "KEPT_SAMPLES", 100)
+    gathered = plot.Gathered(None, np.dtype(np.float64))
+    y = np.sin(np.arange(10_000))
+    y[5_000] = 9.0
+    for begin in range(0, 10_000, 500):
+        gathered.add(np.arange(begin, begin + 500), y[begin : begin + 500])
+    times, values = gathered.joined()
+    assert gathered.count == 10_000
+    assert len(times) <= 1500
+    assert values.max() == 9.0
+    assert (np.diff(times) > 0).all()
