@@ -12,11 +12,12 @@ from hil.log.choice import Choice
 from hil.log.contents import Contents
 from hil.log.databases import Databases
 from hil.log.decoded import Values
+from hil.log.read import Progress
 from hil.log.series import MessageSeries, Samples, collect
 from hil.log.several import Logs
 from hil.log.summary import Summary
 
-VALUES_AT_ONCE = 32_000_000  # of both logs together: about half a gigabyte
+VALUES_AT_ONCE = 8_000_000  # of both logs together: about 300 MB
 FLOAT_TOLERANCE = 1e-6  # of the larger value, for floating-point signals
 
 Ints = npt.NDArray[np.int64]
@@ -108,7 +109,12 @@ def own_tolerance(signal: Signal) -> float | None:
 
 
 def diff_logs(
-    first: Logs, second: Logs, databases: Databases, choice: Choice, tolerance: Tolerance = lambda *_: None
+    first: Logs,
+    second: Logs,
+    databases: Databases,
+    choice: Choice,
+    tolerance: Tolerance = lambda *_: None,
+    progress: Progress | None = None,
 ) -> LogDifference:
     """Compare the chosen signals of two logs.
 
@@ -116,10 +122,11 @@ def diff_logs(
     stamps agree within half a cycle; else every frame of the first log with the nearest one of the other, not farther
     than half a cycle (the median of the first log). Stamps are taken as they are where the two logs overlap in time,
     else from the first frame of each log on. Messages are compared group by group, so that memory does not grow with
-    the logs; a group is at least one message.
+    the logs; a group is at least one message. Both logs are read once, and once again for each group.
     """
     wanted = choice.wanted(databases)
-    sides = [_contents(logs, databases, choice, wanted) for logs in (first, second)]
+    readings = _Readings(progress)
+    sides = [_contents(logs, databases, choice, wanted, readings.next()) for logs in (first, second)]
     ours, other = (contents.summary() for contents in sides)
     same_clock = ours.first_ns <= other.last_ns and other.first_ns <= ours.last_ns
     starts = [0, 0] if same_clock else [ours.first_ns, other.first_ns]
@@ -138,9 +145,13 @@ def diff_logs(
         for name, n in counts[0].items()
         if name in counts[1]
     }
-    for messages in _groups(sizes):
+    groups = list(_groups(sizes))
+    readings.total = 2 + 2 * len(groups)
+    for messages in groups:
         names = [name for message in messages for name in names_of.get(message, ())]
-        one, two = (collect(choice.frames(logs.tables()), databases.decoder(names)) for logs in (first, second))
+        one, two = (
+            collect(choice.frames(logs.tables(readings.next())), databases.decoder(names)) for logs in (first, second)
+        )
         for message in sorted(messages & one.keys() & two.keys()):
             one[message].time_ns -= starts[0]
             two[message].time_ns -= starts[1]
@@ -155,9 +166,27 @@ def _frames(contents: Contents, wanted: Collection[str] | None) -> dict[str, int
     return {name: one.count for name, one in messages.items() if chosen is None or name in chosen}
 
 
-def _contents(logs: Logs, databases: Databases, choice: Choice, wanted: Collection[str] | None) -> Contents:
+class _Readings:
+    """Progress over several readings of logs; how many there are is known after the first two."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self.total = 4
+        self._progress = progress
+        self._begun = 0
+
+    def next(self) -> Progress | None:
+        """Progress of the next reading."""
+        number = self._begun
+        self._begun += 1
+        progress = self._progress
+        return None if progress is None else lambda done: progress((number + done) / self.total)
+
+
+def _contents(
+    logs: Logs, databases: Databases, choice: Choice, wanted: Collection[str] | None, progress: Progress | None
+) -> Contents:
     contents = Contents(databases, wanted)
-    for table in choice.frames(logs.tables()):
+    for table in choice.frames(logs.tables(progress)):
         contents.add(table)
     return contents
 
