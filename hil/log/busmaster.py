@@ -14,6 +14,7 @@ from hil.log.lines import read_lines
 from hil.log.source import ReadOptions, Source
 from hil.log.wall_clock import MAX_START_NS, wall_clock_ns
 
+MAX_NS = 5_000_000_000_000_000_000  # of a stamp, for the compiled pass
 DAY_NS = 86_400 * 10**9
 TICK_NS = 100_000  # of the last number of a stamp
 TYPES = {
@@ -39,7 +40,7 @@ def read_busmaster(source: Source, account: Account, options: ReadOptions) -> It
     mode), or count from the start of their session (absolute mode), or from the line before (relative mode).
     Messages of J1939 that several frames carried, and LIN, are passed over.
     """
-    return read_lines(source, account, BusmasterParser(account, options.timezone), False)
+    return read_lines(source, account, BusmasterParser(account, options.timezone), options.fast)
 
 
 class BusmasterParser:
@@ -55,10 +56,21 @@ class BusmasterParser:
         self.midnight_ns = 0  # before the start
         self.last_ns = 0  # stamp of the last line
         self.files = False  # inside the list of databases
+        self.numbers = np.full(10_000, -1, np.int32)  # channel by its number in the log
 
     def take(self, buffer: npt.NDArray[np.uint8], begin: int, builder: FrameBuilder) -> int:
-        """There is no compiled pass: all lines are left."""
-        return begin
+        """Add lines of CAN frames."""
+        from hil.log.busmaster_pass import take_lines
+
+        if self.protocol != b"CAN" or abs(self.last_ns) > MAX_NS or abs(self.midnight_ns) > MAX_NS:
+            return begin
+        state = np.array([self.midnight_ns, self.last_ns], np.int64)
+        mode = ("absolute", "relative", "system").index(self.mode)
+        at = builder.fill(take_lines, buffer, begin, self.numbers, state, self.start_ns, mode, self.base)
+        self.midnight_ns, self.last_ns = int(state[0]), int(state[1])
+        if at > begin:
+            self.files = False
+        return at
 
     def line(self, line: bytes, offset: int, builder: FrameBuilder) -> bool:
         """Add, pass over or reject one line."""
@@ -157,14 +169,14 @@ class BusmasterParser:
             return False
         sent = FrameFlag.SENT if direction == b"tx" else FrameFlag(0)
         if kind.startswith(b"err"):
-            return builder.add(time_ns, f"can{channel}", 0, False, b"", FrameFlag.ERROR | sent, 0)
+            return self._add(builder, time_ns, channel, 0, False, b"", FrameFlag.ERROR | sent, 0)
         if kind not in TYPES or len(words) < 6 or not (words[5].isdigit() and len(words[5]) <= 2):
             return False
         wide, flags = TYPES[kind]
         length, data = int(words[5]), self._bytes(words[6:])
         if flags & FrameFlag.REMOTE:
-            return length <= 15 and builder.add(
-                time_ns, f"can{channel}", can_id, wide, b"", flags | sent, min(length, 8)
+            return length <= 15 and self._add(
+                builder, time_ns, channel, can_id, wide, b"", flags | sent, min(length, 8)
             )
         if flags & FrameFlag.FD:
             lengths = {length} | ({FD_CODES[length]} if length < 16 else set())
@@ -172,7 +184,17 @@ class BusmasterParser:
             lengths = {min(length, 8)} if length < 16 else set()
         if data is None or len(data) not in lengths:
             return False
-        return builder.add(time_ns, f"can{channel}", can_id, wide, data, flags | sent, 0)
+        return self._add(builder, time_ns, channel, can_id, wide, data, flags | sent, 0)
+
+    def _add(
+        self, builder: FrameBuilder, time_ns: int, channel: int, can_id: int, wide: bool, data: bytes,
+        flags: FrameFlag, length: int,
+    ) -> bool:  # fmt: skip
+        name = f"can{channel}"
+        if not builder.add(time_ns, name, can_id, wide, data, flags, length):
+            return False
+        self.numbers[channel + 1] = builder.channel(name)
+        return True
 
     def _j1939(self, words: list[bytes], time_ns: int, builder: FrameBuilder) -> bool:
         """``time channel ID PGN type source destination priority Rx length data``; False where it is no frame."""
@@ -189,5 +211,5 @@ class BusmasterParser:
         return (
             data is not None
             and len(data) == length
-            and builder.add(time_ns, f"can{max(int(words[1]), 1) - 1}", can_id, True, data, flags, 0)
+            and self._add(builder, time_ns, max(int(words[1]), 1) - 1, can_id, True, data, flags, 0)
         )

@@ -304,20 +304,21 @@ class _Head:
         self._source = source
         self._signals = [one.signal for one in plan.signals]
         self._columns = [f"{name}.{one.name}" if wanted.takes_from(name, one.name) else None for one in self._signals]
-        self._counts = np.zeros((len(self._signals), 3), np.int64)
+        self._n, self._sna, self._outside = ([0] * len(self._signals) for _ in range(3))
 
     def add(self, log: DecodedLog, signals: list[Found]) -> None:
         """Put the columns of a table into its result."""
-        if not signals:
-            return
+        columns, counts = log.columns, log.signals
         for place, rows, values, n, sna, outside in signals:
             name = self._columns[place]
             if name is not None:
-                log.columns[name] = Column(self._signals[place], rows, values, self._source)
-                log.signals[name] = SignalCount(n, sna, outside)
-        self._counts[[one.place for one in signals]] += [one[3:] for one in signals]
+                columns[name] = Column(self._signals[place], rows, values, self._source)
+                counts[name] = SignalCount(n, sna, outside)
+                self._n[place] += n
+                self._sna[place] += sna
+                self._outside[place] += outside
 
     def totals(self) -> dict[str, SignalCount]:
         """Counts of all tables so far."""
-        named = zip(self._columns, self._counts.tolist(), strict=True)
-        return {name: SignalCount(*counts) for name, counts in named if name is not None}
+        counts = map(SignalCount, self._n, self._sna, self._outside)
+        return {name: count for name, count in zip(self._columns, counts, strict=True) if name is not None}

@@ -227,40 +227,56 @@ def extract(words, jobs, ints, floats, as_int, as_float, counts, scratch):  # ty
         absent, bad = 0, 0
         for chunk in range(0, n, _CHUNK):
             m = min(_CHUNK, n - chunk)
-            source, target = begin + chunk, out + chunk
+            # slices, since an index that is a sum could be negative, which keeps a loop from being vectorised
+            source = words[begin + chunk : begin + chunk + m]
+            whole_out = as_int[out + chunk : out + chunk + m]
+            float_out = as_float[out + chunk : out + chunk + m]
+            raw = scratch[:m]
             if swap:
                 for i in range(m):
-                    scratch[i] = (((_swapped(words[source + i]) >> shift) & mask) ^ sign) - sign
+                    raw[i] = (((_swapped(source[i]) >> shift) & mask) ^ sign) - sign
             else:
                 for i in range(m):
-                    scratch[i] = (((words[source + i] >> shift) & mask) ^ sign) - sign
+                    raw[i] = (((source[i] >> shift) & mask) ^ sign) - sign
             if kind == 0:
                 factor, offset = floats[s, 0], floats[s, 1]
                 for i in range(m):
-                    as_float[target + i] = float(scratch[i]) * factor + offset
+                    float_out[i] = float(raw[i]) * factor + offset
             else:
                 whole, start = ints[s, 5], ints[s, 6]
                 for i in range(m):
-                    as_int[target + i] = scratch[i] * whole + start
+                    whole_out[i] = raw[i] * whole + start
             flags, none = ints[s, 10], ints[s, 9]
+            here, outside = 0, 0
             if flags & 1:
                 for i in range(m):
-                    if scratch[i] == none:
-                        absent += 1
+                    if raw[i] == none:
+                        here += 1
+                absent += here
             if flags & 2:
-                counted = flags & 1
                 if kind == 0:
                     low, high = floats[s, 2], floats[s, 3]
                     for i in range(m):
-                        v = as_float[target + i]
-                        if not (v >= low and v <= high) and not (counted and scratch[i] == none):
-                            bad += 1
+                        v = float_out[i]
+                        if v < low or v > high:
+                            outside += 1
+                    if here and outside:
+                        for i in range(m):
+                            v = float_out[i]
+                            if raw[i] == none and (v < low or v > high):
+                                outside -= 1
                 else:
                     least, most = ints[s, 7], ints[s, 8]
                     for i in range(m):
-                        w = as_int[target + i]
-                        if (w < least or w > most) and not (counted and scratch[i] == none):
-                            bad += 1
+                        w = whole_out[i]
+                        if w < least or w > most:
+                            outside += 1
+                    if here and outside:
+                        for i in range(m):
+                            w = whole_out[i]
+                            if raw[i] == none and (w < least or w > most):
+                                outside -= 1
+                bad += outside
         counts[j, 0] = absent
         counts[j, 1] = bad
     return jobs.shape[0]

@@ -14,7 +14,7 @@ Values = npt.NDArray[np.float64] | npt.NDArray[np.int64] | npt.NDArray[np.uint64
 Rows = npt.NDArray[np.int64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class Column:
     """One signal of a log: ``values`` in the DBC's own unit at the frames ``rows`` (ascending).
 

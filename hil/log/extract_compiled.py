@@ -44,8 +44,8 @@ def extract_all(parts: Parts, base: Words) -> list[list[Found]]:
             for i, (signal, (absent, bad)) in enumerate(zip(plan.signals, counts, strict=True))
         ]
         for i, one in enumerate(found[number]):
-            if one.sna or one.outside:
-                signal = plan.signals[i]
+            signal = plan.signals[i]
+            if one.sna or (one.outside and signal.named):
                 found[number][i] = _corrected(one, Piece(i, signal, rows, group.words(signal), None))
         job += len(plan.signals)
     for (number, piece), begin, (absent, bad) in zip(pieces, jobs.outs[job:], jobs.counts[job:], strict=True):

@@ -126,11 +126,17 @@ def format_of(source: Source) -> Format:
     if not head:
         problem = "gzip file that cannot be unpacked" if source.packed else "empty: no log in it"
         raise LogError(source.path, f"{problem}; give a log file")
-    scores = [form.told_by(head) for form in FORMATS]
-    if not max(scores):
+    form = told(head)
+    if form is None:
         names = ", ".join(f.name for f in FORMATS)
         raise LogError(source.path, f"no log of a known format, its first bytes are {head[:24]!r}; known are {names}")
-    return FORMATS[scores.index(max(scores))]
+    return form
+
+
+def told(head: bytes) -> Format | None:
+    """Format of a log that begins so; None where it is none of the known ones."""
+    scores = [form.told_by(head) for form in FORMATS]
+    return FORMATS[scores.index(max(scores))] if max(scores) else None
 
 
 def writable(path: Path) -> Format:

@@ -48,13 +48,15 @@ class Joined(NamedTuple):
 class _Transfer:
     can_id: int  # of the message, priority 6
     size: int
+    number: int  # of packets
     last_ns: int
     timeout_ns: int
     packets: dict[int, bytes] = field(default_factory=dict)
 
-    @property
-    def number(self) -> int:
-        return -(-self.size // _PACKET)
+
+def _place(channel: int, source: int, destination: int) -> int:
+    """What tells transfers under way apart."""
+    return channel << 16 | destination << 8 | source
 
 
 class Transport:
@@ -67,7 +69,7 @@ class Transport:
 
     def __init__(self) -> None:
         self.broken: Counter[str] = Counter()
-        self._open: dict[tuple[int, int, int], _Transfer] = {}
+        self._open: dict[int, _Transfer] = {}
 
     @property
     def open(self) -> int:
@@ -92,13 +94,12 @@ class Transport:
             payload = data[8 * i : 8 * i + min(8, lengths[i])]
             can_id = ids[i]
             where = channels[channel[i]]
-            source, destination = can_id & 0xFF, can_id >> 8 & 0xFF
-            if group_number(can_id) & 0x3FF00 == TP_DT:
-                whole = self._packet((where, source, destination), payload, times[i])
+            if can_id & 0xFF0000 == TP_DT << 8:
+                whole = self._packet(where << 16 | can_id & 0xFFFF, payload, times[i])
                 if whole is not None:
                     joined.append(Joined(row, channel[i], *whole))
             else:
-                self._control(where, source, destination, payload, times[i])
+                self._control(where, can_id & 0xFF, can_id >> 8 & 0xFF, payload, times[i])
         return joined
 
     def _control(self, channel: int, source: int, destination: int, payload: bytes, now_ns: int) -> None:
@@ -107,9 +108,9 @@ class Transport:
             return
         kind = payload[0]
         if kind in (_RTS, _BAM):
-            self._begin((channel, source, destination), payload, now_ns)
+            self._begin(channel, source, destination, payload, now_ns)
             return
-        to, fro = (channel, destination, source), (channel, source, destination)
+        to, fro = _place(channel, destination, source), _place(channel, source, destination)
         group = _group(payload)
         if kind == _CTS:  # the receiver of a transfer speaks
             self._alive(to, now_ns)
@@ -121,8 +122,8 @@ class Transport:
                 if transfer is not None and group_number(transfer.can_id) == group_number(group << 8):
                     self._break(place, ABORTED)
 
-    def _begin(self, place: tuple[int, int, int], payload: bytes, now_ns: int) -> None:
-        _, source, destination = place
+    def _begin(self, channel: int, source: int, destination: int, payload: bytes, now_ns: int) -> None:
+        place = _place(channel, source, destination)
         broadcast = payload[0] == _BAM
         size = payload[1] | payload[2] << 8
         group = _group(payload)
@@ -137,9 +138,10 @@ class Transport:
         if group >> 8 & 0xFF < 240:
             group = group & 0x3FF00 | destination
         can_id = 6 << 26 | group << 8 | source
-        self._open[place] = _Transfer(can_id, size, now_ns, BROADCAST_TIMEOUT_NS if broadcast else TIMEOUT_NS)
+        timeout_ns = BROADCAST_TIMEOUT_NS if broadcast else TIMEOUT_NS
+        self._open[place] = _Transfer(can_id, size, payload[3], now_ns, timeout_ns)
 
-    def _packet(self, place: tuple[int, int, int], payload: bytes, now_ns: int) -> tuple[int, bytes] | None:
+    def _packet(self, place: int, payload: bytes, now_ns: int) -> tuple[int, bytes] | None:
         transfer = self._alive(place, now_ns)
         if transfer is None:
             self.broken[NO_TRANSFER] += 1
@@ -153,9 +155,9 @@ class Transport:
         if len(transfer.packets) < transfer.number:
             return None
         del self._open[place]
-        return transfer.can_id, b"".join(transfer.packets[i] for i in range(1, transfer.number + 1))
+        return transfer.can_id, b"".join([transfer.packets[i] for i in range(1, transfer.number + 1)])
 
-    def _alive(self, place: tuple[int, int, int], now_ns: int) -> _Transfer | None:
+    def _alive(self, place: int, now_ns: int) -> _Transfer | None:
         """Return the transfer of a place, if there is one and it has not waited too long; it has been heard of now."""
         transfer = self._open.get(place)
         if transfer is None:
@@ -166,7 +168,7 @@ class Transport:
         transfer.last_ns = now_ns
         return transfer
 
-    def _break(self, place: tuple[int, int, int], reason: str) -> None:
+    def _break(self, place: int, reason: str) -> None:
         if self._open.pop(place, None) is not None:
             self.broken[reason] += 1
 

@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from hil.log.mdf_blocks import LENGTH_OPEN, LIST_OPEN, DamagedError, MdfFile
+from hil.log.mdf_blocks import DamagedError, MdfFile
+from hil.log.mdf_layout import LENGTH_OPEN, LIST_OPEN
 from hil.log.mdf_packed import BlockBytes, Stored, open_block
 
 MAX_TRANSPOSED_BYTES = 1 << 28  # of one block; the standard recommends 4 MiB at most

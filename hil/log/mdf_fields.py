@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hil.log.mdf_blocks import VIRTUAL, VLSD, Member
+from hil.log.mdf_layout import VIRTUAL, VLSD, Member
 
 Bytes = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.bool_]

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hil.log.frames import FD_CODES, FrameFlag, FrameTable, LogFacts
-from hil.log.mdf_blocks import KINDS
+from hil.log.mdf_layout import KINDS
 from hil.log.mdf_write import BUS_EVENT, BYTES, UNSIGNED, Channel, GroupWriter, MdfWriter
 from hil.log.write import numbered
 

@@ -7,8 +7,9 @@ import numpy.typing as npt
 
 from hil.log.account import Account
 from hil.log.frames import FD_CODES, FD_LENGTHS, MAX_EXTENDED_ID, MAX_STANDARD_ID, FrameFlag, FrameTable
-from hil.log.mdf_blocks import KINDS, VIRTUAL, VLSD, DamagedError, Group, Member
+from hil.log.mdf_blocks import DamagedError
 from hil.log.mdf_fields import KEPT_8, KEPT_64, Bytes, Mask, Numbers, data_bytes, fits, unsigned
+from hil.log.mdf_layout import KINDS, VIRTUAL, VLSD, Group, Member
 from hil.log.mdf_time import Clock, is_time
 
 MAX_CHANNEL = 255

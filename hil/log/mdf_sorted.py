@@ -8,9 +8,10 @@ import numpy.typing as npt
 
 from hil.log.account import Account
 from hil.log.frames import FrameTable
-from hil.log.mdf_blocks import CYCLES_OPEN, MAX_RECORD_BYTES, VLSD, DamagedError, DataGroup, Group, MdfFile
+from hil.log.mdf_blocks import DamagedError, MdfFile
 from hil.log.mdf_data import DataStream
 from hil.log.mdf_fields import Bytes
+from hil.log.mdf_layout import CYCLES_OPEN, MAX_RECORD_BYTES, VLSD, DataGroup, Group
 from hil.log.mdf_records import Layout
 from hil.log.mdf_values import SignalData
 

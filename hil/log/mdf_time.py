@@ -3,8 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
-from hil.log.mdf_blocks import VIRTUAL_MASTER, Member
 from hil.log.mdf_fields import Bytes, Mask, unsigned
+from hil.log.mdf_layout import VIRTUAL_MASTER, Member
 
 Stamps = npt.NDArray[np.int64]
 MAX_SECONDS = 1 << 34  # of a tick, and of the first one
@@ -61,7 +61,7 @@ class Clock:
         master = self.master
         size = master.bits // 8
         order = "<" if master.data_type == 4 else ">"
-        raw = np.ascontiguousarray(records[:, master.byte : master.byte + size]).view(f"{order}f{size}")
+        raw = records[:, master.byte : master.byte + size].view(f"{order}f{size}")
         seconds = raw[:, 0].astype(np.float64)
         with np.errstate(over="ignore", invalid="ignore"):
             if master.factor != 1 or master.offset:

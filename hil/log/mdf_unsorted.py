@@ -8,9 +8,10 @@ import numpy.typing as npt
 
 from hil.log.account import Account
 from hil.log.frames import FrameTable
-from hil.log.mdf_blocks import CYCLES_OPEN, VLSD, VLSD_OFFSETS_OPEN, DamagedError, DataGroup, MdfFile
+from hil.log.mdf_blocks import DamagedError, MdfFile
 from hil.log.mdf_data import DataStream
 from hil.log.mdf_fields import Bytes, unsigned
+from hil.log.mdf_layout import CYCLES_OPEN, VLSD, VLSD_OFFSETS_OPEN, DataGroup
 from hil.log.mdf_merge import Reordering
 from hil.log.mdf_records import Layout
 from hil.log.mdf_scan import END, UNKNOWN, scan_records
@@ -280,14 +281,15 @@ class _Scanner:
         self, buffer: Bytes, numbers: npt.NDArray[np.int32], begins: npt.NDArray[np.int64], first: int
     ) -> None:
         id_bytes = self.data.id_bytes
-        for k, values in self.values.items():
-            begin = begins[numbers == k]
-            if len(begin):
-                values.add(buffer, begin, 4 + numbers_at(buffer, "<u4", begin).astype(np.int64))
-        for k, part in self.parts.items():
-            begin = begins[numbers == k]
-            if len(begin):
-                part.add(buffer, begin, self.stream.offsets_of(first + begin - id_bytes))
+        order = np.argsort(numbers, kind="stable")
+        counts = np.bincount(numbers, minlength=len(self.groups))
+        ends = np.cumsum(counts)
+        for k in np.flatnonzero(counts).tolist():
+            begin = begins[order[ends[k] - counts[k] : ends[k]]]
+            if k in self.values:
+                self.values[k].add(buffer, begin, 4 + numbers_at(buffer, "<u4", begin).astype(np.int64))
+            elif k in self.parts:
+                self.parts[k].add(buffer, begin, self.stream.offsets_of(first + begin - id_bytes))
 
     def _close(self) -> None:
         self.stream.close()

@@ -7,21 +7,24 @@ from datetime import timedelta
 from hil.log.account import Account
 from hil.log.builder import ROWS
 from hil.log.frames import FrameTable, LogError
-from hil.log.mdf_blocks import DamagedError, DataGroup, Group, MdfFile
+from hil.log.mdf_blocks import DamagedError, MdfFile
 from hil.log.mdf_frames import write_mf4
+from hil.log.mdf_layout import DataGroup, Group
 from hil.log.mdf_merge import merged
 from hil.log.mdf_records import Channels
 from hil.log.mdf_sorted import Share, sorted_frames
 from hil.log.mdf_unsorted import unsorted_frames
+from hil.log.mdf_values import STORE_BYTES
 from hil.log.source import ReadOptions, Source
 from hil.log.wall_clock import EPOCH, wall_clock_ns
 
 __all__ = ["read_mf4", "write_mf4"]
 
 LATEST = 420  # version of MDF that is read
+BLOCK_ROWS = ROWS // 2  # records of a group that become frames at once: they fit a cache
 MERGED_ROWS = 4 * ROWS  # of all groups together
 HELD_BYTES = 64 << 20  # of records and values, of all groups together
-LEAST_ROWS = 64
+LEAST_ROWS, LEAST_BYTES = 64, 4096  # of one group
 
 
 def read_mf4(source: Source, account: Account, options: ReadOptions) -> Iterator[FrameTable]:
@@ -40,11 +43,12 @@ def read_mf4(source: Source, account: Account, options: ReadOptions) -> Iterator
         account.cut_at(size)
     try:
         mdf = MdfFile(file, size, account)
+        if mdf.version // 100 != 4:
+            version = f"MDF version {mdf.version / 100:.2f}; 4.00 to {LATEST / 100:.2f} are read"
+            raise LogError(source.path, f"{version}: convert it to MDF 4")
         mdf.describe()
     except DamagedError as error:
         raise LogError(source.path, f"no header of MDF 4: {error.problem}", error.offset) from error
-    if mdf.version // 100 != 4:
-        raise LogError(source.path, f"MDF version {mdf.version / 100:.2f}; 4.00 to 4.20 are read: convert it to MDF 4")
     if mdf.version > LATEST:
         account.note(f"MDF version {mdf.version / 100:.2f}: what is newer than {LATEST / 100:.2f} in it is not read")
     if not mdf.finalised:
@@ -97,9 +101,8 @@ def _groups_of_frames(mdf: MdfFile, source: Source, account: Account) -> list[tu
 
 
 def _share(found: list[tuple[DataGroup, list[Group]]]) -> Share:
-    return Share(
-        max(LEAST_ROWS, min(ROWS, MERGED_ROWS // len(found))), max(4096, min(16 << 20, HELD_BYTES // len(found)))
-    )
+    rows, size = MERGED_ROWS // len(found), HELD_BYTES // len(found)
+    return Share(max(LEAST_ROWS, min(BLOCK_ROWS, rows)), max(LEAST_BYTES, min(STORE_BYTES, size)))
 
 
 def _readers(

@@ -128,9 +128,9 @@ def take_blocks(  # type: ignore[no-untyped-def]
 ):
     """Add the enhanced packets of one section of a pcapng file.
 
-    For each interface of the section: ``links`` its link type, ``scales`` (k, 3) multiplier, divisor and power of two
-    (32 at most) that turn its ticks into ns, ``offsets`` ns to add (2 ** 61 at most), ``interfaces`` its channel, -1
-    for a new one.
+    For each interface of the section: ``links`` its link type, ``scales`` (k, 4) multiplier, divisor and power of two
+    (32 at most) that turn its ticks into ns and the limit of ticks over that power, ``offsets`` ns to add (2 ** 61 at
+    most), ``interfaces`` its channel, -1 for a new one.
     """
     times, channels, flags = columns[0], columns[1], columns[6]
     rows, size = times.shape[0], buffer.shape[0]
@@ -153,9 +153,13 @@ def take_blocks(  # type: ignore[no-untyped-def]
         ticks = high << 32 | low
         multiplier, divisor, power = scales[interface, 0], scales[interface, 1], scales[interface, 2]
         whole = ticks >> power
-        if whole >= (1 << 62) // multiplier:
+        if whole >= scales[interface, 3]:
             return p, n
-        time_ns = whole * multiplier // divisor + (((ticks - (whole << power)) * multiplier) >> power)
+        time_ns = whole * multiplier
+        if divisor > 1:
+            time_ns //= divisor
+        if power:
+            time_ns += ((ticks - (whole << power)) * multiplier) >> power
         if _frame(buffer, p + 28, captured, original, links[interface], little, columns, n) < 0:
             return p, n
         if _sent(buffer, p + 28 + padded, p + length - 4, little):

@@ -73,6 +73,13 @@ class _Interface:
         """Whether the compiled pass can count its stamps."""
         return self.power <= 32 and self.divisor < 2**62 and abs(self.offset_ns) < 2**61
 
+    @property
+    def scale(self) -> tuple[int, int, int, int]:
+        """For the compiled pass: multiplier, divisor, power of two, and the limit of ticks over that power."""
+        if not self.fast:
+            return 1, 1, 0, 0
+        return self.multiplier, self.divisor, self.power, 2**62 // self.multiplier
+
     def time_ns(self, ticks: int) -> int:
         """Stamp in ns, cut."""
         return (ticks * self.multiplier // self.divisor >> self.power) + self.offset_ns
@@ -120,7 +127,7 @@ class _Blocks:
             known = self.interfaces[:FAST_INTERFACES]
             self._facts = (
                 np.array([i.link if i.fast else -1 for i in known], np.int64),
-                np.array([(i.multiplier, i.divisor, i.power) if i.fast else (1, 1, 0) for i in known], np.int64),
+                np.array([i.scale for i in known], np.int64),
                 np.array([i.offset_ns if i.fast else 0 for i in known], np.int64),
             )
         window, before = self.window, self.builder.n

@@ -8,7 +8,7 @@ from dbc.database import Database
 from hil.log.account import Account
 from hil.log.builder import recording_of
 from hil.log.decode import DecodedLog, decode_log
-from hil.log.formats import BY_NAME, format_of
+from hil.log.formats import BY_NAME, format_of, told
 from hil.log.frames import FrameTable, Recording
 from hil.log.source import DEFAULT, ReadOptions, Source
 
@@ -96,6 +96,19 @@ def open_log(
     ...     time_s, speed = log.signals(parse_database(Path("car.dbc").read_bytes())).series("WHEELS.FL")
     """
     return Log(path, form, options, limit_bytes)
+
+
+def log_format(path: Path) -> str | None:
+    """Name of the format of a log of frames, None for a file that is no log.
+
+    Raises
+    ------
+    LogError
+        When it cannot be opened.
+    """
+    with Source(path) as source:
+        form = told(source.head())
+    return None if form is None else form.name
 
 
 def read_log(path: Path, form: str | None = None) -> Recording:

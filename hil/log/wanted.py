@@ -51,6 +51,8 @@ class Wanted:
     def unmatched(self, known: Iterable[tuple[str, Iterable[str]]]) -> tuple[str, ...]:
         """Return the names that no message or signal has; ``known`` are messages with their signals."""
         names: set[str] = set()
+        if not self._given:
+            return ()
         for message, signals in known:
             names.add(message)
             names.update(f"{message}.{signal}" for signal in signals)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hil.diagnosis.data.log import WHEELS, Floats
-from hil.log.decode import DecodedLog
+from hil.log import DecodedLog
 
 _BAR = 1e5
 _SINGLE = {

@@ -13,13 +13,12 @@ from dbc.database import Database
 from hil.diagnosis.data.brakebench_signals import own_channels
 from hil.diagnosis.data.channel_map import ChannelMap, to_si
 from hil.diagnosis.data.log import CHANNELS, Floats, Log, UnusableError, make_log
-from hil.log.decode import DecodedLog, decode_log
-from hil.log.read import read_log
+from hil.log import DecodedLog, decode_log, log_format, read_log
 
 _GRID_S = 0.01
 _TABLES = (".csv", ".parquet", ".mf4", ".mdf", ".mat")
 _WITH_UNIT = re.compile(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*")
-_FRAMES = {"arbitration_id", "id", "data"}
+_FRAMES = {"channel", "id", "extended", "length", "data"}
 _HOLD_S = 0.25
 
 
@@ -47,7 +46,7 @@ def read_logs(
 def _files(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
-    suffixes = {*_TABLES, ".log", ".asc", ".blf", ".trc"}
+    suffixes = {*_TABLES, ".log", ".asc", ".blf", ".trc", ".pcap", ".pcapng", ".gz"}
     return sorted(file for file in path.iterdir() if file.suffix.lower() in suffixes and not file.name.startswith("."))
 
 
@@ -150,7 +149,7 @@ def _table_columns(path: Path) -> dict[str, tuple[Floats, str]] | None:
     """Columns and their units; None where the file is a log of frames."""
     suffix = path.suffix.lower()
     if suffix == ".csv":
-        return _csv(path)
+        return None if path.exists() and log_format(path) is not None else _csv(path)
     if suffix == ".parquet":
         return _parquet(path)
     if suffix in (".mf4", ".mdf"):
@@ -181,8 +180,6 @@ def _csv(path: Path) -> dict[str, tuple[Floats, str]] | None:
     while lines[at].startswith("#") and at + 1 < len(lines) and lines[at + 1].startswith("#"):
         at += 1
     header = [cell.strip().strip('"') for cell in lines[at].lstrip("# ").split(",")]
-    if set(header) >= _FRAMES or set(header) >= {"arbitration_id", "data"}:
-        return None
     rows = [line for line in lines[at + 1 :] if line.strip() and not line.startswith("#")]
     try:
         table = np.genfromtxt(rows, delimiter=",", dtype=np.float64, ndmin=2)

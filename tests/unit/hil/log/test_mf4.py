@@ -1,4 +1,5 @@
 import struct
+import zlib
 from dataclasses import replace
 from datetime import UTC
 from pathlib import Path
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 from mdf_made import Cg, Cn, Made, frame, record, time
 
-from hil.log import mdf_unsorted, mf4
+from hil.log import mdf_packed, mdf_unsorted, mf4
 from hil.log.formats import BY_NAME
 from hil.log.frames import FD_CODES, FrameFlag, FrameTable, LogError, LogFacts
 from hil.log.read import open_log
@@ -284,7 +285,12 @@ def simple(made, width=8, start_ns=START, **facts):
 @pytest.mark.parametrize("piece", [None, 1000, 23 * 10])
 @pytest.mark.parametrize("equal", [False, True])
 @pytest.mark.parametrize("width", [8, 64])
-def test_each_way_of_storing(read, way, piece, equal, width):
+@pytest.mark.parametrize("held", [True, False])
+def test_each_way_of_storing(read, way, piece, equal, width, held, monkeypatch):
+    if not held:  # as blocks too large for the memory are
+        monkeypatch.setattr(mdf_packed, "WHOLE_BYTES", 0)
+        monkeypatch.setattr(mdf_packed, "INPUT_BYTES", 64)
+        monkeypatch.setattr(mdf_packed, "inflater", zlib.decompressobj)
     made = plain(width=width)
     file, link = simple(made, width)
     file.patch(link, file.data(b"".join(records(made, width)), piece, way, 15 + width, equal))
@@ -478,6 +484,47 @@ def test_the_time_may_stand_in_another_group(read):
     assert [(t - START, i) for t, _, i, *_ in rows(frames)] == [(500_000_000, 0x10), (1_500_000_000, 0x11)]
 
 
+def test_lists_of_values_with_their_invalidation_bits_apart(read):
+    made = plain(90)
+    file, link = simple(made, version=420)
+    content = b"".join(records(made))
+    parts = [content[i : i + 23 * 30] for i in range(0, len(content), 23 * 30)]
+    values = [file.data(part, None, way, 23, ident=b"DV") for part, way in zip(parts, WAYS_TO_PACK, strict=True)]
+    bits = [file.data(bytes(30), ident=b"DI") for _ in parts]
+    second = file.block(b"LD", [0, values[2], bits[2]], struct.pack("<IIQ", 0x8000_0001, 1, 30))
+    first = file.block(b"LD", [second, *values[:2], *bits[:2]], struct.pack("<IIQ", 0x8000_0001, 2, 30))
+    file.patch(link, first)
+    struct.pack_into("<I", file.raw, file.raw.index(b"##CG") + 24 + 48 + 28, 1)  # one byte of invalidation bits
+    account, frames = read(file)
+    assert account.whole
+    assert rows(frames) == expected(made)
+
+
+def test_a_frame_marked_invalid_is_rejected(read):
+    channel = frame()
+    channel.flags, channel.invalid = 2, 3
+    content = b"".join(record(k, 1, k, b"1").ljust(23, b"\0") + bytes([8 if k == 1 else 0xF7]) for k in range(3))
+    file = Made(start_ns=START)
+    file.group([Cg([time(), channel], 23, 3, inval_bytes=1)], file.data(content))
+    account, frames = read(file)
+    assert (frames.can_id.tolist(), account.rejected) == ([0, 2], 1)
+
+
+def test_what_is_newer_than_the_reader_is_said(read):
+    made = plain(3)
+    file, link = simple(made, version=430)
+    file.patch(link, file.data(b"".join(records(made))))
+    account, frames = read(file)
+    assert rows(frames) == expected(made)
+    assert "MDF version 4.30" in account.notes[0]
+    at = file.packed(b"".join(records(made)))
+    file.raw[at + 24 + 2] = 2  # another way of packing
+    file.patch(link, at)
+    account, frames = read(file)
+    assert len(frames) == 0
+    assert "packed in way 2 (MDF 4.3)" in account.first_rejected[0].text
+
+
 def test_a_local_start_time_is_read_in_the_chosen_zone(read):
     made = plain(1)
     file, link = simple(made, time_flags=1)
@@ -526,7 +573,10 @@ def test_groups_without_can_frames_are_passed_over_and_counted(read):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"MDF     3.30    ".ljust(28, b"\0") + struct.pack("<H", 330) + bytes(600), "no header of MDF 4|MDF version"),
+        (
+            b"MDF     3.30    ".ljust(28, b"\0") + struct.pack("<H", 330) + bytes(600),
+            r"MDF version 3\.30; 4\.00 to 4\.20 are read: convert it",
+        ),
         (b"MDF     4.10    ".ljust(40, b"\0"), "no header of MDF 4: 64 bytes should stand here"),
         (b"MDF     4.10    ".ljust(400, b"\0"), "no header of MDF 4: a block should stand here"),
         (bytes(Made()), "it holds no groups"),
@@ -539,6 +589,7 @@ def test_what_is_no_bus_log_is_refused(read, content, message):
 
 # -- unfinalised files -----------------------------------------------------------------------------------------------
 
+WAYS_TO_PACK = ("plain", "deflate", "transposed")
 ALL_OPEN = 0x1 | 0x4 | 0x10 | 0x20
 
 
@@ -820,6 +871,39 @@ def test_memory_does_not_grow_with_the_log(tmp_path):
         tracemalloc.stop()
     assert written < 60e6
     assert peak < 60e6
+
+
+@pytest.mark.parametrize("columns", [0, 23])
+def test_a_small_file_that_unpacks_to_much_is_read_in_bounded_memory(tmp_path, columns):
+    import tracemalloc
+
+    n = 1_500_000
+    file = Made(start_ns=START)
+    dg, _, _ = file.group([Cg([time(), frame()], 23, n)])
+    file.patch(dg + 40, file.packed(record(1.0, 1, 0x10, b"1").ljust(23, b"\0") * n, columns))
+    (tmp_path / "a.mf4").write_bytes(bytes(file))
+    assert len(file.raw) < n / 10
+    tracemalloc.start()
+    try:
+        with open_log(tmp_path / "a.mf4") as log:
+            assert sum(len(table) for table in log.tables()) == n
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 25e6
+
+
+def test_a_block_that_cannot_be_as_long_as_it_says_is_refused(read):
+    made = plain(40)
+    file, link = simple(made)
+    content = b"".join(records(made))
+    file.patch(link, file.packed(content))
+    at = bytes(file).index(b"##DZ") + 24 + 8
+    for absurd in (2**63, 2**40, 10**7):
+        file.patch(at, absurd)
+        account, frames = read(file)
+        assert not account.whole
+        assert len(frames) in (0, 40)
 
 
 # -- mutants ---------------------------------------------------------------------------------------------------------
