@@ -6,7 +6,7 @@ import pytest
 
 from hil.cli import diff
 from hil.errors import BrakebenchError
-from hil.log.diff import pairs
+from hil.log.diff_signals import pairs
 
 DBC = """VERSION ""
 BU_: A
