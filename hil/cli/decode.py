@@ -27,7 +27,7 @@ from hil.log.choice import Choice, Moment
 from hil.log.contents import Contents
 from hil.log.several import Logs
 from hil.log.source import ReadOptions
-from hil.log.summary import Summary
+from hil.log.summary_values import Summary
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -102,7 +102,7 @@ def _choice(args: argparse.Namespace) -> Choice:
 
 
 def _check_out(args: argparse.Namespace) -> None:
-    if args.limit_mb is not None and not args.limit_mb > 0:
+    if args.limit_mb is not None and not 0 < args.limit_mb < 1e9:
         raise BrakebenchError("--limit-mb takes a number above 0")
     if args.out:
         from hil.log.export_messages import check_target
@@ -112,7 +112,7 @@ def _check_out(args: argparse.Namespace) -> None:
             raise BrakebenchError(f"{args.out}: exists already; use --force to replace it, or give another name")
     elif args.resample is not None or args.names:
         raise BrakebenchError("--resample and --names say how signals are written; give --out as well")
-    if args.resample is not None and not args.resample > 0:
+    if args.resample is not None and not 1e-9 <= args.resample < 1e9:
         raise BrakebenchError("--resample takes a step above 0 s, 0.01 for 10 ms")
 
 

@@ -11,9 +11,11 @@ from typing import Any
 from dbc.database import Signal
 from hil.cli.columns import columns, terminal_width, wrapped
 from hil.cli.log_options import LOGS, add_databases, add_timezone, databases, words_of
+from hil.cli.progress import Progress
 from hil.errors import BrakebenchError
 from hil.log.choice import Choice
-from hil.log.diff import LogDifference, SignalDifference, Tolerance, diff_logs
+from hil.log.diff import LogDifference, Tolerance, diff_logs
+from hil.log.diff_signals import SignalDifference
 from hil.log.several import Logs
 from hil.log.source import ReadOptions
 
@@ -55,8 +57,8 @@ def run(args: argparse.Namespace) -> int:
     choice = Choice(tuple(args.channel), messages=words_of(args.messages), signals=words_of(args.signals))
     tolerance = _tolerance(args.tolerance)
     options = ReadOptions(timezone=args.timezone)
-    with Logs([args.first], options) as first, Logs([args.second], options) as second:
-        found = diff_logs(first, second, databases_, choice, tolerance)
+    with Logs([args.first], options) as first, Logs([args.second], options) as second, Progress() as progress:
+        found = diff_logs(first, second, databases_, choice, tolerance, progress.part(0, "comparing"))
         for logs in (first, second):
             if not any(part.frames for part in logs.parts):
                 raise BrakebenchError(f"{logs.parts[0].path}: no frame could be read; give a CAN log")

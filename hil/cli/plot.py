@@ -22,7 +22,9 @@ from hil.log.frames import FrameTable
 from hil.log.several import UNDATED_NS, Logs
 from hil.log.source import ReadOptions
 from hil.log.wall_clock import wall_clock_of
-from hil.report.courses import Course, Courses, write_courses
+from hil.report.courses import Course, Courses
+from hil.report.courses_page import courses_page
+from hil.report.courses_picture import write_picture
 from hil.report.thin import thinned
 
 SUFFIXES = (".html", ".png", ".svg", ".pdf")
@@ -70,7 +72,10 @@ def run(args: argparse.Namespace) -> int:
     samples = sum(signal.count for signal in gathered.signals.values())
     subtitle = _subtitle(gathered, samples, args.timezone)
     with atomic_write(args.out, args.force, read) as temporary:
-        write_courses(plots, Path(args.log).name, subtitle, temporary)
+        if args.out.suffix == ".html":
+            temporary.write_text(courses_page(plots, Path(args.log).name, subtitle), encoding="utf-8")
+        else:
+            write_picture(plots, Path(args.log).name, subtitle, temporary)
     print(f"{args.out}: {len(gathered.signals)} signals, {samples:,} values")
     if not whole:
         print("something of the log was cut off or rejected; brakebench decode tells what")

@@ -36,6 +36,7 @@ class Progress:
         self._began_s = monotonic_ns() / 1e9
         self._shown_s = 0.0
         self._width = 0
+        self._share = 0.0
 
     def __enter__(self) -> Self:
         return self
@@ -60,7 +61,7 @@ class Progress:
         if passed < QUIET_S or now - self._shown_s < EVERY_S:
             return
         self._shown_s = now
-        share = min(1.0, (self._part + done) / self._parts)
+        share = self._share = min(1.0, max(self._share, (self._part + done) / self._parts))  # never back
         left = f", {duration_text(passed / share * (1 - share))} left" if share > 0.005 else ""
         line = f"{self._what}  {100 * share:3.0f} %{left}"
         self._stream.write("\r" + line.ljust(self._width))

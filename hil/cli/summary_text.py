@@ -8,7 +8,7 @@ from hil.log.contents import Contents, SignalSummary
 from hil.log.decode import NOT_A_FRAME
 from hil.log.decoded import DecodedCounts, SignalCount
 from hil.log.several import UNDATED_NS, Logs, Part
-from hil.log.summary import ChannelSummary, Cycle, IdSummary, Summary
+from hil.log.summary_values import ChannelSummary, Cycle, IdSummary, Summary
 from hil.log.wall_clock import wall_clock_of
 
 SHOWN = 10  # of each kind of note

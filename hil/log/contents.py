@@ -12,7 +12,8 @@ from hil.log.decode import DecodedCounts, DecodedLog
 from hil.log.decoded import Column
 from hil.log.frames import FrameFlag, FrameTable
 from hil.log.integrity import Integrity, IntegrityCounter, has_profile_layout
-from hil.log.summary import BitRates, Statistics, Summary
+from hil.log.summary import BitRates, Statistics
+from hil.log.summary_values import Summary
 
 MAX_PROTECTED = 4096  # identifiers, over all channels
 
@@ -56,7 +57,7 @@ class Contents:
     Attributes
     ----------
     signals : by ``MESSAGE.SIGNAL``, those that the log has.
-    unmatched : wanted names that the databases do not have.
+    frames_of : frames of each message, those of each J1939 source apart.
     """
 
     def __init__(
@@ -68,6 +69,7 @@ class Contents:
     ) -> None:
         self.databases = databases
         self.signals: dict[str, SignalSummary] = {}
+        self.frames_of: dict[str, int] = {}
         self._legacy = legacy
         self._bit_rates = bit_rates or {}
         self._statistics = Statistics(self._rates)
@@ -88,15 +90,16 @@ class Contents:
         if not len(table):
             return
         log = self._decoder.add(table)
-        self._note_channels(log, table)
+        self._note_rows(log, table)
         for name, column in log.columns.items():
             if name not in self.signals:
                 self.signals[name] = SignalSummary(name.rpartition(".")[0], column.signal, column.values.dtype)
             self.signals[name].add(column)
         self._check_protection(table)
 
-    def _note_channels(self, log: DecodedLog, table: FrameTable) -> None:
+    def _note_rows(self, log: DecodedLog, table: FrameTable) -> None:
         for name, rows in log.rows.items():
+            self.frames_of[name] = self.frames_of.get(name, 0) + len(rows)
             came_on = self._channels_of.setdefault(name, set())
             if len(table.channels) == 1:
                 came_on.add(0)

@@ -6,7 +6,7 @@ import pytest
 
 from hil.cli import diff
 from hil.errors import BrakebenchError
-from hil.log.diff import pairs
+from hil.log.diff_signals import pairs
 
 DBC = """VERSION ""
 BU_: A
@@ -128,3 +128,12 @@ def test_pairs_are_one_to_one_and_near():
     assert len(np.unique(a)) == len(a) == len(np.unique(b))
     assert (np.abs(one[a] - two[b]) <= np.median(np.diff(one)) / 2).all()
     assert len(a) > 140
+
+
+def test_messages_compared_in_groups_give_the_same(compare, monkeypatch):
+    other = [*lines(SAME), *(f"({1000.001 + k / 10:.6f}) can0 002#{k:02X}\n" for k in range(5))]
+    changed = [line.replace("002#03", "002#09") for line in other]
+    whole, _ = compare(other, changed, code=1)
+    monkeypatch.setattr("hil.log.diff.VALUES_AT_ONCE", 1)
+    assert compare(other, changed, code=1)[0] == whole
+    assert whole["signals"]["N.U"]["greatest"] == 6

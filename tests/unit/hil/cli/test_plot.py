@@ -9,7 +9,8 @@ from matplotlib.image import imread
 
 from hil.cli import plot
 from hil.errors import BrakebenchError
-from hil.report.courses import Course, Courses, courses_figure
+from hil.report.courses import Course, Courses
+from hil.report.courses_page import courses_figure
 
 DBC = """VERSION ""
 BU_: A
