@@ -34,8 +34,9 @@ _CLOCK = re.compile(
 )
 _FRAME_LIKE = re.compile(rb"\s[RT]x\s")
 _DIRECTION = re.compile(rb"[RT]x", re.IGNORECASE)
+_EVENT = re.compile(rb"[A-Za-z_%/]")  # a name, an environment variable, a comment
 # An event of a channel that is no frame: "1  Statistic: ...", "1  J1939TP ...".
-_NO_FRAME = re.compile(rb"Statistic|CAN\b|Start\b|J1939TP|SV:|Log\b|Status|\w{1,40}:", re.IGNORECASE)
+_NO_FRAME = re.compile(rb"Statistic|Overload|CAN\b|Start\b|J1939TP|SV:|Log\b|Status|\w{1,40}:", re.IGNORECASE)
 _BYTE = {16: re.compile(rb"[0-9A-F]{1,2}", re.IGNORECASE), 10: re.compile(rb"\d{1,3}")}
 _ID = {16: re.compile(rb"([0-9A-F]{1,8})(x?)", re.IGNORECASE), 10: re.compile(rb"(\d{1,10})(x?)", re.IGNORECASE)}
 _LENGTH_CODE = re.compile(rb"[0-9A-F]|1[0-5]", re.IGNORECASE)
@@ -125,7 +126,7 @@ class AscParser:
         fd = words[1].upper() == b"CANFD"
         number = words[2 if fd and len(words) > 2 else 1]
         if not (number.isdigit() and len(number) <= 4):
-            if fd or not (words[1][:1].isalpha() or words[1][:1] == b"%"):
+            if fd or words[1].upper() == b"CANXL" or not _EVENT.match(words[1]):
                 return None
             measured = words[1].lower() == b"start" and words[3:4] and words[3].lower() in (b"measurement", b"messung")
             if measured and self.trigger_ns is not None and self.trigger_ns != self.start_ns:

@@ -1,6 +1,6 @@
 """The compiled pass over ASC lines: frames as CANoe, CANalyzer and python-can write them; odd lines are left."""
 
-from hil.log.compiled import HEX, NO_BYTE, NO_DIGIT, PAIRS, compiled, inlined
+from hil.log.compiled import HEX, NO_BYTE, NO_DIGIT, PAIRS, compiled, ends, inlined
 
 MAX_LINE = 4096
 MAX_NS = 4_000_000_000_000_000_000  # the sum of two of them stays below 2**63
@@ -20,12 +20,6 @@ def _blanks(buffer, p, size):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _ends(byte):  # type: ignore[no-untyped-def]
-    """Whether a byte ends a word."""
-    return byte == 32 or byte == 10 or byte == 13 or byte == 9
-
-
-@inlined
 def _is(buffer, p, size, word):  # type: ignore[no-untyped-def]
     """Whether a word stands here, and a blank or the end of the line behind it."""
     n = len(word)
@@ -34,7 +28,7 @@ def _is(buffer, p, size, word):  # type: ignore[no-untyped-def]
     for k in range(n):
         if buffer[p + k] != word[k]:
             return False
-    return _ends(buffer[p + n])
+    return ends(buffer[p + n])
 
 
 _CANFD = (67, 65, 78, 70, 68)
@@ -186,7 +180,7 @@ def take_lines(  # type: ignore[no-untyped-def]
                     elif buffer[p] != 100 or buffer[p + 1] != 32:  # d
                         break
                     code = int(HEX[buffer[p + 2]])
-                    if code == NO_DIGIT or not _ends(buffer[p + 3]):
+                    if code == NO_DIGIT or not ends(buffer[p + 3]):
                         break
                     p += 3
                     if bits & _REMOTE:
@@ -232,7 +226,7 @@ def take_lines(  # type: ignore[no-untyped-def]
                         break
                     for j in range(count, width):
                         data[n, j] = 0
-                if p >= size or not _ends(buffer[p]):
+                if p >= size or not ends(buffer[p]):
                     break
                 while p < size and (buffer[p] == 32 or buffer[p] == 9):
                     p += 1
@@ -253,7 +247,7 @@ def take_lines(  # type: ignore[no-untyped-def]
                         asc_flags = asc_flags << 4 | int(HEX[buffer[p]])
                         p += 1
                         digits += 1
-                    if digits == 0 or p >= size or not _ends(buffer[p]):
+                    if digits == 0 or p >= size or not ends(buffer[p]):
                         break
                     if asc_flags & _ASC_REMOTE:
                         if count:

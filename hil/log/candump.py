@@ -104,5 +104,5 @@ def write_candump(file: IO[bytes], tables: Iterable[FrameTable], facts: LogFacts
 
     directed = bool(facts.flags & FrameFlag.SENT)
     for table in tables:
-        names, lengths = channel_bytes(candump_names(table.channels))
-        write_rows(file, candump_rows, table, names, lengths, facts.finer_than_us, directed)
+        names, starts = channel_bytes(candump_names(table.channels))
+        write_rows(file, candump_rows, table, names, starts, facts.finer_than_us, directed)

@@ -71,3 +71,9 @@ def byte_of(buffer, p):  # type: ignore[no-untyped-def]
     """Value of two hexadecimal digits; `NO_BYTE` and more for what is none."""
     at = np.uint64(p)
     return np.int64(PAIRS[np.int64(buffer[at]) | np.int64(buffer[at + np.uint64(1)]) << 8])
+
+
+@inlined
+def ends(byte):  # type: ignore[no-untyped-def]
+    """Whether a byte ends a word: a blank, a tabulator, the end of the line."""
+    return byte == 32 or byte == 10 or byte == 13 or byte == 9

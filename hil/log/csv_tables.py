@@ -18,8 +18,8 @@ import numpy.typing as npt
 
 from hil.log.account import Account
 from hil.log.builder import FrameBuilder
-from hil.log.digits import chosen, decimal, hexadecimal, lines
 from hil.log.frames import FrameFlag, FrameTable, LogError, LogFacts
+from hil.log.line_writer import channel_bytes, write_rows
 from hil.log.lines import read_lines
 from hil.log.source import ReadOptions, Source
 
@@ -35,7 +35,6 @@ WORDS = {
     "tx": FrameFlag.SENT,
 }
 BUSES = 256  # of GVRET
-LETTERS = 1 << 24  # most letters of a piece that is written at once
 _BOM = b"\xef\xbb\xbf"
 
 _STAMP = re.compile(r"([+-]?)([0-9]{1,17})(?:\.([0-9]{0,18}))?(?:[eE]([+-]?[0-9]{1,2}))?")
@@ -261,40 +260,12 @@ def _cells(line: str) -> list[str]:
 
 def write_csv(file: IO[bytes], tables: Iterable[FrameTable], facts: LogFacts, zone: tzinfo) -> None:
     """Write our CSV; stamps have nine digits."""
+    from hil.log.line_pass import csv_rows
+
     file.write(COLUMNS.encode() + b"\n")
     for table in tables:
-        step = LETTERS // (256 + max(map(len, table.channels), default=0))  # bounds memory where names are long
-        for begin in range(0, len(table), step):
-            file.write(_text(table.take(slice(begin, begin + step))))
-
-
-def _text(table: FrameTable) -> bytes:
-    words = [" ".join(word for word, flag in WORDS.items() if flag & bits).encode() for bits in range(64)]
-    names = [_quoted(name).encode() for name in table.channels]
-    seconds, rest = np.divmod(np.abs(table.time_ns).astype(np.uint64), np.uint64(1_000_000_000))
-    shown = np.where(table.flags & FrameFlag.REMOTE, 0, table.length).astype(np.int64)
-    return lines(
-        len(table),
-        [
-            chosen([b"", b"-"], (table.time_ns < 0).astype(np.int64)),
-            decimal(seconds, 10),
-            b".",
-            decimal(rest, 9, padded=True),
-            b",",
-            chosen(names, table.channel),
-            b",",
-            decimal(table.can_id.astype(np.uint64), 9),
-            b",",
-            decimal(table.extended.astype(np.uint64), 1),
-            b",",
-            chosen(words, table.flags & 63),
-            b",",
-            decimal(table.length.astype(np.uint64), 2),
-            b",",
-            hexadecimal(table.data, shown),
-            b"\n",
-        ],
-    )
+        names, starts = channel_bytes([_quoted(name) for name in table.channels])
+        write_rows(file, csv_rows, table, names, starts, name_bytes=int(np.diff(starts).max(initial=0)))
 
 
 def _quoted(name: str) -> str:

@@ -63,10 +63,12 @@ def _zeroed(out, at, value, width):  # type: ignore[no-untyped-def]
 @inlined
 def _stamp(out, at, value, unit, digits, width):  # type: ignore[no-untyped-def]
     """A stamp in ns as decimal fraction of ``unit`` ns with ``digits`` behind the point, its integer ``width`` wide."""
-    size = abs(value)
-    whole, fraction = size // unit, size % unit
-    below, step = digits, unit
-    for _ in range(below):
+    whole, fraction, step = value // unit, value % unit, unit
+    if value < 0:  # away from zero, and never the number itself, which may have no positive counterpart
+        if fraction:
+            whole, fraction = whole + 1, unit - fraction
+        whole = -whole
+    for _ in range(digits):
         step //= 10
     fraction //= step
     if value < 0:
@@ -213,7 +215,7 @@ def trc_rows(out, columns, first, stop, numbers, start, before):  # type: ignore
 
 
 @compiled
-def candump_rows(out, columns, first, stop, names, name_lengths, fine, directed):  # type: ignore[no-untyped-def]
+def candump_rows(out, columns, first, stop, names, starts, fine, directed):  # type: ignore[no-untyped-def]
     """Lines of candump's log form."""
     times, channels, ids, wide, lengths, data, flags = columns
     at = 0
@@ -226,9 +228,9 @@ def candump_rows(out, columns, first, stop, names, name_lengths, fine, directed)
         at = _zeroed(out, at + 1, fraction, 9) if fine else _zeroed(out, at + 1, fraction // 1000, 6)
         out[at], out[at + 1] = 41, _BLANK
         at += 2
-        for k in range(name_lengths[channel]):
-            out[at + k] = names[channel, k]
-        at += name_lengths[channel]
+        for k in range(starts[channel], starts[channel + 1]):
+            out[at] = names[k]
+            at += 1
         out[at] = _BLANK
         error = bits & _ERROR
         can_id = int(ids[row]) | (0x2000_0000 if error else 0)
@@ -255,7 +257,7 @@ def candump_rows(out, columns, first, stop, names, name_lengths, fine, directed)
 
 
 @compiled
-def csv_rows(out, columns, first, stop, names, name_lengths):  # type: ignore[no-untyped-def]
+def csv_rows(out, columns, first, stop, names, starts):  # type: ignore[no-untyped-def]
     """Lines of our CSV; ``names`` are quoted where they must be."""
     times, channels, ids, wide, lengths, data, flags = columns
     at = 0
@@ -264,9 +266,9 @@ def csv_rows(out, columns, first, stop, names, name_lengths):  # type: ignore[no
         at = _stamp(out, at, times[row], 1_000_000_000, 9, 1)
         out[at] = 44
         at += 1
-        for k in range(name_lengths[channel]):
-            out[at + k] = names[channel, k]
-        at += name_lengths[channel]
+        for k in range(starts[channel], starts[channel + 1]):
+            out[at] = names[k]
+            at += 1
         out[at] = 44
         at = _padded(out, at + 1, int(ids[row]), 10, 1, _BLANK)
         out[at], out[at + 1], out[at + 2] = 44, _ZERO + int(wide[row]), 44

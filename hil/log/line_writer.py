@@ -1,6 +1,6 @@
 """Writing text logs: the start time of the header, and rows written by compiled passes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import tzinfo
 from typing import IO
 
@@ -29,13 +29,11 @@ def header_start_ns(facts: LogFacts, zone: tzinfo, unit_ns: int) -> int:
     return start_ns
 
 
-def channel_bytes(names: tuple[str, ...]) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.int64]]:
-    """Channel names as UTF-8, uint8 (k, longest), and their lengths, for a compiled pass."""
-    raw = [name.encode() for name in names] or [b""]
-    lengths = np.array([len(name) for name in raw], np.int64)
-    width = max(1, int(lengths.max()))
-    joined = b"".join(name.ljust(width, b"\0") for name in raw)
-    return np.frombuffer(joined, np.uint8).reshape(len(raw), width), lengths
+def channel_bytes(names: Sequence[str]) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.int64]]:
+    """Channel names as UTF-8, one behind the other, and where each begins (k + 1 places), for a compiled pass."""
+    raw = [name.encode() for name in names]
+    starts = np.concatenate(([0], np.cumsum([len(name) for name in raw], dtype=np.int64)))
+    return np.frombuffer(b"".join(raw) or b"\0", np.uint8), starts
 
 
 def write_rows(
@@ -44,13 +42,14 @@ def write_rows(
     """Write a table in pieces of bounded size.
 
     ``rows(out, columns, first, stop, *arguments)`` writes the lines of the rows from ``first`` to ``stop`` to the
-    buffer ``out`` and returns their bytes; no line is longer than `ROW_BYTES` and twice ``name_bytes``.
+    buffer ``out`` and returns their bytes; no line is longer than `ROW_BYTES` and ``name_bytes``, those of the longest
+    channel name.
     """
     columns = (
         table.time_ns, table.channel, table.can_id, table.extended, table.length, table.data, table.flags,
     )  # fmt: skip
     columns = tuple(np.ascontiguousarray(column) for column in columns)  # type: ignore[assignment]
-    row_bytes = ROW_BYTES + 2 * name_bytes
+    row_bytes = ROW_BYTES + name_bytes
     step = max(1, BUFFER_BYTES // row_bytes)
     out = np.empty(row_bytes * min(step, max(1, len(table))), np.uint8)
     for first in range(0, len(table), step):

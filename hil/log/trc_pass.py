@@ -1,18 +1,12 @@
 """The compiled pass over TRC lines of all versions, column by column; odd lines are left to the careful parser."""
 
-from hil.log.compiled import HEX, NO_BYTE, NO_DIGIT, PAIRS, compiled, inlined
+from hil.log.compiled import HEX, NO_BYTE, NO_DIGIT, PAIRS, compiled, ends
 
 MAX_LINE = 4096
 _MAX_MS = 4_000_000_000_000
 _MAX_STANDARD, _MAX_EXTENDED = 0x7FF, 0x1FFF_FFFF
 _REMOTE, _ERROR, _FD, _SWITCH, _STATE, _SENT = 1, 2, 4, 8, 16, 32
 _N, _O, _T, _B, _I, _D_SMALL, _R, _L_SMALL, _L, _D = 78, 79, 84, 66, 73, 100, 82, 108, 76, 68
-
-
-@inlined
-def _ends(byte):  # type: ignore[no-untyped-def]
-    """Whether a byte ends a word."""
-    return byte == 32 or byte == 10 or byte == 13 or byte == 9
 
 
 @compiled
@@ -104,7 +98,7 @@ def take_lines(buffer, begin, letters, numbers, origin, names, name_lengths, col
                     sound = False
             else:
                 sound = False
-            if not sound or p >= size or not _ends(buffer[p]):
+            if not sound or p >= size or not ends(buffer[p]):
                 sound = False
                 break
         if not sound or numbers[bus] < 0 or (not bits & _FD and count > 15):

@@ -102,6 +102,7 @@ def test_each_kind_of_line(read, line, expected):
         "0.1 CANFD 1 Rx 123 2 0 2 2 11 22" + TAIL.format(flags=0),
         "0.1 CANFD 1 Rx",
         "0.1 CANFD x",
+        "0.1 CANXL   2 Rx   CBFF   243215   176      432  msgCanCCTest1 2 2 e1 89 f1 174 00000000 00000000",
         "0.1",
         "\0\1\2",
         "1" * 4000,
@@ -126,6 +127,9 @@ Begin Triggerblock Tue Nov 14 10:13:20.123 pm 2023
    0.2 1 J1939TP FEE3p 6 0 0 - Rx d 23 A0 0F A6 60
    1.1 L1 30 Tx 6 00 00 00 00 00 00 checksum = 70
    1.2 SV: 2 0 1 ::Variable = 1
+   1.2 _variable := 1
+   1.2 // a comment
+   1.2 1  OverloadFrame
    1.3 1  123             TxRq d 1 01
    1.4 CANFD 1 TxRq 123 1 0 1 1 01
 End TriggerBlock
@@ -133,7 +137,7 @@ End TriggerBlock
 """
     log, account = read(HEAD + lines)
     assert (len(log.frames), account.rejected, account.truncated_at) == (0, 0, None)
-    assert account.passed_over == {"TxRq": 2, "event": 6}
+    assert account.passed_over == {"TxRq": 2, "event": 9}
 
 
 def test_relative_stamps_count_from_the_line_before(read):
