@@ -144,7 +144,7 @@ def unsorted_frames(
     compiled : whether the scan for records is compiled; None compiles it for all but small files.
     """
     reader = _Scanner(mdf, data, share, account, compiled)
-    order = Reordering(max(share.rows, 4)) if len(reader.parts) > 1 else None
+    order = Reordering(share.waiting) if len(reader.parts) > 1 else None
     for last in reader.steps():
         for k, part in reader.parts.items():
             table = part.frames(last)
