@@ -254,7 +254,7 @@ class _Scanner:
             firsts = np.append(begins - id_bytes, at)  # of the records, ascending
             starts = self.stream.starts_between(position, position + at) - position
             self.aligned = bool((firsts[np.searchsorted(firsts, starts)] == starts).all())
-        return at, why
+        return int(at), int(why)
 
     def _behind(self, shown: Bytes, first: int, low: int, have: int) -> int:
         """Where to go on behind an id that no group has: at the next block of data, if blocks begin with a record."""

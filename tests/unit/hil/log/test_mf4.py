@@ -609,9 +609,10 @@ ALL_OPEN = 0x1 | 0x4 | 0x10 | 0x20
 
 @pytest.mark.parametrize("stated", [0, 24, 24 + 46])
 @pytest.mark.parametrize("rest", [0, 5])
-def test_an_open_block_reaches_to_the_end(read, stated, rest):
+@pytest.mark.parametrize("flags", [ALL_OPEN, 0])
+def test_an_open_block_reaches_to_the_end(read, stated, rest, flags):
     made = plain(20)
-    file, link = simple(made, unfinalised=ALL_OPEN)
+    file, link = simple(made, unfinalised=flags)
     content = b"".join(records(made))
     file.patch(link, file.block(b"DT", (), content + bytes(range(1, rest + 1)), stated))
     cycles = bytes(file).index(b"##CG") + 24 + 48 + 8
