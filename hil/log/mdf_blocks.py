@@ -14,7 +14,19 @@ from fractions import Fraction
 from typing import IO
 
 from hil.log.account import Account
-from hil.log.mdf_layout import CG_REMOTE_MASTER, KINDS, MASTER, OTHER_BUSES, VIRTUAL_MASTER, DataGroup, Group, Member
+from hil.log.mdf_layout import (
+    CG_REMOTE_MASTER,
+    CYCLES_OPEN,
+    KINDS,
+    LENGTH_OPEN,
+    LIST_OPEN,
+    MASTER,
+    OTHER_BUSES,
+    VIRTUAL_MASTER,
+    DataGroup,
+    Group,
+    Member,
+)
 
 HEADER = struct.Struct("<4s4xQQ")  # identifier, length, number of links
 MAX_NAME_BYTES = 64  # of a name that is looked at
@@ -77,7 +89,8 @@ class MdfFile:
         self.finalised = not head.startswith(b"UnFin")
         (version,) = struct.unpack_from("<H", head, 28)
         self.version = version or 400
-        self.unfinalised = 0 if self.finalised else struct.unpack_from("<H", head, 60)[0]
+        (left_open,) = struct.unpack_from("<H", head, 60)
+        self.unfinalised = 0 if self.finalised else left_open or CYCLES_OPEN | LENGTH_OPEN | LIST_OPEN
         self.start_ns = 0
         self.local_start = False
         self.groups: list[DataGroup] = []

@@ -103,7 +103,7 @@ class DataStream:
         if k < 0:
             return self._where[0][0] if self._where else 0
         offset, packed = self._where[k]
-        return offset if packed else offset + position - self._starts[k]
+        return int(offset if packed else offset + position - self._starts[k])
 
     def offsets_of(self, positions: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
         """As `offset_of`, for many."""

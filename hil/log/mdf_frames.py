@@ -50,14 +50,15 @@ class _Kind:
         self.remote = bool(kind & FrameFlag.REMOTE)
         name = KINDS[1 if self.remote else 2 if kind else 0]
         self.width = 0 if self.remote else width
-        layout: list[Any] = [("time", "<i8"), ("BusChannel", "u1"), ("ID", "<u4")]
+        # one byte is left free: mdfr 0.7.3 does not see a member that begins where the whole frame does
+        layout: list[Any] = [("time", "<i8"), ("free", "u1"), ("BusChannel", "u1"), ("ID", "<u4")]
         layout += [(member, "u1") for member in ("IDE", "DLC", "DataLength", "Dir", "EDL", "BRS", "ESI")]
         if not self.remote:
             layout.append(("DataBytes", "u1", (width,)))
         self.dtype = np.dtype(layout)
         members = []
         for member, place in (self.dtype.fields or {}).items():
-            if member != "time":
+            if member not in ("time", "free"):
                 kind_of_bits = BYTES if member == "DataBytes" else UNSIGNED
                 bits = 8 * place[0].itemsize
                 members.append(Channel(f"{name}.{member}", kind_of_bits, place[1], bits, flags=BUS_EVENT))

@@ -18,10 +18,18 @@ from hil.log.mdf_values import SignalData
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """What one of several groups that are read side by side may keep in memory: records, and bytes."""
+    """What one of several data groups that are read side by side may keep in memory.
+
+    Attributes
+    ----------
+    rows : records that become frames at once.
+    size : bytes of records, and of values of variable length.
+    waiting : frames of an unsorted group that wait for earlier ones.
+    """
 
     rows: int
     size: int
+    waiting: int
 
     def records(self, stride: int) -> int:
         """Records of one block."""

@@ -144,7 +144,7 @@ def unsorted_frames(
     compiled : whether the scan for records is compiled; None compiles it for all but small files.
     """
     reader = _Scanner(mdf, data, share, account, compiled)
-    order = Reordering(max(share.rows, 4)) if len(reader.parts) > 1 else None
+    order = Reordering(share.waiting) if len(reader.parts) > 1 else None
     for last in reader.steps():
         for k, part in reader.parts.items():
             table = part.frames(last)
@@ -254,7 +254,7 @@ class _Scanner:
             firsts = np.append(begins - id_bytes, at)  # of the records, ascending
             starts = self.stream.starts_between(position, position + at) - position
             self.aligned = bool((firsts[np.searchsorted(firsts, starts)] == starts).all())
-        return at, why
+        return int(at), int(why)
 
     def _behind(self, shown: Bytes, first: int, low: int, have: int) -> int:
         """Where to go on behind an id that no group has: at the next block of data, if blocks begin with a record."""

@@ -58,11 +58,11 @@ def read_mf4(source: Source, account: Account, options: ReadOptions) -> Iterator
     if mdf.cut:
         account.cut_at(size)
     channels = Channels()
-    tables = merged(_readers(mdf, found, account, options), _share(found).rows)
+    tables = (table for table in merged(_readers(mdf, found, account, options), _share(found).rows) if len(table))
     first = next(tables, None)
     if first is None:
         return
-    channels.first = 0 if len(first) and int(first.channel.min()) == 0 else 1
+    channels.first = min(1, int(first.channel.min()))
     if not channels.first:
         account.note("its bus channels count from 0")
     yield channels.numbered(first)
@@ -102,7 +102,8 @@ def _groups_of_frames(mdf: MdfFile, source: Source, account: Account) -> list[tu
 
 def _share(found: list[tuple[DataGroup, list[Group]]]) -> Share:
     rows, size = MERGED_ROWS // len(found), HELD_BYTES // len(found)
-    return Share(max(LEAST_ROWS, min(BLOCK_ROWS, rows)), max(LEAST_BYTES, min(STORE_BYTES, size)))
+    rows = max(LEAST_ROWS, rows)
+    return Share(min(BLOCK_ROWS, rows), max(LEAST_BYTES, min(STORE_BYTES, size)), rows)
 
 
 def _readers(

@@ -311,6 +311,20 @@ def test_unsorted_groups_with_values_in_a_group_of_their_own(read, id_bytes, com
     assert rows(frames) == made
 
 
+def test_asammdf_agrees_on_an_unsorted_file(tmp_path, read):
+    import asammdf
+
+    file, _ = unsorted(n=60)
+    (tmp_path / "u.mf4").write_bytes(bytes(file))
+    _, frames = read(tmp_path / "u.mf4")
+    frames = of_kind(frames, 0)
+    with asammdf.MDF(tmp_path / "u.mf4") as mdf:
+        theirs = mdf.get("CAN_DataFrame")
+        np.testing.assert_array_equal(theirs["CAN_DataFrame.ID"], frames.can_id)
+        np.testing.assert_array_equal(theirs["CAN_DataFrame.DataBytes"], frames.data)
+        np.testing.assert_allclose(theirs.timestamps * 1e9, frames.time_ns - START, atol=1)
+
+
 def unsorted(id_bytes=1, piece=None, unfinalised=None, offsets=True, n=300, way="plain"):
     """Data frames whose values stand in a group of their own, remote frames and LIN, all in one stream."""
     made, remote = plain(n, 64), plain(n // 3, seed=5)
@@ -318,7 +332,7 @@ def unsorted(id_bytes=1, piece=None, unfinalised=None, offsets=True, n=300, way=
     open_end = unfinalised is not None
     groups = [
         Cg([time(), frame(payload="vlsd")], 23, 0 if open_end else len(made), 1),
-        Cg([], 0, 0 if open_end else len(made), 2, flags=1),
+        Cg([], 0 if open_end else sum(4 + len(row[-1]) for row in made), 0 if open_end else len(made), 2, flags=1),
         Cg([time(), frame("CAN_RemoteFrame", payload="none", prefix=False)], 15, 0 if open_end else len(remote), 200),
         Cg([time(), Cn("LIN_Frame", 8, 0, 8)], 9, 0 if open_end else 10, 7),
     ]
@@ -595,9 +609,10 @@ ALL_OPEN = 0x1 | 0x4 | 0x10 | 0x20
 
 @pytest.mark.parametrize("stated", [0, 24, 24 + 46])
 @pytest.mark.parametrize("rest", [0, 5])
-def test_an_open_block_reaches_to_the_end(read, stated, rest):
+@pytest.mark.parametrize("flags", [ALL_OPEN, 0])
+def test_an_open_block_reaches_to_the_end(read, stated, rest, flags):
     made = plain(20)
-    file, link = simple(made, unfinalised=ALL_OPEN)
+    file, link = simple(made, unfinalised=flags)
     content = b"".join(records(made))
     file.patch(link, file.block(b"DT", (), content + bytes(range(1, rest + 1)), stated))
     cycles = bytes(file).index(b"##CG") + 24 + 48 + 8
