@@ -63,9 +63,9 @@ class _StreamValues:
         if self.in_order:
             self.starts = np.concatenate((self.starts, first + target))
 
-    def ready(self, offsets: npt.NDArray[np.uint64], last: bool) -> int:
-        """How many of the records in a row have their values."""
-        if last or self.broken:
+    def ready(self, offsets: npt.NDArray[np.uint64]) -> int:
+        """How many of the records in a row wait for their values no longer."""
+        if self.broken:
             return len(offsets)
         if self.in_order:
             return min(len(offsets), len(self.starts))
@@ -124,8 +124,11 @@ class _Part:
         n = len(self.records)
         if isinstance(self.values, _StreamValues) and n:
             assert self.layout.data is not None
-            last = last or n * self.layout.size > self.values.window.most
-            n = self.values.ready(unsigned(self.records, self.layout.data).astype(np.uint64), last)
+            ready = self.values.ready(unsigned(self.records, self.layout.data).astype(np.uint64))
+            if last and ready < n:
+                self.layout.account.cut_at(int(self.offsets[ready]))
+            elif n * self.layout.size <= self.values.window.most:
+                n = ready
         if not n:
             return None
         records, where = self.records[:n], self.offsets
@@ -234,13 +237,13 @@ class _Scanner:
                     low = self._behind(buffer[:32], first, 0, have)
             elif not got:
                 break
-        end = stream.position - (have - low)
-        if low < have:
-            self.account.reject(stream.offset_of(end), buffer[low : min(have, low + 32)].tobytes().hex())
-            self.account.cut_at(stream.offset_of(end))
-        elif stream.cut:
-            self.account.cut_at(self.mdf.size)
+        end = stream.offset_of(stream.position - (have - low))
+        rest = buffer[low : min(have, low + 32)].tobytes()
+        if rest and not self._is_value(rest):  # the frame that waits for a value is the one to be rejected
+            self.account.reject(end, rest.hex())
         yield True
+        if rest or stream.cut:
+            self.account.cut_at(end if rest else self.mdf.size)
         self._close()
 
     def _scan(self, held: Bytes, position: int) -> tuple[int, int]:
@@ -270,6 +273,10 @@ class _Scanner:
             return int(starts[0]) - first
         stream.next_block()
         return have
+
+    def _is_value(self, record: bytes) -> bool:
+        ident = int.from_bytes(record[: self.data.id_bytes], "little")
+        return any(self.groups[k].record_id == ident for k in self.values)
 
     def _lose(self) -> None:
         """Bytes of the stream are lost: offsets of values no longer tell where these are."""

@@ -658,10 +658,13 @@ def test_an_unfinalised_unsorted_file(read, offsets, compiled, monkeypatch):
     account, frames = read(file, fast=compiled)
     assert account.whole
     assert rows(frames) == made
-    account, frames = read(bytes(file)[:-3], fast=compiled)
-    assert account.truncated_at is not None
-    assert rows(frames) == [row for row in made if row in set(rows(frames))]
-    assert len(made) - len(frames) <= 2
+    whole = bytes(file)
+    last = whole.rindex(b"\1" + struct.pack("<d", (made[-1][0] - START) / 1e9))  # the last frame, then its value
+    size = len(made[-1][-1])
+    for cut in (1, size, size + 2, size + 4, size + 5, size + 5 + 20):
+        account, frames = read(whole[:-cut], fast=compiled)
+        assert (account.rejected, account.truncated_at) == (1, last)
+        assert rows(frames) == made[:-1]
 
 
 # -- damage ----------------------------------------------------------------------------------------------------------
