@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from hil.cli.columns import terminal_width
@@ -80,6 +81,9 @@ def run(args: argparse.Namespace) -> int:
             contents.add(table)
         summary = contents.summary()
         _check_found(logs, choice, summary)
+        if summary.backwards is not None and not choice.of_frames:
+            line = logs.line_of(summary.backwards.frame - 1)
+            summary = replace(summary, backwards=replace(summary.backwards, line=line))
         rows = None
         if args.out and (summary.frames or logs.whole):
             progress.part(1, "writing")

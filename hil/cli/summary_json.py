@@ -95,7 +95,9 @@ def _part(part: Part) -> dict[str, Any]:
 
 
 def _back(back: Backwards | None) -> dict[str, Any] | None:
-    return None if back is None else {"count": back.count, "first_frame": back.frame, "first_ns": back.time_ns}
+    if back is None:
+        return None
+    return {"count": back.count, "first_frame": back.frame, "first_line": back.line, "first_ns": back.time_ns}
 
 
 def _channel(one: ChannelSummary) -> dict[str, Any]:

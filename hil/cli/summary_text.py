@@ -141,8 +141,9 @@ def _notes(logs: Logs, contents: Contents, counts: DecodedCounts, summary: Summa
     back = summary.backwards
     if back is not None:
         where = _seconds(back.time_ns - summary.began_ns)
+        line = "" if back.line is None else f" (line {back.line:,})"
         yield (
-            f"stamps run back {_count(back.count, 'time')}, first at frame {back.frame:,}, "
+            f"stamps run back {_count(back.count, 'time')}, first at frame {back.frame:,}{line}, "
             f"which is stamped {where} s after the first one"
         )
     yield from _protection(contents)

@@ -29,6 +29,8 @@ class Account:
     start_ns : start time that the log states, ns since 1970; None where it states none.
     local_start : the start time is a wall clock without a zone, read in the zone that was chosen.
     notes : what else the reader should know.
+    wanted_frame, wanted_end : number of a frame (from 0), asked for before the reading; the offset behind its line in a
+        text log.
     """
 
     rejected: int = 0
@@ -38,6 +40,8 @@ class Account:
     start_ns: int | None = None
     local_start: bool = False
     notes: list[str] = field(default_factory=list)
+    wanted_frame: int | None = None
+    wanted_end: int | None = None
 
     @property
     def whole(self) -> bool:

@@ -75,6 +75,12 @@ class FrameBuilder:
                 self.name_lengths = np.append(self.name_lengths, len(raw))
         return number
 
+    def limit(self, rows: int) -> None:
+        """Have the table that begins now end after ``rows`` frames at most."""
+        if rows < self.rows and not self.n:
+            self.rows = rows
+            self.columns = self._fresh()
+
     def widen(self) -> None:
         """Make room for CAN FD frames of more than 8 bytes."""
         if self.width < 64:

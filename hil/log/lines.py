@@ -44,6 +44,8 @@ def read_lines(source: Source, account: Account, parser: LineParser, fast: bool 
     fast : False never uses the compiled pass, True always; None uses it for all but small logs.
     """
     builder = FrameBuilder(account)
+    end_at = 0  # of what was taken, in the log
+    taken = _limited(builder, account, 0)
     left = wait = 0  # calls of the compiled pass that took nothing, one after the other; lines to go before the next
     for offset, block in _blocks(source, account):
         end = block.rfind(b"\n") + 1
@@ -52,7 +54,10 @@ def read_lines(source: Source, account: Account, parser: LineParser, fast: bool 
         at = 0
         while at < len(block):
             if builder.full:
+                if account.wanted_frame == taken + builder.n - 1:
+                    account.wanted_end = offset + at
                 yield builder.take()
+                taken = _limited(builder, account, taken + builder.rows)
             if compiled and at < end and not wait:
                 begin, at = at, parser.take(buffer, at, builder)
                 left = left + 1 if at == begin else 0
@@ -71,7 +76,17 @@ def read_lines(source: Source, account: Account, parser: LineParser, fast: bool 
                     account.cut_at(offset + at)
                 break
             at = stop + 1
+        end_at = offset + len(block)
+    if account.wanted_frame == taken + builder.n - 1:
+        account.wanted_end = end_at
     yield builder.take()
+
+
+def _limited(builder: FrameBuilder, account: Account, taken: int) -> int:
+    """Have the next table end with the frame whose line is asked for; ``taken`` frames were handed on."""
+    if account.wanted_frame is not None and taken <= account.wanted_frame:
+        builder.limit(account.wanted_frame + 1 - taken)
+    return taken
 
 
 def _blocks(source: Source, account: Account) -> Iterator[tuple[int, bytes]]:

@@ -6,7 +6,7 @@ from typing import Self
 
 from dbc.database import Database
 from hil.log.account import Account
-from hil.log.builder import recording_of
+from hil.log.builder import ROWS, recording_of
 from hil.log.decode import DecodedLog, decode_log
 from hil.log.formats import BY_NAME, format_of, told
 from hil.log.frames import FrameTable, Recording
@@ -69,6 +69,23 @@ class Log:
             yield table
         if self.account.local_start:
             self.account.note(f"start time taken as {self.options.timezone} (the log names no zone)")
+
+    def line_of(self, frame: int) -> int | None:
+        """Line (from 1) of a text log that holds a frame, counted from 0; None in a log that has no lines."""
+        account = Account(wanted_frame=frame)
+        self.source.rewind(account)
+        seen = 0
+        for table in self.format.read(self.source, account, self.options):
+            seen += len(table)
+            if account.wanted_end is not None or seen > frame + ROWS:
+                break
+        if account.wanted_end is None:
+            return None
+        self.source.rewind(Account())
+        left, lines, last = account.wanted_end, 0, b""
+        while left and (part := self.source.read(min(left, 1 << 20))):
+            left, lines, last = left - len(part), lines + part.count(b"\n"), part
+        return lines if last.endswith(b"\n") else lines + 1
 
     def recording(self) -> Recording:
         """All frames, with the account."""

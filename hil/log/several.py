@@ -139,6 +139,17 @@ class Logs:
         self.channels = tuple(numbers)
         yield FrameTable.empty(channels=self.channels)
 
+    def line_of(self, frame: int) -> int | None:
+        """Line of a frame, as `hil.log.read.Log.line_of`; None where several logs are read."""
+        if len(self.parts) > 1:
+            return None
+        path = self.parts[0].path
+        kept = self._kept.get(path)
+        if kept is not None:
+            return kept.line_of(frame)
+        with open_log(path, options=self.options, limit_bytes=self.limit_bytes) as log:
+            return log.line_of(frame)
+
     def _tables(self, part: Part, progress: Progress | None) -> Iterator[FrameTable]:
         kept = self._kept.get(part.path)
         log = kept or open_log(part.path, options=self.options, limit_bytes=self.limit_bytes)

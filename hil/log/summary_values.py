@@ -34,11 +34,13 @@ class Backwards:
     count : how many.
     frame : number of the first such frame in the log, from 1.
     time_ns : its stamp.
+    line : its line in a text log, from 1; None where it was not looked for, and in logs without lines.
     """
 
     count: int
     frame: int
     time_ns: int
+    line: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

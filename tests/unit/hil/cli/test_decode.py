@@ -335,3 +335,12 @@ def test_progress_tells_the_remaining_time_on_a_terminal_only(monkeypatch):
         shown = stream.getvalue()
         assert shown == ("" if not stream.isatty() else "\rreading   25 %, 30 s left\r" + " " * 25 + "\r")
     assert [duration_text(s) for s in (45, 185, 7800)] == ["45 s", "3 min 05 s", "2 h 10 min"]
+
+
+def test_the_line_of_a_stamp_that_runs_back_is_named(tmp_path, dbc, capsys):
+    lines = ["(1.0) can0 001#0101", "bad", "(3.0) can0 001#0101", "", "(2.0) can0 001#0101"]
+    (tmp_path / "back.log").write_text("\n".join(lines))
+    assert run(tmp_path / "back.log", "--dbc", dbc) == 1
+    assert "stamps run back 1 time, first at frame 3 (line 5)" in capsys.readouterr().out
+    run(tmp_path / "back.log", "--dbc", dbc, "--json")
+    assert json.loads(capsys.readouterr().out)["stamps_back"]["first_line"] == 5
