@@ -818,7 +818,7 @@ def test_a_damaged_record_of_an_unsorted_stream_costs_the_rest_of_its_block(read
 def test_groups_that_share_a_record_id_or_have_records_of_no_bytes_are_said(read):
     raw, _ = two_groups(10, 10)
     at = raw.rindex(b"##CG") + 24 + 48
-    for field, value in ((0, 1), (24, 0)):  # record id, bytes of a record
+    for field, value in ((0, 2), (24, 0)):  # record id, bytes of a record
         damaged = bytearray(raw)
         struct.pack_into("<Q", damaged, at + field, value)
         account, _ = read(damaged)
