@@ -171,9 +171,10 @@ class _Scanner:
         self.compiled = mdf.size > FEW_BYTES if compiled is None else compiled
         self.parts: dict[int, _Part] = {}
         self.values: dict[int, _StreamValues] = {}
-        groups = sorted({group.record_id: group for group in data.groups}.values(), key=lambda g: g.record_id)
+        by_id = {group.record_id: group for group in data.groups if group.vlsd or group.data_bytes + group.inval_bytes}
+        groups = sorted(by_id.values(), key=lambda g: g.record_id)
         if len(groups) < len(data.groups):
-            account.reject(data.address, "several groups have one record id")
+            account.reject(data.address, "several groups have one record id, or records of no bytes")
         self.groups = groups
         in_order = bool(mdf.unfinalised & VLSD_OFFSETS_OPEN)
         by_address = {group.address: k for k, group in enumerate(groups) if group.vlsd}

@@ -815,6 +815,16 @@ def test_a_damaged_record_of_an_unsorted_stream_costs_the_rest_of_its_block(read
     assert "no record: 63" in account.first_rejected[0].text
 
 
+def test_groups_that_share_a_record_id_or_have_records_of_no_bytes_are_said(read):
+    raw, _ = two_groups(10, 10)
+    at = raw.rindex(b"##CG") + 24 + 48
+    for field, value in ((0, 2), (24, 0)):  # record id, bytes of a record
+        damaged = bytearray(raw)
+        struct.pack_into("<Q", damaged, at + field, value)
+        account, _ = read(damaged)
+        assert any("records of no bytes" in piece.text for piece in account.first_rejected)
+
+
 def test_where_records_cross_blocks_all_behind_a_damaged_one_are_lost(read):
     raw, blocks = two_groups(100, 10, aligned=False)
     raw[blocks[3] + 3 + 24 * 4] = 99
