@@ -12,9 +12,9 @@ from dbc.bench_messages import ManoeuvreState
 from dbc.contract import contract
 from dbc.frame import BusName, LinkEvent
 from hil.bench.recorder import recorded_events
-from hil.log.decode import DecodedLog, decode_log, own_databases
 from hil.log.frames import FrameFlag, Recording
 from hil.log.read import read_log
+from hil.log.signals.decode import DecodedLog, decode_log, own_databases
 
 Floats = NDArray[np.float64]
 

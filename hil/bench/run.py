@@ -16,7 +16,7 @@ from hil.bench.real import RealBench
 from hil.bench.result import RunResult, Signals, measure
 from hil.bench.run_report import build_report
 from hil.bench.virtual import VirtualBench
-from hil.log.export import export
+from hil.log.export.tables import export
 from hil.report.figure import write_figure
 from hil.report.html import write_html
 from hil.report.report import Number, Report, Verdict

@@ -23,12 +23,12 @@ from hil.cli.summary_json import summary_values
 from hil.cli.summary_text import summary_lines
 from hil.errors import BrakebenchError
 from hil.log.account import printable
-from hil.log.blocks import Block, Field, Layout, blocks_of
 from hil.log.choice import Choice, Moment
-from hil.log.contents import Contents
+from hil.log.export.blocks import Block, Field, Layout, blocks_of
 from hil.log.several import Logs
 from hil.log.source import ReadOptions
-from hil.log.summary_values import Summary
+from hil.log.summary.contents import Contents
+from hil.log.summary.values import Summary
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -109,7 +109,7 @@ def _check_out(args: argparse.Namespace) -> None:
     if args.limit_mb is not None and not 0 < args.limit_mb < 1e9:
         raise BrakebenchError("--limit-mb takes a number above 0")
     if args.out:
-        from hil.log.export_messages import check_target
+        from hil.log.export.messages import check_target
 
         check_target(args.out)
         if Path(args.out).exists() and not args.force:
@@ -134,8 +134,8 @@ def _check_found(logs: Logs, choice: Choice, summary: Summary) -> None:
 def _write(
     args: argparse.Namespace, blocks: Iterable[Block], contents: Contents, summary: Summary, read: list[Path]
 ) -> int:
-    from hil.log.export_messages import write_signals
-    from hil.log.resample import resampled
+    from hil.log.export.messages import write_signals
+    from hil.log.export.resample import resampled
 
     fields = tuple(Field(one.message, one.signal, one.dtype) for one in contents.signals.values())
     several = contents.counts.several_channels and args.resample is None

@@ -14,8 +14,8 @@ from hil.cli.log_options import LOGS, add_databases, add_timezone, databases, wo
 from hil.cli.progress import Progress
 from hil.errors import BrakebenchError
 from hil.log.choice import Choice
-from hil.log.diff import LogDifference, Tolerance, diff_logs
-from hil.log.diff_signals import SignalDifference
+from hil.log.compare.diff import LogDifference, Tolerance, diff_logs
+from hil.log.compare.diff_signals import SignalDifference
 from hil.log.several import Logs
 from hil.log.source import ReadOptions
 

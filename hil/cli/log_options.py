@@ -9,10 +9,10 @@ from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from dbc.database import Database
 from hil.errors import BrakebenchError
-from hil.log.database_files import read_database
-from hil.log.databases import Databases
+from hil.log.foreign.database_files import read_database
+from hil.log.signals.databases import Databases
 from hil.log.source import STDIN
-from hil.log.summary import BitRates
+from hil.log.summary.summary import BitRates
 
 LOGS = "a log (candump, ASC, BLF, TRC, MF4, CSV, pcap, Parquet; also packed with gzip); - is standard input"
 ZONE = "zone of wall clocks that name none: an IANA name (Asia/Tokyo), UTC or local (default: UTC)"

@@ -16,10 +16,10 @@ from hil.cli.progress import Progress
 from hil.errors import BrakebenchError
 from hil.log.atomic_write import atomic_write
 from hil.log.choice import Choice, Moment, matches
-from hil.log.decode import Decoder
-from hil.log.decoded import Column, Values
 from hil.log.frames import FrameTable
 from hil.log.several import UNDATED_NS, Logs
+from hil.log.signals.decode import Decoder
+from hil.log.signals.decoded import Column, Values
 from hil.log.source import ReadOptions
 from hil.log.wall_clock import wall_clock_of
 from hil.report.courses import Course, Courses

@@ -3,11 +3,11 @@
 import math
 from typing import Any
 
-from hil.log.contents import Contents, SignalSummary
-from hil.log.decode import NOT_A_FRAME
-from hil.log.decoded import SignalCount, TransportCount
 from hil.log.several import Logs, Part
-from hil.log.summary_values import Backwards, ChannelSummary, IdSummary, Summary
+from hil.log.signals.decode import NOT_A_FRAME
+from hil.log.signals.decoded import SignalCount, TransportCount
+from hil.log.summary.contents import Contents, SignalSummary
+from hil.log.summary.values import Backwards, ChannelSummary, IdSummary, Summary
 
 
 def summary_values(logs: Logs, contents: Contents, summary: Summary, warnings: tuple[str, ...]) -> dict[str, Any]:

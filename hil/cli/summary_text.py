@@ -4,11 +4,11 @@ from collections.abc import Iterator
 from datetime import tzinfo
 
 from hil.cli.columns import columns, wrapped
-from hil.log.contents import Contents, SignalSummary
-from hil.log.decode import NOT_A_FRAME
-from hil.log.decoded import DecodedCounts, SignalCount
 from hil.log.several import UNDATED_NS, Logs, Part
-from hil.log.summary_values import ChannelSummary, Cycle, IdSummary, Summary
+from hil.log.signals.decode import NOT_A_FRAME
+from hil.log.signals.decoded import DecodedCounts, SignalCount
+from hil.log.summary.contents import Contents, SignalSummary
+from hil.log.summary.values import ChannelSummary, Cycle, IdSummary, Summary
 from hil.log.wall_clock import wall_clock_of
 
 SHOWN = 10  # of each kind of note

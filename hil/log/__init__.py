@@ -10,9 +10,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from hil.log.decode import DecodedLog, Decoder, decode_log
     from hil.log.frames import FrameFlag, FrameTable, LogError, Recording
     from hil.log.read import Log, log_format, open_log, read_log
+    from hil.log.signals.decode import DecodedLog, Decoder, decode_log
 
 _MODULES = {
     "DecodedLog": "decode", "Decoder": "decode", "decode_log": "decode",

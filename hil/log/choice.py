@@ -9,8 +9,8 @@ from fnmatch import fnmatchcase
 import numpy as np
 
 from hil.errors import BrakebenchError
-from hil.log.databases import Databases
 from hil.log.frames import FrameTable
+from hil.log.signals.databases import Databases
 from hil.log.wall_clock import wall_clock_ns
 
 MOST_NS = 2**63 - 1

@@ -27,7 +27,7 @@ class Format:
 
     Attributes
     ----------
-    name : as it is called; the module ``hil.log.<module>`` has ``read_<name>`` and, where `writable`, ``write_<name>``.
+    name, module : as it is called; ``hil.log.<module>`` has ``read_<name>`` and, where `writable`, ``write_<name>``.
     suffixes : of its files; the first one names it when a log is written.
     told_by : score of the first bytes of a file; the format with the highest score above 0 is the file's.
     resolution_ns : stamps are kept to this.
@@ -39,9 +39,9 @@ class Format:
     """
 
     name: str
+    module: str
     suffixes: tuple[str, ...]
     told_by: Callable[[bytes], int]
-    module: str = ""
     writable: bool = True
     resolution_ns: int = 1
     channel_names: bool = False
@@ -63,7 +63,7 @@ class Format:
         writer(file, tables, facts, zone)
 
     def _module(self) -> object:
-        return importlib.import_module(f"hil.log.{self.module or self.name}")
+        return importlib.import_module(f"hil.log.{self.module}")
 
 
 BINARY = 1_000_000  # score of a signature
@@ -95,19 +95,21 @@ _PYTHON_CAN = rb"timestamp,arbitration_id,extended,remote,error,dlc,data"
 _GVRET = rb"Time Stamp,ID,Extended,(?:Dir,)?Bus,LEN"
 
 FORMATS = (
-    Format("candump", (".log",), _lines(_CANDUMP), channel_names=True, start_time=False, before_start=False),
-    Format("candump_screen", (), _lines(_SCREEN), writable=False),
-    Format("asc", (".asc",), _lines(_ASC, 2), error_content=False),
-    Format("blf", (".blf",), _begins(b"LOGG")),
-    Format("trc", (".trc",), _lines(_TRC), resolution_ns=1000, error_content=False),
-    Format("mf4", (".mf4", ".mdf"), _begins(b"MDF ", b"UnFinMF ")),
-    Format("csv", (".csv",), _first_line(_CSV), "csv_tables", channel_names=True, start_time=False),
-    Format("python_can_csv", (), _first_line(_PYTHON_CAN), "csv_tables", writable=False),
-    Format("gvret", (), _first_line(_GVRET), "csv_tables", writable=False),
-    Format("busmaster", (), _first_line(rb"\*{3}\s*BUSMASTER"), writable=False),
-    Format("pcap", (".pcap",), _begins(*_PCAP), writable=False),
-    Format("pcapng", (".pcapng",), _begins(b"\x0a\x0d\x0d\x0a"), "pcap", channel_names=True, start_time=False),
-    Format("parquet", (".parquet",), _begins(b"PAR1"), channel_names=True),
+    Format(
+        "candump", "text.candump", (".log",), _lines(_CANDUMP), channel_names=True, start_time=False, before_start=False
+    ),
+    Format("candump_screen", "text.candump_screen", (), _lines(_SCREEN), writable=False),
+    Format("asc", "text.asc", (".asc",), _lines(_ASC, 2), error_content=False),
+    Format("blf", "blf.blf", (".blf",), _begins(b"LOGG")),
+    Format("trc", "text.trc", (".trc",), _lines(_TRC), resolution_ns=1000, error_content=False),
+    Format("mf4", "mf4.mf4", (".mf4", ".mdf"), _begins(b"MDF ", b"UnFinMF ")),
+    Format("csv", "text.csv_tables", (".csv",), _first_line(_CSV), channel_names=True, start_time=False),
+    Format("python_can_csv", "text.csv_tables", (), _first_line(_PYTHON_CAN), writable=False),
+    Format("gvret", "text.csv_tables", (), _first_line(_GVRET), writable=False),
+    Format("busmaster", "text.busmaster", (), _first_line(rb"\*{3}\s*BUSMASTER"), writable=False),
+    Format("pcap", "capture.pcap", (".pcap",), _begins(*_PCAP), writable=False),
+    Format("pcapng", "capture.pcap", (".pcapng",), _begins(b"\x0a\x0d\x0d\x0a"), channel_names=True, start_time=False),
+    Format("parquet", "foreign.parquet", (".parquet",), _begins(b"PAR1"), channel_names=True),
 )
 BY_NAME = {form.name: form for form in FORMATS}
 WRITABLE = {suffix: form for form in FORMATS if form.writable for suffix in form.suffixes}

@@ -7,9 +7,9 @@ from typing import Self
 from dbc.database import Database
 from hil.log.account import Account
 from hil.log.builder import ROWS, recording_of
-from hil.log.decode import DecodedLog, decode_log
 from hil.log.formats import BY_NAME, format_of, told
 from hil.log.frames import FrameTable, Recording
+from hil.log.signals.decode import DecodedLog, decode_log
 from hil.log.source import DEFAULT, ReadOptions, Source
 
 Progress = Callable[[float], None]
@@ -96,7 +96,7 @@ class Log:
         return self.recording().frames
 
     def signals(self, databases: Database | Mapping[str, Database] | None = None) -> DecodedLog:
-        """All signals; ``databases`` as in `hil.log.decode.decode_log`."""
+        """All signals; ``databases`` as in `hil.log.signals.decode.decode_log`."""
         return decode_log(self.recording(), databases)
 
 

@@ -13,6 +13,7 @@ from hil.log.account import Account
 from hil.log.frames import LogError
 
 HEAD_BYTES = 65_536  # enough to tell the format
+FEW_BYTES = 200_000  # a log below this is read without the compiled pass, which costs half a second to load
 STDIN = "-"
 PACKED_BYTES = 16_384
 GZIP_BITS = 31  # zlib's name for a gzip frame around the stream

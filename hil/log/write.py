@@ -1,16 +1,18 @@
 """Writes frames as a log of any known format."""
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from datetime import UTC, tzinfo
 from pathlib import Path
 
 import numpy as np
 
-from hil.log.candump import candump_names
+from hil.log.builder import NAME_BYTES
 from hil.log.formats import Format, writable
 from hil.log.frames import FrameFlag, FrameTable, LogError, LogFacts
 
+_NO_NAME_LETTER = re.compile(r"[^!-~]")
 MAX_CHANNEL = 255  # of formats that number their channels
 
 
@@ -19,6 +21,23 @@ def channel_numbers(channels: tuple[str, ...]) -> list[int]:
     ends = [re.search(r"\d{1,3}$", name) for name in channels]
     numbers = [int(end[0]) for end in ends if end and int(end[0]) < MAX_CHANNEL]
     return numbers if len(set(numbers)) == len(channels) else list(range(len(channels)))
+
+
+def candump_names(channels: tuple[str, ...]) -> tuple[str, ...]:
+    """Channel names as a candump log can hold them.
+
+    A blank, and every letter that is no visible ASCII, becomes an underscore; a name is cut to 32 letters, and one
+    that another channel then has as well gets a number behind it.
+    """
+    held: dict[str, None] = {}
+    counts: Counter[str] = Counter()
+    for channel in channels:
+        plain = name = _NO_NAME_LETTER.sub("_", channel)[:NAME_BYTES] or "_"
+        while name in held:
+            counts[plain] += 1
+            name = f"{plain[: NAME_BYTES - 8]}_{counts[plain] + 1}"
+        held[name] = None
+    return tuple(held)
 
 
 def write_log(frames: FrameTable, path: Path) -> None:

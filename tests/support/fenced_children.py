@@ -1,4 +1,4 @@
-"""Harmless functions that behave as foreign readers do at their worst; stands in for `hil.log.fenced` in tests."""
+"""Harmless functions that behave as foreign readers at their worst; in place of `hil.log.foreign.fenced` in tests."""
 
 import importlib
 import os
@@ -6,9 +6,9 @@ import signal
 import sys
 from pathlib import Path
 
-from hil.log import fenced
+from hil.log.foreign import fenced
 
-MODULES = ("log_mutants", "hil.log.parquet_columns")  # of parquet_mutants alone
+MODULES = ("log_mutants", "hil.log.foreign.parquet_columns")  # of parquet_mutants alone
 
 
 def warm():
@@ -16,7 +16,7 @@ def warm():
         sys.path.append(str(Path(__file__).parent))
         for name in MODULES:
             importlib.import_module(name)
-        sys.modules["hil.log.parquet_columns"].warm()
+        sys.modules["hil.log.foreign.parquet_columns"].warm()
 
 
 def well(path):

@@ -5,12 +5,13 @@ from datetime import UTC
 
 import numpy as np
 
-from hil.log import builder, lines
+from hil.log import builder
 from hil.log.account import Account
 from hil.log.builder import recording_of
 from hil.log.formats import BY_NAME
 from hil.log.frames import FrameFlag, FrameTable
 from hil.log.source import ReadOptions, Source
+from hil.log.text import lines
 
 
 def read_bytes(path, content, form, fast, zone=UTC):

@@ -14,9 +14,9 @@ from dbc.contract import database_text
 from dbc.database import parse_database
 from dbc.frame import BusName
 from hil.bench.virtual import simulate
-from hil.log.decode import Decoder
 from hil.log.frames import FrameTable
 from hil.log.read import open_log
+from hil.log.signals.decode import Decoder
 from hil.log.write import write_log
 from hil.rt.clock import cpu_time_ns
 from hil.rt.process import output_of

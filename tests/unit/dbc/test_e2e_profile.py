@@ -13,7 +13,7 @@ from dbc import e2e
 from dbc.codec import CodecError
 from dbc.contract import contract, database_text
 from dbc.frame import BusName
-from hil.log.integrity import Integrity, check_frames
+from hil.log.signals.integrity import Integrity, check_frames
 
 PROTECTED = [spec for bus in BusName for spec in contract(bus).by_id.values() if spec.data_id is not None]
 

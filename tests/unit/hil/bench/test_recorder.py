@@ -8,8 +8,8 @@ from dbc.contract import encode, spec_of
 from dbc.frame import BusName, Frame, LinkEvent, LinkState
 from dbc.messages import BrakePedal
 from hil.bench.recorder import FLUSH_PERIOD_NS, Recorder, RecorderError, error_frame, recorded_events
-from hil.log.decode import decode_log
 from hil.log.read import read_log
+from hil.log.signals.decode import decode_log
 
 
 class Heard:

@@ -6,7 +6,7 @@ import pytest
 
 from hil.cli import diff
 from hil.errors import BrakebenchError
-from hil.log.diff_signals import pairs
+from hil.log.compare.diff_signals import pairs
 
 DBC = """VERSION ""
 BU_: A
@@ -134,6 +134,6 @@ def test_messages_compared_in_groups_give_the_same(compare, monkeypatch):
     other = [*lines(SAME), *(f"({1000.001 + k / 10:.6f}) can0 002#{k:02X}\n" for k in range(5))]
     changed = [line.replace("002#03", "002#09") for line in other]
     whole, _ = compare(other, changed, code=1)
-    monkeypatch.setattr("hil.log.diff.VALUES_AT_ONCE", 1)
+    monkeypatch.setattr("hil.log.compare.diff.VALUES_AT_ONCE", 1)
     assert compare(other, changed, code=1)[0] == whole
     assert whole["signals"]["N.U"]["greatest"] == 6

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from dbc.database import parse_database
-from hil.log.decode import decode_log
 from hil.log.read import read_log
+from hil.log.signals.decode import decode_log
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,1 @@
+"""Vector's binary logging format (BLF): read and written."""

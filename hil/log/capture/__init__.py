@@ -1,0 +1,1 @@
+"""Packet captures with CAN frames: pcap and pcapng."""

@@ -1,0 +1,1 @@
+"""Signals of logs as whole columns, and what differs between two logs."""

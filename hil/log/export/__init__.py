@@ -1,0 +1,1 @@
+"""Decoded signals as files: CSV, Parquet, MF4."""

@@ -1,0 +1,81 @@
+"""Decoded rows on their way to a file, whatever its format."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from dbc.database import Signal
+from hil.log.frames import FrameTable
+from hil.log.signals.decode import Decoder
+from hil.log.signals.decoded import DecodedLog, Rows, Values
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Field:
+    """A column of the output: ``MESSAGE.SIGNAL``."""
+
+    message: str
+    signal: Signal
+    dtype: np.dtype[Any]
+
+    @property
+    def name(self) -> str:
+        """``MESSAGE.SIGNAL``."""
+        return f"{self.message}.{self.signal.name}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Block:
+    """Rows to be written.
+
+    Attributes
+    ----------
+    time_ns : int64 (n,).
+    channel : index into ``channels`` of each row; None where rows belong to none (a raster).
+    columns : by ``MESSAGE.SIGNAL``: rows (ascending) and values.
+    rows : rows of each message.
+    """
+
+    time_ns: npt.NDArray[np.int64]
+    channel: npt.NDArray[np.int32] | None
+    channels: tuple[str, ...]
+    columns: Mapping[str, tuple[Rows, Values]]
+    rows: Mapping[str, Rows]
+
+    def __len__(self) -> int:
+        return len(self.time_ns)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layout:
+    """What is written.
+
+    Attributes
+    ----------
+    fields : the columns, in their order.
+    with_channel : a column ``channel`` follows ``time``.
+    names : beside each signal with named values, a column ``MESSAGE.SIGNAL (name)`` has the names.
+    start_ns : start time of the log, for formats that have one.
+    """
+
+    fields: tuple[Field, ...]
+    with_channel: bool = False
+    names: bool = False
+    start_ns: int = 0
+    channel_of: Mapping[str, str] = field(default_factory=dict)
+
+
+def block_of(log: DecodedLog) -> Block:
+    """Return decoded frames as rows to be written, one row per frame."""
+    frames = log.recording.frames
+    columns = {name: (column.rows, column.values) for name, column in log.columns.items()}
+    return Block(frames.time_ns, frames.channel, frames.channels, columns, log.rows)
+
+
+def blocks_of(tables: Iterable[FrameTable], decoder: Decoder) -> Iterator[Block]:
+    """Yield the signals of tables as rows to be written, one row per frame."""
+    for table in tables:
+        yield block_of(decoder.add(table))

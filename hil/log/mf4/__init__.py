@@ -1,0 +1,1 @@
+"""ASAM MDF 4: bus logs read and written, decoded signals written."""

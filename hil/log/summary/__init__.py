@@ -1,0 +1,1 @@
+"""What a log holds, in memory that does not grow with it."""
