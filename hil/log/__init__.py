@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from hil.log.signals.decode import DecodedLog, Decoder, decode_log
 
 _MODULES = {
-    "DecodedLog": "decode", "Decoder": "decode", "decode_log": "decode",
+    "DecodedLog": "signals.decode", "Decoder": "signals.decode", "decode_log": "signals.decode",
     "FrameFlag": "frames", "FrameTable": "frames", "LogError": "frames", "Recording": "frames",
     "Log": "read", "log_format": "read", "open_log": "read", "read_log": "read",
 }  # fmt: skip
