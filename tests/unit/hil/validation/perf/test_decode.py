@@ -6,8 +6,8 @@ import pytest
 from hil.validation.perf import decode
 
 EVERYWHERE = [
-    "frames to signals", "log to signals", "asc to signals", "blf to signals", "trc to signals", "csv to signals",
-    "blf to frames",
+    "frames to signals", "log to signals", "asc to signals", "blf to signals", "trc to signals",
+    "python-can's csv to signals", "our csv to signals", "blf to frames",
 ]  # fmt: skip
 
 
