@@ -59,6 +59,8 @@ class Layout:
     with_channel : a column ``channel`` follows ``time``.
     names : beside each signal with named values, a column ``MESSAGE.SIGNAL (name)`` has the names.
     start_ns : start time of the log, for formats that have one.
+    channel_of : channel of each message.
+    rows : how many there will be, about.
     """
 
     fields: tuple[Field, ...]
@@ -66,6 +68,7 @@ class Layout:
     names: bool = False
     start_ns: int = 0
     channel_of: Mapping[str, str] = field(default_factory=dict)
+    rows: int = 0
 
 
 def block_of(log: DecodedLog) -> Block:

@@ -18,8 +18,8 @@ from hil.log.export.tables import batch_of, check_suffix, export_blocks, schema_
 from hil.log.frames import LogError
 
 MAX_FILES = 800  # open at the same time
-CELLS_PER_GROUP = 250_000  # kept of one message before they are written
-CELLS_HELD = 2_000_000  # of all messages together
+CELLS_PER_GROUP = 125_000  # kept of one message before they are written
+CELLS_HELD = 1_000_000  # of all messages together
 
 
 def write_signals(
