@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
             line = logs.line_of(summary.backwards.frame - 1)
             summary = replace(summary, backwards=replace(summary.backwards, line=line))
         rows = None
-        if args.out and (summary.frames or logs.whole):
+        if args.out and summary.frames:
             progress.part(1, "writing")
             blocks = blocks_of(choice.frames(logs.tables(progress)), databases_.decoder(wanted))
             rows = _write(args, blocks, contents, summary, [*files, *(part.path for part in logs.parts)])
@@ -147,9 +147,7 @@ def _write(
 
 def _exit_code(logs: Logs, contents: Contents, summary: Summary) -> int:
     """0 whole; 1 something of the log is missing; 2 no frame could be read."""
-    if logs.whole and not contents.counts.rejected:
-        return 0
     if not summary.frames:
         print("brakebench: no frame could be read; give a CAN log", file=sys.stderr)
         return 2
-    return 1
+    return 0 if logs.whole and not contents.counts.rejected else 1

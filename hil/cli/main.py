@@ -56,12 +56,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         code: int = args.run(args)
     except BrakebenchError as error:
-        print(f"brakebench: {error}", file=sys.stderr)
+        print(f"brakebench: {_visible(str(error))}", file=sys.stderr)
         return error.exit_code
     except BrokenPipeError:
         sys.stderr.close()  # the reader of our output has left
         return 0
     return code
+
+
+def _visible(text: str) -> str:
+    """A message that is safe on a terminal: names of files and the like may hold control characters."""
+    from hil.log.account import printable
+
+    return "\n".join(printable(line) for line in text.split("\n"))
 
 
 if __name__ == "__main__":
