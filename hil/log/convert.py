@@ -52,6 +52,8 @@ def convert(
     with open_log(source, options=options) as log, atomic_write(target, overwrite, [source]) as temporary:
         facts = LogFacts.of(log.tables(_part(progress, 0)))
         account = log.account
+        if not facts.frames and not account.whole:
+            raise LogError(source, "no frame could be read; give a CAN log")
         facts = replace(facts, start_ns=account.start_ns)
         write_tables(log.tables(_part(progress, 1)), facts, temporary, form, options.timezone)
         with open_log(temporary, form.name, options) as back:
