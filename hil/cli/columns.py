@@ -1,7 +1,8 @@
 """Aligned columns of text that fit the width they are given."""
 
+import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from hil.log.account import printable
 
@@ -12,6 +13,14 @@ LEAST_NAME = 8
 def terminal_width() -> int:
     """Letters of a line: those of the terminal (or of COLUMNS), 100 where there is none."""
     return max(LEAST_WIDTH, min(MOST_WIDTH, shutil.get_terminal_size((100, 24)).columns))
+
+
+def say(lines: Iterable[str]) -> None:
+    """Print lines; a reader of the output that has left (``| head``) changes nothing of what the command returns."""
+    try:
+        print("\n".join(lines), flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
 def cut(text: str, width: int) -> str:

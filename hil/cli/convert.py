@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from hil.cli.columns import terminal_width, wrapped
+from hil.cli.columns import say, terminal_width, wrapped
 from hil.cli.log_options import LOGS, add_force, add_timezone
 from hil.cli.progress import Progress
 from hil.log.convert import Conversion, convert
@@ -49,15 +49,16 @@ def run(args: argparse.Namespace) -> int:
             "passed_over": dict(account.passed_over),
             "notes": [*done.notes, *account.notes],
         }
-        print(json.dumps(result))
+        say([json.dumps(result)])
     else:
         text = (
             f"{done.source} ({done.format}) -> {done.path}: {done.frames_read:,} frames read, "
             f"{done.frames_written:,} written, equal"
         )
-        print("\n".join(wrapped(text, terminal_width())))
-    for note in _notes(done):
-        print("\n".join(wrapped(note, terminal_width())), file=sys.stderr if args.json else sys.stdout)
+        say(line for note in (text, *_notes(done)) for line in wrapped(note, terminal_width()))
+    if args.json:
+        for note in _notes(done):
+            print("\n".join(wrapped(note, terminal_width())), file=sys.stderr)
     return 0 if account.whole else 1
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from hil.cli.columns import terminal_width
+from hil.cli.columns import say, terminal_width
 from hil.cli.log_options import (
     LOGS,
     add_databases,
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     warnings = (*databases_.warnings, *(w for one in databases_.all() for w in one.warnings))
     with (
         Logs(paths(args.log), ReadOptions(timezone=args.timezone), limit) as logs,
-        Progress(2 if args.out else 1) as progress,
+        Progress(1 if args.out is None else 2) as progress,
     ):
         for table in choice.frames(logs.tables(progress)):
             contents.add(table)
@@ -85,18 +85,18 @@ def run(args: argparse.Namespace) -> int:
             line = logs.line_of(summary.backwards.frame - 1)
             summary = replace(summary, backwards=replace(summary.backwards, line=line))
         rows = None
-        if args.out and summary.frames:
+        if args.out is not None and summary.frames:
             progress.part(1, "writing")
             blocks = blocks_of(choice.frames(logs.tables(progress)), databases_.decoder(wanted))
             rows = _write(args, blocks, contents, summary, [*files, *(part.path for part in logs.parts)])
     if args.json:
         values = summary_values(logs, contents, summary, warnings)
-        print(json.dumps(values | {"out": args.out, "rows": rows}, allow_nan=False))
+        say([json.dumps(values | {"out": args.out, "rows": rows}, allow_nan=False)])
     else:
         lines = summary_lines(logs, contents, summary, args.timezone, terminal_width(), warnings)
         if rows is not None:
             lines += ["", f"signals: {printable(args.out)} ({rows:,} rows, {len(contents.signals)} signals)"]
-        print("\n".join(lines))
+        say(lines)
     return _exit_code(logs, contents, summary)
 
 
@@ -108,7 +108,7 @@ def _choice(args: argparse.Namespace) -> Choice:
 def _check_out(args: argparse.Namespace) -> None:
     if args.limit_mb is not None and not 0 < args.limit_mb < 1e9:
         raise BrakebenchError("--limit-mb takes a number above 0")
-    if args.out:
+    if args.out is not None:
         from hil.log.export.messages import check_target
 
         check_target(args.out)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dbc.database import Signal
-from hil.cli.columns import columns, terminal_width, wrapped
+from hil.cli.columns import columns, say, terminal_width, wrapped
 from hil.cli.log_options import LOGS, add_databases, add_timezone, databases, words_of
 from hil.cli.progress import Progress
 from hil.errors import BrakebenchError
@@ -29,7 +29,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="which signals of two logs differ",
         description="Compare the signals of two logs, frame by frame: which differ, from when, by how much.",
         epilog="Frames are paired by their stamps, within half a cycle. Tolerance is one raw step, and none for single "
-        "bits and named values. Exit codes: 0 equal within the tolerances, 1 they differ, 2 unusable.",
+        "bits and named values. Exit codes: 0 equal within the tolerances, 1 they differ, or something of a log was "
+        "cut off or rejected, 2 unusable.",
     )
     parser.add_argument("first", metavar="A", type=Path, help=LOGS)
     parser.add_argument("second", metavar="B", type=Path, help="the other one")
@@ -62,12 +63,12 @@ def run(args: argparse.Namespace) -> int:
         for logs in (first, second):
             if not any(part.frames for part in logs.parts):
                 raise BrakebenchError(f"{logs.parts[0].path}: no frame could be read; give a CAN log")
-        whole = {str(logs.parts[0].path): logs.whole for logs in (first, second)}
+        whole = [first.whole, second.whole]
     if args.json:
-        print(json.dumps(_values(found, args, whole), allow_nan=False))
+        say([json.dumps(_values(found, args, whole), allow_nan=False)])
     else:
-        print("\n".join(_lines(found, args, whole, terminal_width())))
-    return 0 if found.equal else 1
+        say(_lines(found, args, whole, terminal_width()))
+    return 0 if found.equal and all(whole) else 1
 
 
 def _tolerance(words: list[str]) -> Tolerance:
@@ -91,7 +92,7 @@ def _tolerance(words: list[str]) -> Tolerance:
     return tolerance
 
 
-def _lines(found: LogDifference, args: argparse.Namespace, whole: dict[str, bool], width: int) -> Iterator[str]:
+def _lines(found: LogDifference, args: argparse.Namespace, whole: list[bool], width: int) -> Iterator[str]:
     different = sorted((one for one in found.signals if not one.equal), key=lambda one: one.first_s or 0.0)
     clock = "by their stamps" if found.same_clock else "from the first frame of each on (they do not overlap in time)"
     text = (
@@ -99,7 +100,8 @@ def _lines(found: LogDifference, args: argparse.Namespace, whole: dict[str, bool
         f"compared, {len(different)} differ"
     )
     yield from wrapped(text, width)
-    yield from (line for path, good in whole.items() if not good for line in wrapped(f"{path} is not whole", width))
+    for path in dict.fromkeys(path for path, good in zip((args.first, args.second), whole, strict=True) if not good):
+        yield from wrapped(f"{path}: something was cut off or rejected; brakebench decode tells what", width)
     if different:
         heads = ("signal", "unit", "compared", "differ", "one-sided", "from s", "greatest", "at s", "rms")
         yield ""
@@ -141,12 +143,12 @@ def _row(one: SignalDifference) -> tuple[str, ...]:
     )
 
 
-def _values(found: LogDifference, args: argparse.Namespace, whole: dict[str, bool]) -> dict[str, Any]:
+def _values(found: LogDifference, args: argparse.Namespace, whole: list[bool]) -> dict[str, Any]:
     return {
         "first": str(args.first),
         "second": str(args.second),
         "equal": found.equal,
-        "whole": list(whole.values()),
+        "whole": whole,
         "same_clock": found.same_clock,
         "signals": {
             one.name: {

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dbc.database import Signal
+from hil.cli.columns import say, terminal_width, wrapped
 from hil.cli.log_options import LOGS, add_databases, add_force, add_timezone, databases, paths, words_of
 from hil.cli.progress import Progress
 from hil.errors import BrakebenchError
@@ -56,7 +57,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Read the signals and draw them."""
-    if args.out.suffix not in SUFFIXES:
+    if args.out.suffix.lower() not in SUFFIXES:
         raise BrakebenchError(f"{args.out}: plots are written as {', '.join(SUFFIXES)}")
     databases_, files = databases(args.dbc)
     begin, end = (None if text is None else Moment.parse(text, args.timezone) for text in (args.begin, args.end))
@@ -64,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     decoder = databases_.decoder(choice.wanted(databases_))
     with Logs(paths([args.log]), ReadOptions(timezone=args.timezone)) as logs, Progress() as progress:
         gathered = gather(logs, decoder, choice, progress)
-        whole = logs.whole
+        whole = logs.whole and not decoder.totals.rejected
         read = [*files, *(part.path for part in logs.parts)]
     if not gathered.signals:
         raise BrakebenchError(f"{args.log}: no frame of {', '.join(args.signal)} in it")
@@ -72,13 +73,14 @@ def run(args: argparse.Namespace) -> int:
     samples = sum(signal.count for signal in gathered.signals.values())
     subtitle = _subtitle(gathered, samples, args.timezone)
     with atomic_write(args.out, args.force, read) as temporary:
-        if args.out.suffix == ".html":
+        if args.out.suffix.lower() == ".html":
             temporary.write_text(courses_page(plots, Path(args.log).name, subtitle), encoding="utf-8")
         else:
             write_picture(plots, Path(args.log).name, subtitle, temporary)
-    print(f"{args.out}: {len(gathered.signals)} signals, {samples:,} values")
+    notes = [f"{args.out}: {len(gathered.signals)} signals, {samples:,} values"]
     if not whole:
-        print("something of the log was cut off or rejected; brakebench decode tells what")
+        notes.append("something of the log was cut off, rejected or too short; brakebench decode tells what")
+    say(line for note in notes for line in wrapped(note, terminal_width()))
     return 0 if whole else 1
 
 

@@ -85,7 +85,8 @@ def _first_line(pattern: bytes) -> Callable[[bytes], int]:
 
 _CANDUMP = rb"\(\d{1,10}(?:\.\d{1,9})?\)\s+\S+\s+[0-9A-F]+#"
 _SCREEN = (
-    rb"(?:\(\d[\d.: -]*\)[ \t]+)?\S+[ \t]+(?:[RT]X[ \t]+\S+[ \t]+\S+[ \t]+)?[0-9A-F]{3,8}[ \t]+\[\d{1,2}\][ \t\r\n]"
+    rb"(?:\(\d[\d.: -]*\)[ \t]+)?\S+[ \t]+(?:[RT]X[ \t]+\S+[ \t]+\S+[ \t]+)?[0-9A-F]{3,8}[ \t]+"
+    rb"(?:\[\d{1,2}\]|\{[9A-F]\})[ \t\r\n]"
 )
 _ASC = rb"\d+\.\d+\s+(?:CANFD\s+)?\d+\s+\S|date\s+\w|base\s+(?:hex|dec)|begin triggerblock"
 _TRC = rb";\$(?:FILEVERSION|STARTTIME|COLUMNS)=|;.*\.trc\b|\d+\)?\s+\d+(?:\.\d+)?\s+\S+\s+\S+\s+"

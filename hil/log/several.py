@@ -11,7 +11,7 @@ import numpy.typing as npt
 from hil.log.account import Account
 from hil.log.frames import FrameTable, LogError
 from hil.log.read import Log, Progress, open_log
-from hil.log.source import DEFAULT, STDIN, ReadOptions
+from hil.log.source import DEFAULT, ReadOptions
 
 UNDATED_NS = 1_000_000_000 * 1_000_000_000  # stamps below (before September 2001) count from some start, not from 1970
 
@@ -62,7 +62,7 @@ class Logs:
         self.limit_bytes = limit_bytes
         self.notes: list[str] = []
         self.channels: tuple[str, ...] = ()
-        self._kept: dict[Path, Log] = {}  # standard input can be opened only once; one log alone need not be again
+        self._kept: dict[Path, Log] = {}  # a pipe can be opened only once; one log alone need not be again
         if len({str(path) for path in paths}) < len(paths):
             twice = next(path for path in paths if list(paths).count(path) > 1)
             raise LogError(twice, "is given twice; name every log once")
@@ -94,7 +94,7 @@ class Logs:
 
     def _look(self, path: Path, alone: bool) -> Part:
         log = open_log(path, options=self.options, limit_bytes=self.limit_bytes)
-        keep = alone or str(path) == STDIN
+        keep = alone or log.source.once
         if keep:
             self._kept[path] = log
         try:

@@ -4,6 +4,7 @@ Tables are written block after block, so that memory does not grow with the log.
 """
 
 import json
+import os
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -72,9 +73,11 @@ class WideTable(AbstractContextManager["WideTable"]):
         self._layout = layout
         self._schema = schema_of(layout, layout.fields, "{0.name}")
         self._writer: pa.parquet.ParquetWriter | None = None
+        self._opened: pa.OSFile | None = None
         self._file: IO[bytes] | None = None
         if path.suffix == ".parquet":
-            self._writer = pa.parquet.ParquetWriter(path, self._schema, compression="zstd")
+            self._opened = opened(path)
+            self._writer = pa.parquet.ParquetWriter(self._opened, self._schema, compression="zstd")
         else:
             self._file = path.open("wb")
             self._file.write((",".join(_quoted(name) for name in self._schema.names) + "\n").encode())
@@ -90,6 +93,8 @@ class WideTable(AbstractContextManager["WideTable"]):
         """Finish the file."""
         if self._writer is not None:
             self._writer.close()
+        if self._opened is not None:
+            self._opened.close()
         if self._file is not None:
             self._file.close()
 
@@ -102,6 +107,11 @@ class WideTable(AbstractContextManager["WideTable"]):
                 self._writer.write_batch(batch)
             else:
                 pa.csv.write_csv(batch, self._file, self._options)
+
+
+def opened(path: Path) -> pa.OSFile:
+    """File to write; pyarrow itself refuses a path that is no UTF-8."""
+    return pa.OSFile(os.fsencode(path), "wb")
 
 
 def _quoted(name: str) -> str:

@@ -88,7 +88,7 @@ def test_a_damaged_log_is_drawn_and_told(log, tmp_path, capsys):
     with log.open("a") as file:
         file.write("rubbish\n")
     assert run(log, "S", "--dbc", tmp_path / "a.dbc", "--out", tmp_path / "a.svg") == 1
-    assert "cut off or rejected" in capsys.readouterr().out
+    assert "cut off, rejected" in capsys.readouterr().out
 
 
 def test_many_values_are_thinned_and_the_peak_stays():
