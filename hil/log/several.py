@@ -50,6 +50,7 @@ class Logs:
     parts : the logs, by their first stamp.
     notes : what concerns them together.
     channels : names that the last reading met.
+    first_ns : stamp of the first frame, where times relative to the log begin; 0 before a reading and without a frame.
 
     Raises
     ------
@@ -62,6 +63,7 @@ class Logs:
         self.limit_bytes = limit_bytes
         self.notes: list[str] = []
         self.channels: tuple[str, ...] = ()
+        self.first_ns = 0
         self._kept: dict[Path, Log] = {}  # standard input can be opened only once; one log alone need not be again
         if len({str(path) for path in paths}) < len(paths):
             twice = next(path for path in paths if list(paths).count(path) > 1)
@@ -123,6 +125,7 @@ class Logs:
             _Reading(self._tables(part, told(place)), part, numbers) for place, part in enumerate(self.parts)
         ]  # fmt: skip
         active: list[_Reading] = []
+        begun = False
         while waiting or active:
             if not active:
                 active.append(waiting.pop(0))
@@ -135,7 +138,10 @@ class Logs:
                 else:
                     until = min(until, active[-1].until)
             if until is not None:
-                yield _merged([one.take(until) for one in active], tuple(numbers))
+                table = _merged([one.take(until) for one in active], tuple(numbers))
+                if not begun:
+                    begun, self.first_ns = True, int(table.time_ns[0])
+                yield table
         self.channels = tuple(numbers)
         yield FrameTable.empty(channels=self.channels)
 

@@ -3,6 +3,7 @@ import io
 import json
 import sys
 
+import numba
 import pyarrow.csv
 import pyarrow.parquet
 import pytest
@@ -88,9 +89,9 @@ def test_text_accounts_for_every_frame(log, dbc, capsys):
     assert "2 not a frame" in out
     assert "at byte 38: bad" in out
     assert "M: frames shorter than the database says" in out
-    assert "unknown: can0 0x7ff (1)" in out
+    assert "unknown: can0 7FF (1)" in out
     assert "cut off at byte" in out
-    assert "length: can0 0x001 M changes 2 times between 1, 2 bytes" in out
+    assert "length: can0 001 M changes 2 times between 1, 2 bytes" in out
 
 
 def test_a_whole_log_ends_with_0_and_names_what_is_odd_in_its_values(whole, dbc, capsys):
@@ -344,3 +345,25 @@ def test_the_line_of_a_stamp_that_runs_back_is_named(tmp_path, dbc, capsys):
     assert "stamps run back 1 time, first at frame 3 (line 5)" in capsys.readouterr().out
     run(tmp_path / "back.log", "--dbc", dbc, "--json")
     assert json.loads(capsys.readouterr().out)["stamps_back"]["first_line"] == 5
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+def test_a_terminal_is_told_that_something_is_compiled():
+    import hil.log.compiled  # noqa: F401 (tells of compilations once it is loaded)
+
+    terminal, file = Terminal(), io.StringIO()
+    for stream in (terminal, file):
+        with Progress(stream=stream):
+            numba.njit(lambda a: a + 1)(1)
+    assert terminal.getvalue().startswith("\rcompiling what reads this log, once after installation: some seconds")
+    assert terminal.getvalue().endswith(" \r")
+    assert file.getvalue() == ""
+
+
+def test_times_count_from_the_first_frame_of_the_log_whatever_part_is_chosen(tmp_path, dbc, capsys):
+    stamps = [100 + k / 10 for k in range(80) if not 40 < k < 50]
+    (tmp_path / "gap.log").write_text("".join(f"({t:.6f}) can0 001#0101\n" for t in stamps))
+    for words in ((), ("--from", "2"), ("--from", "2", "--to", "6")):
+        assert run(tmp_path / "gap.log", "--dbc", dbc, *words) == 0
+        out = capsys.readouterr().out
+        assert "gap: can0 001 M is silent for 1000 ms (10 cycles of 100 ms) from 4.000 s on" in out
