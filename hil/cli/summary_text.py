@@ -140,7 +140,7 @@ def _cycles(cycle: Cycle) -> str:
 def _some(notes: list[str], more: str) -> Iterator[str]:
     yield from notes[:SHOWN]
     if len(notes) > SHOWN:
-        yield f"{more}: and {len(notes) - SHOWN} more (all of them with --json)"
+        yield f"{more}: {len(notes) - SHOWN} more (all of them with --json)"
 
 
 def _notes(logs: Logs, contents: Contents, counts: DecodedCounts, summary: Summary) -> Iterator[str]:
@@ -190,7 +190,8 @@ def _notes(logs: Logs, contents: Contents, counts: DecodedCounts, summary: Summa
     if unknown:
         shown = ", ".join(f"{one.channel} {_id_text(one)} ({one.count:,})" for one in unknown[:SHOWN_UNKNOWN])
         more = f", and {len(unknown) - SHOWN_UNKNOWN} more" if len(unknown) > SHOWN_UNKNOWN else ""
-        yield f"unknown: {shown}{more}"
+        hint = "; give the database of this log with --dbc" if contents.databases.guessed and not counts.decoded else ""
+        yield f"unknown: {shown}{more}{hint}"
     if summary.other_frames:
         yield f"{_count(summary.other_frames, 'frame')} of more than {len(ids):,} identifiers have no statistics"
 

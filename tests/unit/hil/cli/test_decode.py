@@ -314,7 +314,7 @@ def test_columns_are_cut_to_the_width_and_empty_ones_left_out():
     lines = columns(("name", "empty", "n"), [("a" * 100, "", "1"), ("b", "", "22")], 40)
     assert lines[0] == "name".ljust(36) + "   n"
     assert max(map(len, lines)) == 40
-    assert lines[1].endswith("~   1")
+    assert lines[1] == "a" * 12 + "~" + "a" * 23 + "   1"  # the end of a name tells more than its begin
     assert wrapped("  a bb \x1bcc", 8) == ["  a bb", "  \\x1bcc"]
 
 
@@ -367,3 +367,45 @@ def test_times_count_from_the_first_frame_of_the_log_whatever_part_is_chosen(tmp
         assert run(tmp_path / "gap.log", "--dbc", dbc, *words) == 0
         out = capsys.readouterr().out
         assert "gap: can0 001 M is silent for 1000 ms (10 cycles of 100 ms) from 4.000 s on" in out
+
+
+def test_a_log_counts_once_under_whatever_name(log, dbc, tmp_path, result):
+    (tmp_path / "link.log").symlink_to(log)
+    assert result(log, tmp_path / "link.log", f"{tmp_path}/*.log", "--dbc", dbc, code=1)["frames"] == 6
+
+
+def test_a_channel_that_only_an_option_knows_is_told(whole, dbc, result):
+    words = ["--dbc", dbc, "--dbc", f"can3={dbc}", "--bitrate", "can4=500000", "--bitrate", "250000"]
+    notes = result(whole, *words, "--channel", "can0", "--channel", "can5")["notes"]
+    assert sorted(notes) == [
+        "--bitrate: the log has no channel can4; its channels are can0",
+        "--channel: the log has no channel can5; its channels are can0",
+        "--dbc: the log has no channel can3; its channels are can0",
+    ]
+
+
+def test_a_log_of_another_car_asks_for_its_database(whole, dbc, capsys):
+    hint = "give the database of this log with --dbc"
+    assert run(whole) == 0
+    assert hint in " ".join(capsys.readouterr().out.split())
+    assert run(whole, "--dbc", dbc) == 0
+    assert hint not in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], r"a\.dbc: is a database \(DBC\), no log; give a log, and this with --dbc"),
+        (["--from", "9"], r"no frame between --from and --to; give times within 0 to 1\.500 s from its first frame$"),
+        (["--from", "2", "--to", "1"], "no frame between --from and --to"),
+        (["--channel", "can7", "--from", "0"], r"no channel can7; its channels are can0"),
+        (["--resample", "0", "--out", "a.csv"], "--resample 0: expected a step above 0 in seconds, 0.01 for 10 ms"),
+        (["--limit-mb", "0"], "--limit-mb 0: expected a number of megabytes above 0"),
+        (["--out", "no/folder/a.csv"], "there is no folder no/folder; create it, or give another name"),
+        (["--out", "a"], "written as .*, or into a FOLDER/ with a slash; got no suffix"),
+    ],
+)
+def test_wrong_use_says_what_to_do(words, message, whole, dbc, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(BrakebenchError, match=message):
+        run(whole if words else dbc, "--dbc", dbc, *words)
