@@ -115,9 +115,9 @@ def _lines(found: LogDifference, args: argparse.Namespace, whole: dict[str, bool
         yield from columns(heads, [_row(one) for one in different], width, left=(0, 1))
     unpaired = sorted((one for one in found.messages if not one.equal), key=lambda one: one.unpaired_s or 0.0)
     if unpaired:
-        heads = ("frames without a partner", "in A", "in B", "only in A", "only in B", "from s")
         yield ""
-        yield from columns(heads, [_unpaired_row(one) for one in unpaired[:SHOWN]], width)
+        frames = ("frames without a partner", "in A", "in B", "only in A", "only in B", "from s")
+        yield from columns(frames, [_unpaired_row(one) for one in unpaired[:SHOWN]], width)
     if len(unpaired) > SHOWN:
         yield f"and {len(unpaired) - SHOWN} more messages with frames that have no partner (all of them with --json)"
     notes: list[str] = []
