@@ -24,8 +24,11 @@ def say(lines: Iterable[str]) -> None:
 
 
 def cut(text: str, width: int) -> str:
-    """Text of at most ``width`` letters; ``~`` stands for what is left out."""
-    return text if len(text) <= width else text[: max(0, width - 1)] + "~"
+    """Text of at most ``width`` letters; ``~`` stands for what is left out before the end, which tells the most."""
+    if len(text) <= width:
+        return text
+    behind = max(0, width - 1) * 2 // 3
+    return text[: max(0, width - 1) - behind] + "~" + text[len(text) - behind :]
 
 
 def columns(heads: Sequence[str], rows: Sequence[Sequence[str]], width: int, left: Sequence[int] = (0,)) -> list[str]:

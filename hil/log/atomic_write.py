@@ -14,6 +14,18 @@ from hil.log.frames import LogError
 STEM_BYTES = 180  # of the name that stays in a temporary one; a file system takes 255
 
 
+def check_folder(path: Path) -> None:
+    """Refuse a file to write whose folder is none.
+
+    Raises
+    ------
+    LogError
+        When there is no such folder.
+    """
+    if not path.parent.is_dir():
+        raise LogError(path, f"cannot be written: there is no folder {path.parent}; create it, or give another name")
+
+
 @contextmanager
 def atomic_write(path: Path, overwrite: bool = False, read: Iterable[Path] = ()) -> Iterator[Path]:
     """Yield a temporary path beside ``path``; put it in place when the block ends without an error.
@@ -26,10 +38,11 @@ def atomic_write(path: Path, overwrite: bool = False, read: Iterable[Path] = ())
     Raises
     ------
     LogError
-        When ``path`` exists and may not be replaced, or cannot be written.
+        When ``path`` exists and may not be replaced, has no folder, or cannot be written.
     """
     if path.is_symlink():
         path = Path(os.path.realpath(path))  # the link stays, and leads to what is written
+    check_folder(path)
     if path.exists():
         if any(other.exists() and path.samefile(other) for other in read):
             raise LogError(path, "is read by this command too; give another name for the output")

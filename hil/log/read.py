@@ -109,7 +109,7 @@ def open_log(
     """Open a log; parameters and errors as of `Log`.
 
     >>> with open_log("drive.blf") as log:  # doctest: +SKIP
-    ...     frames = log.frames().to_arrow().to_pandas()
+    ...     frames = log.frames().to_arrow()
     ...     time_s, speed = log.signals(parse_database(Path("car.dbc").read_bytes())).series("WHEELS.FL")
     """
     return Log(path, form, options, limit_bytes)

@@ -77,6 +77,10 @@ class Source:
             self.size = self._raw.seek(0, 2)
             self._raw.seek(0)
             self.packed = self._raw.read(2) == _GZIP
+        except IsADirectoryError as error:
+            raise LogError(
+                path, "is a folder; give a log file, or several as a quoted pattern: 'FOLDER/*.blf'"
+            ) from error
         except OSError as error:
             raise LogError(path, f"cannot be opened: {error.strerror or error}; give a log file") from error
         self._position = 0

@@ -63,7 +63,8 @@ def check_suffix(path: Path, suffixes: tuple[str, ...]) -> None:
     """Refuse a file whose suffix names no known kind of output."""
     if path.suffix not in suffixes:
         known = f"{', '.join(suffixes[:-1])} or {suffixes[-1]}"
-        raise LogError(path, f"signals are written as {known}, got {path.suffix or 'no suffix'!r}")
+        got = f"the suffix {path.suffix!r}" if path.suffix else "no suffix"
+        raise LogError(path, f"signals are written as {known}, or into a FOLDER/ with a slash; got {got}")
 
 
 class WideTable(AbstractContextManager["WideTable"]):

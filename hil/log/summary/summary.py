@@ -82,7 +82,6 @@ class Statistics:
             frames=int(whole[Whole.FRAMES]),
             first_ns=int(whole[Whole.LEAST]),
             last_ns=int(whole[Whole.GREATEST]),
-            began_ns=int(whole[Whole.FIRST]),
             channels=tuple(sorted(channels, key=lambda one: one.name)),
             ids=tuple(rows),
             other_frames=int(whole[Whole.OTHER]),

@@ -89,7 +89,7 @@ def test_memory_does_not_hold_the_log(tmp_path, source):
 
 
 def test_an_unwritable_place_is_said(tmp_path, source):
-    with pytest.raises(LogError, match="cannot be written"):
+    with pytest.raises(LogError, match=r"cannot be written: there is no folder .*; create it"):
         convert(source, tmp_path / "no" / "such" / "folder.log")
 
 

@@ -116,7 +116,7 @@ def test_standard_input_can_be_read_again_and_again():
 def test_what_cannot_be_opened(tmp_path):
     with pytest.raises(LogError, match="cannot be opened: No such file"):
         Source(tmp_path / "none")
-    with pytest.raises(LogError, match="cannot be opened: Is a directory"):
+    with pytest.raises(LogError, match="is a folder; give a log file"):
         Source(tmp_path)
     (tmp_path / "empty").write_bytes(b"")
     with pytest.raises(LogError, match="empty: no log in it"):
