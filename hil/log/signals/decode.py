@@ -143,7 +143,6 @@ class Decoder:
         fast = bool(self._fast)
         log = DecodedLog(
             recording=Recording(Path(), "", table),
-            time_s=np.asarray(table.time_ns / 1e9, np.float64),
             frames=len(table),
             notes=self._totals.notes,
         )

@@ -280,3 +280,32 @@ def extract(words, jobs, ints, floats, as_int, as_float, counts, scratch):  # ty
         counts[j, 0] = absent
         counts[j, 1] = bad
     return jobs.shape[0]
+
+
+@compiled
+def leave_out(words, numbers, values, rows, kept):  # type: ignore[no-untyped-def]
+    """Leave out the values that are not available.
+
+    Parameters
+    ----------
+    words : int64 (n,), the words of one signal.
+    numbers : its row of ``ints``, see `extract`.
+    values : int64 (n,), moved together in place.
+    rows, kept : int64 (n,), the frames, and filled in: those that stay.
+
+    Returns
+    -------
+    Number of values that stay.
+    """
+    shift, mask, sign, swap, none = numbers[0], numbers[1], numbers[2], numbers[3], numbers[9]
+    n = min(min(words.shape[0], values.shape[0]), min(rows.shape[0], kept.shape[0]))
+    k = 0
+    for i in range(n):
+        word = words[i]
+        if swap:
+            word = _swapped(word)
+        values[k] = values[i]
+        kept[k] = rows[i]
+        if (((word >> shift) & mask) ^ sign) - sign != none:
+            k += 1
+    return k

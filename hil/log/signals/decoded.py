@@ -198,7 +198,6 @@ class DecodedLog(DecodedCounts):
     Attributes
     ----------
     recording : the frames.
-    time_s : time stamps of the well-formed frames, s; `Column.rows` index it.
     columns : signals by "MESSAGE.SIGNAL", an empty one too where the message came but not the signal; see
         `hil.log.signals.decode` for the names where that alone is not clear. The values lie in one memory that the
         columns share: a copy of one column lets go of all others.
@@ -207,9 +206,16 @@ class DecodedLog(DecodedCounts):
     """
 
     recording: Recording = field(kw_only=True)
-    time_s: npt.NDArray[np.float64] = field(kw_only=True)
     columns: dict[str, Column] = field(default_factory=dict)
     rows: dict[str, Rows] = field(default_factory=dict)
+    _time_s: npt.NDArray[np.float64] | None = field(default=None, init=False, repr=False)
+
+    @property
+    def time_s(self) -> npt.NDArray[np.float64]:
+        """Time stamps of the well-formed frames, s; `Column.rows` index it."""
+        if self._time_s is None:
+            self._time_s = np.asarray(self.recording.frames.time_ns / 1e9, np.float64)
+        return self._time_s
 
     def series(self, name: str) -> tuple[npt.NDArray[np.float64], Values]:
         """Times (s) and values of one column, ``MESSAGE.SIGNAL``; KeyError where the log has none."""

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hil.log.signals.extract import Found, Group, Piece, pieces_of, work_out
-from hil.log.signals.signal_plan import FLOAT, OTHER, MessagePlan, Words
+from hil.log.signals.signal_plan import FLOAT, OTHER, MessagePlan, SignalPlan, Words
 
 Ints = npt.NDArray[np.int64]
 Parts = Sequence[tuple[MessagePlan, Group]]
@@ -14,47 +14,47 @@ Parts = Sequence[tuple[MessagePlan, Group]]
 
 def extract_all(parts: Parts, base: Words) -> list[list[Found]]:
     """Signals of each part (a message and its frames); ``base`` holds the words of groups that have a ``begin``."""
-    jobs = _Jobs(parts, base)
+    plain, others = [], []
+    for number, (plan, group) in enumerate(parts):
+        (plain if _is_plain(plan, group) else others).append(number)
     found: list[list[Found]] = [[] for _ in parts]
-    plain: list[int] = []
-    for number, (plan, group) in enumerate(parts):
-        if _is_plain(plan, group):
-            plain.append(number)
-            jobs.add_plain(number)
+    jobs = _Jobs(parts, base)
+    jobs.add_plain(plain)
     pieces: list[tuple[int, Piece]] = []
-    for number, (plan, group) in enumerate(parts):
-        if not _is_plain(plan, group):
-            for piece in pieces_of(plan, group):
-                if piece.plan.kind == OTHER:
-                    found[number].append(work_out(piece))
-                else:
-                    pieces.append((number, piece))
-                    jobs.add_piece(number, piece)
+    for number in others:
+        for piece in pieces_of(*parts[number]):
+            if piece.plan.kind == OTHER:
+                found[number].append(work_out(piece))
+            else:
+                pieces.append((number, piece))
+                jobs.add_piece(number, piece)
     jobs.run()
     job = 0
     for number in plain:
         plan, group = parts[number]
-        n, begin = len(group.rows), jobs.outs[job]
-        end = begin + n * len(plan.signals)
-        ints, floats = jobs.as_int[begin:end].reshape(-1, n), jobs.as_float[begin:end].reshape(-1, n)
-        counts = jobs.counts[job : job + len(plan.signals)]
-        rows = group.rows
-        found[number] = [
-            Found(i, rows, (floats if signal.kind == FLOAT else ints)[i], n, absent, bad)
-            for i, (signal, (absent, bad)) in enumerate(zip(plan.signals, counts, strict=True))
-        ]
-        for i, one in enumerate(found[number]):
-            signal = plan.signals[i]
-            if one.sna or (one.outside and signal.named):
-                found[number][i] = _corrected(one, Piece(i, signal, rows, group.words(signal), None))
+        found[number] = _plain_found(jobs, job, plan, group)
         job += len(plan.signals)
     for (number, piece), begin, (absent, bad) in zip(pieces, jobs.outs[job:], jobs.counts[job:], strict=True):
-        n = len(piece.rows)
-        values = (jobs.as_float if piece.plan.kind == FLOAT else jobs.as_int)[begin : begin + n]
-        one = Found(piece.place, piece.rows, values, n, absent, bad)
-        found[number].append(_corrected(one, piece) if absent or bad else one)
-    for some in found:
-        some.sort(key=_place)
+        values = (jobs.as_float if piece.plan.kind == FLOAT else jobs.as_int)[begin : begin + len(piece.rows)]
+        one = Found(piece.place, piece.rows, values, len(piece.rows), absent, bad)
+        found[number].append(_corrected(one, piece.plan, parts[number][0].ints[piece.place], piece.words) if absent or bad else one)
+    for number in others:
+        found[number].sort(key=_place)
+    return found
+
+
+def _plain_found(jobs: "_Jobs", job: int, plan: MessagePlan, group: Group) -> list[Found]:
+    """Signals of a message whose words the base holds; ``job`` is the first of them."""
+    rows, n, begin = group.rows, len(group.rows), jobs.outs[job]
+    end = begin + n * len(plan.signals)
+    ints, floats = jobs.as_int[begin:end].reshape(-1, n), jobs.as_float[begin:end].reshape(-1, n)
+    found = []
+    counts = jobs.counts[job : job + len(plan.signals)]
+    for place, (signal, (absent, bad)) in enumerate(zip(plan.signals, counts, strict=True)):
+        one = Found(place, rows, (floats if signal.kind == FLOAT else ints)[place], n, absent, bad)
+        if absent or (bad and signal.named):
+            one = _corrected(one, signal, plan.ints[place], group.plane(0))
+        found.append(one)
     return found
 
 
@@ -67,14 +67,17 @@ def _place(found: Found) -> int:
     return found.place
 
 
-def _corrected(found: Found, piece: Piece) -> Found:
+def _corrected(found: Found, plan: SignalPlan, numbers: Ints, words: Words) -> Found:
     """Leave out frames whose value is not available, and do not count values out of range that have a name."""
     if found.outside:
-        found = found._replace(outside=found.outside - piece.plan.named_among(piece.words))
+        found = found._replace(outside=found.outside - plan.named_among(words))
     if not found.sna:
         return found
-    there = piece.plan.raw(piece.words) != piece.plan.sna[0]
-    return found._replace(rows=found.rows[there], values=found.values[there])
+    from hil.log.signals.decode_pass import leave_out
+
+    rows = np.empty(found.n, np.int64)
+    left = leave_out(words.view(np.int64), numbers, found.values.view(np.int64), found.rows, rows)
+    return found._replace(rows=rows[:left], values=found.values[:left])
 
 
 class _Jobs:
@@ -102,14 +105,15 @@ class _Jobs:
         self.outs: list[int] = []
         self.counts: list[list[int]] = []
 
-    def add_plain(self, number: int) -> None:
-        """All signals of a part whose words the base holds."""
-        plan, group = self._parts[number]
-        k, first = len(plan.signals), self._first[number]
-        self._signals.extend(range(first, first + k))
-        self._begins.extend([group.begin or 0] * k)
-        self._sizes.extend([len(group.rows)] * k)
-        self._inside.extend([True] * k)
+    def add_plain(self, numbers: list[int]) -> None:
+        """All signals of parts whose words the base holds."""
+        for number in numbers:
+            plan, group = self._parts[number]
+            k, first = len(plan.signals), self._first[number]
+            self._signals.extend(range(first, first + k))
+            self._begins.extend([group.begin or 0] * k)
+            self._sizes.extend([len(group.rows)] * k)
+            self._inside.extend([True] * k)
 
     def add_piece(self, number: int, piece: Piece) -> None:
         """One signal."""
