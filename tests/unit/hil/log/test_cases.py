@@ -275,7 +275,8 @@ def test_control_characters_reach_no_terminal(tmp_path, said, monkeypatch):
         (0, "decode", "good.log", "--dbc", "odd.dbc"),
         (0, "decode", "good.log", "--dbc", "odd.dbc", "--json"),
         (0, "decode", odd, "--out", f"{ESCAPES}.csv"),
-        (0, "diff", odd, odd),
+        (0, "diff", odd, odd, "--dbc", "odd.dbc"),
+        (2, "diff", odd, odd),  # no frame of our own messages
         (2, "decode", f"{ESCAPES}.txt"),
         (2, "decode", f"{ESCAPES} none.log"),
         (2, "decode", "good.log", "--dbc", odd),
