@@ -69,7 +69,9 @@ def _notes(done: Conversion) -> Iterator[str]:
     for kind, count in account.passed_over.items():
         yield f"{count:,} {kind} passed over"
     if account.rejected:
-        yield f"{account.rejected:,} pieces of {done.source} are no frames and were left out:"
+        single = account.rejected == 1
+        what = f"piece of {done.source} is no frame" if single else f"pieces of {done.source} are no frames"
+        yield f"{account.rejected:,} {what} and left out:"
         yield from (f"  at byte {one.offset}: {one.text}" for one in account.first_rejected)
     if account.truncated_at is not None:
         yield f"{done.source} is cut off at byte {account.truncated_at}"

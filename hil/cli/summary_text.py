@@ -190,7 +190,11 @@ def _notes(logs: Logs, contents: Contents, counts: DecodedCounts, summary: Summa
     if unknown:
         shown = ", ".join(f"{one.channel} {_id_text(one)} ({one.count:,})" for one in unknown[:SHOWN_UNKNOWN])
         more = f", and {len(unknown) - SHOWN_UNKNOWN} more" if len(unknown) > SHOWN_UNKNOWN else ""
-        hint = "; give the database of this log with --dbc" if contents.databases.guessed and not counts.decoded else ""
+        hint = (
+            "; give the database of this log with --dbc"
+            if contents.databases.guessed and counts.unknown > counts.decoded
+            else ""
+        )
         yield f"unknown: {shown}{more}{hint}"
     if summary.other_frames:
         yield f"{_count(summary.other_frames, 'frame')} of more than {len(ids):,} identifiers have no statistics"

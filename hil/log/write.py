@@ -108,7 +108,8 @@ def losses(facts: LogFacts, form: Format) -> list[str]:
         if replaced:
             notes.append(f"candump has no blanks in channel names, and at most 32 bytes: {', '.join(replaced)}")
     if facts.errors and not form.error_content:
-        notes.append(f"{form.name} keeps neither class nor data of the {facts.errors} error frames")
+        frames = "the error frame" if facts.errors == 1 else f"the {facts.errors:,} error frames"
+        notes.append(f"{form.name} keeps neither class nor data of {frames}")
     if facts.finer_than_us and form.resolution_ns >= 1000:
         notes.append(f"{form.name} keeps stamps to the microsecond")
     if facts.flags & FrameFlag.SENT and not form.sent:
