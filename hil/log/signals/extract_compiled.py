@@ -14,7 +14,8 @@ Parts = Sequence[tuple[MessagePlan, Group]]
 
 def extract_all(parts: Parts, base: Words) -> list[list[Found]]:
     """Signals of each part (a message and its frames); ``base`` holds the words of groups that have a ``begin``."""
-    plain, others = [], []
+    plain: list[int] = []
+    others: list[int] = []
     for number, (plan, group) in enumerate(parts):
         (plain if _is_plain(plan, group) else others).append(number)
     found: list[list[Found]] = [[] for _ in parts]
@@ -37,7 +38,9 @@ def extract_all(parts: Parts, base: Words) -> list[list[Found]]:
     for (number, piece), begin, (absent, bad) in zip(pieces, jobs.outs[job:], jobs.counts[job:], strict=True):
         values = (jobs.as_float if piece.plan.kind == FLOAT else jobs.as_int)[begin : begin + len(piece.rows)]
         one = Found(piece.place, piece.rows, values, len(piece.rows), absent, bad)
-        found[number].append(_corrected(one, piece.plan, parts[number][0].ints[piece.place], piece.words) if absent or bad else one)
+        if absent or bad:
+            one = _corrected(one, piece.plan, parts[number][0].ints[piece.place], piece.words)
+        found[number].append(one)
     for number in others:
         found[number].sort(key=_place)
     return found
