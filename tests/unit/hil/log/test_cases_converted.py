@@ -50,7 +50,8 @@ def losses(case, suffix):
     if suffix in NO_START and case.start_ns not in (None, stamp(case.frames[0])):
         yield f"{NO_START[suffix]} keeps no start time beside the stamps"
     if suffix in NO_ERROR_CONTENT and errors:
-        yield f"{NO_ERROR_CONTENT[suffix]} keeps neither class nor data of the {errors} error frames"
+        frames = "the error frame" if errors == 1 else f"the {errors} error frames"
+        yield f"{NO_ERROR_CONTENT[suffix]} keeps neither class nor data of {frames}"
     if suffix == ".trc" and fine:
         yield "trc keeps stamps to the microsecond"
     if suffix == ".log" and fine:
