@@ -26,6 +26,7 @@ from hil.log.account import printable
 from hil.log.choice import Choice, Moment
 from hil.log.export.blocks import Block, Field, Layout, blocks_of
 from hil.log.several import Logs
+from hil.log.signals.databases import Databases
 from hil.log.source import ReadOptions
 from hil.log.summary.contents import Contents
 from hil.log.summary.values import Summary
@@ -81,6 +82,7 @@ def run(args: argparse.Namespace) -> int:
             contents.add(table)
         summary = contents.summary()
         _check_found(logs, choice, summary)
+        warnings += _of_no_channel(databases_, logs)
         if summary.backwards is not None and not choice.of_frames:
             line = logs.line_of(summary.backwards.frame - 1)
             summary = replace(summary, backwards=replace(summary.backwards, line=line))
@@ -118,6 +120,13 @@ def _check_out(args: argparse.Namespace) -> None:
         raise BrakebenchError("--resample and --names say how signals are written; give --out as well")
     if args.resample is not None and not 1e-9 <= args.resample < 1e9:
         raise BrakebenchError("--resample takes a step above 0 s, 0.01 for 10 ms")
+
+
+def _of_no_channel(databases_: Databases, logs: Logs) -> tuple[str, ...]:
+    """A word about databases of channels that the logs do not have."""
+    named = [] if databases_.guessed else [name for name in databases_.by_channel if name not in logs.channels]
+    has = ", ".join(logs.channels) or "none"
+    return tuple(f"--dbc {name}=...: no channel of the log is called so, it has {has}" for name in named)
 
 
 def _check_found(logs: Logs, choice: Choice, summary: Summary) -> None:

@@ -344,3 +344,14 @@ def test_the_line_of_a_stamp_that_runs_back_is_named(tmp_path, dbc, capsys):
     assert "stamps run back 1 time, first at frame 3 (line 5)" in capsys.readouterr().out
     run(tmp_path / "back.log", "--dbc", dbc, "--json")
     assert json.loads(capsys.readouterr().out)["stamps_back"]["first_line"] == 5
+
+
+def test_channels_of_databases_are_those_of_the_log(tmp_path, dbc, capsys):
+    path = tmp_path / "a.csv"
+    path.write_text("time_s,channel,id,extended,flags,length,data\n1.0,my bus,1,0,,2,0101\n1.1,b=c,1,0,,2,0101\n")
+    assert run(path, "--dbc", f"my bus={dbc}", "--dbc", f"b=c={dbc}", "--dbc", f"can7={dbc}", "--json") == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["decoded"], result["unknown"]) == (2, 0)
+    assert result["dbc_warnings"] == ["--dbc can7=...: no channel of the log is called so, it has my bus, b=c"]
+    with pytest.raises(BrakebenchError, match=r"b=none\.dbc: cannot be opened"):
+        run(path, "--dbc", "a=b=none.dbc")
