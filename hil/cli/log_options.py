@@ -120,15 +120,21 @@ def databases(words: list[str]) -> tuple[Databases, list[Path]]:
     files: list[Path] = []
     read: list[Database] = []
     for word in words:
-        channel, equals, name = word.partition("=")
-        if not equals or Path(word).exists():
-            channel, name = "", word
-        path = Path(name)
+        channel, path = _database(word)
         if path not in files:
             files.append(path)
             read.append(read_database(path))
         (by_channel.setdefault(channel, []) if channel else general).append(read[files.index(path)])
     return Databases.joined(general, by_channel), files
+
+
+def _database(word: str) -> tuple[str, Path]:
+    """Channel ("" for all) and file; of several ``=`` the first one behind which a file is called so parts them."""
+    parts = word.split("=")
+    if len(parts) == 1 or Path(word).exists():
+        return "", Path(word)
+    pairs = [("=".join(parts[:k]), Path("=".join(parts[k:]))) for k in range(1, len(parts))]
+    return next((pair for pair in pairs if pair[1].is_file()), pairs[0])
 
 
 def bit_rates(words: list[str]) -> dict[str, BitRates]:

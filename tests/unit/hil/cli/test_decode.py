@@ -409,3 +409,14 @@ def test_wrong_use_says_what_to_do(words, message, whole, dbc, tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     with pytest.raises(BrakebenchError, match=message):
         run(whole if words else dbc, "--dbc", dbc, *words)
+
+
+def test_channels_of_databases_are_those_of_the_log(tmp_path, dbc, capsys):
+    path = tmp_path / "a.csv"
+    path.write_text("time_s,channel,id,extended,flags,length,data\n1.0,my bus,1,0,,2,0101\n1.1,b=c,1,0,,2,0101\n")
+    assert run(path, "--dbc", f"my bus={dbc}", "--dbc", f"b=c={dbc}", "--dbc", f"can7={dbc}", "--json") == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["decoded"], result["unknown"]) == (2, 0)
+    assert result["notes"] == ["--dbc: the log has no channel can7; its channels are my bus, b=c"]
+    with pytest.raises(BrakebenchError, match=r"b=none\.dbc: cannot be opened"):
+        run(path, "--dbc", "a=b=none.dbc")

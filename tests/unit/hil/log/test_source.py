@@ -149,3 +149,9 @@ def test_output_appears_whole_or_not_at_all(tmp_path):
     with pytest.raises(LogError, match="cannot be written"):
         write()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_format_that_is_none_is_refused(tmp_path):
+    (tmp_path / "a.log").write_text("(1.0) can0 123#11\n")
+    with pytest.raises(LogError, match="no format is called 'xyz'; known are candump, "):
+        open_log(tmp_path / "a.log", form="xyz")
