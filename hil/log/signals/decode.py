@@ -219,25 +219,37 @@ class Decoder:
         heads: list[_Head] = []
         came = np.flatnonzero(np.diff(assigned.starts[:-1]))
         stamps = stamps_of(table.time_ns, assigned, came)
-        for slot in sorted({*came.tolist(), *joined}):
+        slots = came if not joined else np.union1d(came, list(joined))
+        places = assigned.starts[slots], assigned.starts[slots + 1], assigned.least[slots]
+        counts = assigned.short[slots], assigned.longer[slots]
+        for slot, begin, end, least, short, longer in zip(
+            *(a.tolist() for a in (slots, *places, *counts)), strict=True
+        ):
             plan = self._lookup.plan(slot)
-            group, too_short = frames_of(slot, plan, table, words, assigned)
+            group, too_short = frames_of(plan, table, words, assigned, begin, end, least)
             if too_short:
                 log.rejected += too_short
                 log.reasons[TOO_SHORT] += too_short
+                short -= too_short
             log.decoded += len(group.rows)
-            short, longer = int(assigned.short[slot]) - too_short, int(assigned.longer[slot])
-            carried = [one for one in joined.get(slot, ()) if len(one.data) >= plan.least]
+            carried = [one for one in joined.get(slot, ()) if len(one.data) >= plan.least] if joined else []
             if carried:
                 short += sum(len(one.data) < plan.message.length for one in carried)
                 longer += sum(len(one.data) > plan.message.length for one in carried)
                 group = with_joined(group, carried, table, words)
-            if not len(group.rows):
+            count = len(group.rows)
+            if not count:
                 continue
             if carried or too_short:
                 times = table.time_ns[group.rows]
                 stamps[slot] = int(times.min()), int(times.max())
-            log.messages[plan.name] = MessageCount(len(group.rows), *stamps[slot], short, longer, len(carried))
+            log.messages[plan.name] = MessageCount(count, *stamps[slot], short, longer, len(carried))
+            if not plan.from_sources:
+                head = self._head(plan, plan.name, None)
+                log.rows[plan.name] = group.rows
+                heads.append(head)
+                parts.append((plan, group))
+                continue
             for head, one in self._by_source(plan, group, table, assigned):
                 log.rows[head.name] = one.rows
                 heads.append(head)
@@ -253,10 +265,7 @@ class Decoder:
     def _by_source(
         self, plan: MessagePlan, group: Group, table: FrameTable, assigned: Assigned
     ) -> Iterator[tuple["_Head", Group]]:
-        """Frames of a message by the name of their columns."""
-        if not getattr(plan.message, "pgn_match", False):
-            yield self._head(plan, plan.name, None), group
-            return
+        """Frames of a J1939 message by the name of their columns."""
         sources = (table.can_id[group.rows] & 0xFF).astype(np.uint8)
         if sources.min() == sources.max():
             source = int(sources[0])

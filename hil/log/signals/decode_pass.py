@@ -3,6 +3,8 @@
 Words are int64 throughout, so that shifts and masks give the same compiled and uncompiled.
 """
 
+import numpy as np
+
 from hil.log.compiled import compiled, inlined
 
 _REMOTE, _ERROR = 1, 2
@@ -39,6 +41,28 @@ def fill_hash(keys, values, seed, places, found):  # type: ignore[no-untyped-def
         found[at] = values[i]
 
 
+@inlined
+def _take_note(per_slot, slot, n, number):  # type: ignore[no-untyped-def]
+    """Count a frame of another length than the database says, and see whether it came on a new channel."""
+    if n < per_slot[slot, 0]:
+        per_slot[slot, 4] += 1
+        per_slot[slot, 3] = min(per_slot[slot, 3], n)
+    elif n > per_slot[slot, 1]:
+        per_slot[slot, 5] += 1
+    if number != per_slot[slot, 6]:
+        per_slot[slot, 6] = number if per_slot[slot, 6] == -1 else -2
+
+
+@inlined
+def _identifiers(ids, wide, flags, found):  # type: ignore[no-untyped-def]
+    """Standard identifiers of data frames, 2048 for all other frames."""
+    for i in range(found.shape[0]):
+        found[i] = min(ids[i], np.uint32(2048))
+    for i in range(found.shape[0]):
+        if (flags[i] & np.uint8(_ERROR | _REMOTE)) | np.uint8(wide[i]):
+            found[i] = 2048
+
+
 @compiled
 def assign_standard(columns, channels, dense, per_slot, slots, left, totals):  # type: ignore[no-untyped-def]
     """Find the slot of every data frame with a standard identifier that a message has, and count.
@@ -61,32 +85,48 @@ def assign_standard(columns, channels, dense, per_slot, slots, left, totals):  #
     times, channel, ids, wide, length, flags = columns
     networks, numbers = channels
     back, others = 0, 0
-    before = times[0] if times.shape[0] else 0
-    for i in range(times.shape[0]):
-        if times[i] < before:
-            back += 1
-        before = times[i]
-        c = int(channel[i])
-        if c < 0 or c >= networks.shape[0]:
-            return i
-        slot = -1
-        if networks[c] >= 0 and not flags[i] & (_ERROR | _REMOTE) and not wide[i] and ids[i] < 2048:
-            slot = int(dense[networks[c], ids[i]])
-        slots[i] = slot
-        if slot < 0:
-            left[others] = i
-            others += 1
+    for i in range(1, times.shape[0]):
+        back += times[i] < times[i - 1]
+    for begin in range(0, times.shape[0], _CHUNK):
+        end = min(begin + _CHUNK, times.shape[0])
+        here, found = channel[begin:end], slots[begin:end]
+        different = 0
+        for i in range(end - begin):
+            different |= int(here[i]) ^ int(here[0])
+        c = int(here[0])
+        if different == 0 and c >= 0 and c < networks.shape[0] and networks[c] >= 0:
+            _identifiers(ids[begin:end], wide[begin:end], flags[begin:end], found)
+            number, row, lengths = numbers[c], dense[networks[c]], length[begin:end]
+            for k in range(end - begin):
+                j = np.uint64(k)
+                slot = -1
+                if found[j] < 2048:
+                    slot = int(row[np.uint64(found[j])])
+                found[j] = slot
+                if slot < 0:
+                    left[others] = begin + k
+                    others += 1
+                    continue
+                at, n = np.uint64(slot), int(lengths[j])
+                per_slot[at, 2] += 1
+                if n != per_slot[at, 0] or number != per_slot[at, 6]:
+                    _take_note(per_slot, at, n, number)
             continue
-        per_slot[slot, 2] += 1
-        if length[i] != per_slot[slot, 0]:
-            n = int(length[i])
-            if n < per_slot[slot, 0]:
-                per_slot[slot, 4] += 1
-                per_slot[slot, 3] = min(per_slot[slot, 3], n)
-            elif n > per_slot[slot, 1]:
-                per_slot[slot, 5] += 1
-        if numbers[c] != per_slot[slot, 6]:
-            per_slot[slot, 6] = numbers[c] if per_slot[slot, 6] == -1 else -2
+        for i in range(begin, end):
+            c = int(channel[i])
+            if c < 0 or c >= networks.shape[0]:
+                return i
+            slot = -1
+            if networks[c] >= 0 and not flags[i] & (_ERROR | _REMOTE) and not wide[i] and ids[i] < 2048:
+                slot = int(dense[networks[c], ids[i]])
+            slots[i] = slot
+            if slot < 0:
+                left[others] = i
+                others += 1
+                continue
+            per_slot[slot, 2] += 1
+            if length[i] != per_slot[slot, 0] or numbers[c] != per_slot[slot, 6]:
+                _take_note(per_slot, slot, int(length[i]), numbers[c])
     totals[0] = back
     totals[1] = others
     return -1
@@ -148,14 +188,7 @@ def assign_left(left, columns, channels, tables, unknown, per_slot, slots, total
         if slot >= 0:
             slots[i] = slot
             per_slot[slot, 2] += 1
-            n = int(length[i])
-            if n < per_slot[slot, 0]:
-                per_slot[slot, 4] += 1
-                per_slot[slot, 3] = min(per_slot[slot, 3], n)
-            elif n > per_slot[slot, 1]:
-                per_slot[slot, 5] += 1
-            if numbers[c] != per_slot[slot, 6]:
-                per_slot[slot, 6] = numbers[c] if per_slot[slot, 6] == -1 else -2
+            _take_note(per_slot, slot, int(length[i]), numbers[c])
             continue
         strangers += 1
         key = int(numbers[c]) << 32 | can_id
@@ -188,15 +221,22 @@ def scatter(slots, words, stride, position, rows, first):  # type: ignore[no-unt
 
     ``position`` holds where each slot begins and is moved on; ``words`` has ``stride`` words a frame.
     """
-    for i in range(slots.shape[0]):
-        slot = slots[i]
-        if slot >= 0 and slot < position.shape[0]:
-            at = position[slot]
-            if at >= rows.shape[0] or i * stride >= words.shape[0]:
+    if slots.shape[0] * stride > words.shape[0]:
+        return
+    # unsigned, since an index that could be negative costs a branch each
+    slot_end, end = np.uint64(position.shape[0]), np.uint64(min(rows.shape[0], first.shape[0]))
+    for k in range(slots.shape[0]):
+        i = np.uint64(k)
+        if slots[i] < 0:
+            continue
+        slot = np.uint64(slots[i])
+        if slot < slot_end:
+            at = np.uint64(position[slot])
+            if at >= end:
                 return
-            position[slot] = at + 1
-            rows[at] = i
-            first[at] = words[i * stride]
+            position[slot] = int(at) + 1
+            rows[at] = k
+            first[at] = words[i * np.uint64(stride)]
 
 
 @compiled
@@ -299,13 +339,11 @@ def leave_out(words, numbers, values, rows, kept):  # type: ignore[no-untyped-de
     """
     shift, mask, sign, swap, none = numbers[0], numbers[1], numbers[2], numbers[3], numbers[9]
     n = min(min(words.shape[0], values.shape[0]), min(rows.shape[0], kept.shape[0]))
-    k = 0
-    for i in range(n):
-        word = words[i]
-        if swap:
-            word = _swapped(word)
+    k = np.uint64(0)
+    for j in range(n):
+        i = np.uint64(j)
+        word = _swapped(words[i]) if swap else words[i]
         values[k] = values[i]
         kept[k] = rows[i]
-        if (((word >> shift) & mask) ^ sign) - sign != none:
-            k += 1
-    return k
+        k += np.uint64((((word >> shift) & mask) ^ sign) - sign != none)
+    return int(k)

@@ -36,11 +36,10 @@ def extract_all(parts: Parts, base: Words) -> list[list[Found]]:
         found[number] = _plain_found(jobs, job, plan, group)
         job += len(plan.signals)
     for (number, piece), begin, (absent, bad) in zip(pieces, jobs.outs[job:], jobs.counts[job:], strict=True):
+        numbers = parts[number][0].ints[piece.place]
         values = (jobs.as_float if piece.plan.kind == FLOAT else jobs.as_int)[begin : begin + len(piece.rows)]
         one = Found(piece.place, piece.rows, values, len(piece.rows), absent, bad)
-        if absent or bad:
-            one = _corrected(one, piece.plan, parts[number][0].ints[piece.place], piece.words)
-        found[number].append(one)
+        found[number].append(_corrected(one, piece.plan, numbers, piece.words) if absent or bad else one)
     for number in others:
         found[number].sort(key=_place)
     return found
@@ -48,16 +47,17 @@ def extract_all(parts: Parts, base: Words) -> list[list[Found]]:
 
 def _plain_found(jobs: "_Jobs", job: int, plan: MessagePlan, group: Group) -> list[Found]:
     """Signals of a message whose words the base holds; ``job`` is the first of them."""
-    rows, n, begin = group.rows, len(group.rows), jobs.outs[job]
+    rows, n, begin, end_job = group.rows, len(group.rows), jobs.outs[job], job + len(plan.signals)
     end = begin + n * len(plan.signals)
     ints, floats = jobs.as_int[begin:end].reshape(-1, n), jobs.as_float[begin:end].reshape(-1, n)
-    found = []
-    counts = jobs.counts[job : job + len(plan.signals)]
-    for place, (signal, (absent, bad)) in enumerate(zip(plan.signals, counts, strict=True)):
-        one = Found(place, rows, (floats if signal.kind == FLOAT else ints)[place], n, absent, bad)
-        if absent or (bad and signal.named):
-            one = _corrected(one, signal, plan.ints[place], group.plane(0))
-        found.append(one)
+    found = [
+        Found(place, rows, (floats if signal.kind == FLOAT else ints)[place], n, absent, bad)
+        for place, (signal, (absent, bad)) in enumerate(zip(plan.signals, jobs.counts[job:end_job], strict=True))
+    ]
+    odd = jobs.odd[job:end_job]
+    if any(odd):
+        for place in np.flatnonzero(odd).tolist():
+            found[place] = _corrected(found[place], plan.signals[place], plan.ints[place], group.plane(0))
     return found
 
 
@@ -90,6 +90,7 @@ class _Jobs:
     ----------
     outs : where the values of each job begin in the output.
     counts : values not available and out of range, of each job.
+    odd : jobs with either.
     as_int, as_float : the output.
     """
 
@@ -160,4 +161,5 @@ class _Jobs:
                 if done != len(some):
                     raise AssertionError(f"signal {done} of {len(some)} lies outside of its frames")
                 counts[some] = own
+        self.odd: list[bool] = (counts != 0).any(axis=1).tolist()
         self.counts = counts.tolist()

@@ -33,18 +33,25 @@ def words_of(table: FrameTable) -> Words:
     return np.ascontiguousarray(data).reshape(-1).view("<u8").astype(np.uint64, copy=False)
 
 
-def frames_of(slot: int, plan: MessagePlan, table: FrameTable, words: Words, assigned: Assigned) -> tuple[Group, int]:
-    """Frames of a message that hold a signal, and how many do not."""
-    a, b = assigned.starts[slot : slot + 2].tolist()
-    group = Group(assigned.rows[a:b], None, words, len(words) // len(table))
-    group.put_plane(assigned.first[a:b], a)
-    if assigned.least[slot] >= plan.full:
+def frames_of(
+    plan: MessagePlan, table: FrameTable, words: Words, assigned: Assigned, begin: int, end: int, least: int
+) -> tuple[Group, int]:
+    """Frames of a message that hold a signal, and how many do not.
+
+    Parameters
+    ----------
+    begin, end : where its frames are in the order of ``assigned``.
+    least : bytes of the shortest of them.
+    """
+    group = Group(assigned.rows[begin:end], None, words, len(words) // len(table))
+    group.put_plane(assigned.first[begin:end], begin)
+    if least >= plan.full:
         return group, 0
     group.lengths = table.length[group.rows]
-    if assigned.least[slot] >= plan.least:
+    if least >= plan.least:
         return group, 0
     group = group.take(np.flatnonzero(group.lengths >= plan.least))
-    return group, b - a - len(group.rows)
+    return group, end - begin - len(group.rows)
 
 
 def with_joined(group: Group, joined: list[Joined], table: FrameTable, words: Words) -> Group:

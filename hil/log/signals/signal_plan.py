@@ -124,6 +124,7 @@ class MessagePlan:
     full : bytes from which a frame holds every signal (that its multiplexers select).
     plain : the compiled pass takes all signals, and all lie in the first word of every frame that is not short.
     ints, floats : what the compiled pass needs of each signal, see `hil.log.signals.decode_pass`.
+    from_sources : a J1939 message, which several nodes may send.
     """
 
     name: str
@@ -134,6 +135,7 @@ class MessagePlan:
     plain: bool
     ints: Ints
     floats: Floats
+    from_sources: bool = False
 
 
 def padded_length(length: int) -> int:
@@ -166,7 +168,9 @@ def plan_message(message: Message, name: str, wanted: Wanted) -> MessagePlan:
     plain = all(
         plan.kind != OTHER and plan.parent is None and plan.word == 0 and not plan.straddles for plan in signals
     )
-    return MessagePlan(name, message, signals, least, full, plain, ints, floats)
+    return MessagePlan(
+        name, message, signals, least, full, plain, ints, floats, bool(getattr(message, "pgn_match", False))
+    )
 
 
 def _ends(message: Message, by_name: dict[str, Signal]) -> dict[str, int]:
