@@ -117,10 +117,10 @@ def test_a_log_without_a_frame_is_unusable(tmp_path, said, name):
     path.write_bytes(make())
     code, text = said("decode", path, "--out", tmp_path / "out.csv")
     assert code == 2
-    assert "no frame could be read" in text
+    assert "no frame could be read" in text or "no CAN frame in it" in text
     code, text = said("convert", path, tmp_path / "out.log")
     assert code == 2
-    assert "no frame could be read" in text
+    assert "no frame could be read" in text or "no CAN frame in it" in text
     assert holds in text
     assert [one.name for one in tmp_path.iterdir()] == [name]
 
