@@ -13,7 +13,7 @@ from hil.log.formats import writable
 from hil.log.frames import FrameFlag, FrameTable, LogError, LogFacts
 from hil.log.read import Log, Progress, open_log
 from hil.log.source import DEFAULT, ReadOptions
-from hil.log.write import kept, losses, write_tables
+from hil.log.write import cannot_hold, kept, losses, write_tables
 
 KINDS = FrameFlag.REMOTE | FrameFlag.ERROR
 
@@ -55,6 +55,8 @@ def convert(
         if not facts.frames:
             raise LogError(source, f"no frame could be read{_instead(account)}; give a CAN log")
         facts = replace(facts, start_ns=account.start_ns)
+        if (problem := cannot_hold(facts, form)) is not None:
+            raise LogError(target, problem)
         write_tables(log.tables(_part(progress, 1)), facts, temporary, form, options.timezone)
         with open_log(temporary, form.name, options) as back:
             frames_written, difference = _compare(log, back, facts, _part(progress, 2))

@@ -167,3 +167,15 @@ def test_an_interrupted_command_leaves_nothing(folder, number, code, out):
     _, error = process.communicate()
     assert (process.returncode, error) == (code, b"")
     assert set(Path().iterdir()) == before
+
+
+@pytest.mark.parametrize(("moment", "zone"), [("0001-01-01T00:00", "Asia/Tokyo"), ("9999-12-31T23:59", "America/Lima")])
+def test_a_date_beyond_the_calendar_is_refused(folder, capsys, moment, zone):
+    assert run("decode", "a.log", "--from", moment, "--timezone", zone) == 2
+    assert "is no time" in capsys.readouterr().err
+
+
+def test_what_a_format_cannot_hold_is_said_of_the_output(folder, capsys):
+    Path("old.csv").write_text("time_s,channel,id,extended,flags,length,data\n-5,can0,1,0,,1,01\n")
+    assert run("convert", "old.csv", "o.log") == 2
+    assert capsys.readouterr().err.startswith("brakebench: o.log: candump cannot hold stamps before 1970")
