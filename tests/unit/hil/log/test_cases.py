@@ -103,7 +103,7 @@ def ethernet():
 
 
 FRAMELESS = {
-    "ethernet.pcap": (ethernet, "300 link type 1"),
+    "ethernet.pcap": (ethernet, "300 of link type 1"),
     "head.asc": (lambda: b"date Fri May 02 06:24:08.927 2025\nbase hex  timestamps absolute\n", ""),
     "head.blf": (lambda: (LOGS / "e.blf").read_bytes()[:144], ""),
     "damaged.log": (lambda: b"(1.0) can0 12#\n(1.0) can0 123#1\n", "2 pieces that are none"),
