@@ -58,6 +58,7 @@ def losses(case, suffix):
         yield NINE_DIGITS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize("name", CONVERTED)
 def test_conversions_keep_what_a_format_holds_and_say_the_rest(tmp_path, capsys, name, suffix):
