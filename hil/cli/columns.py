@@ -1,7 +1,8 @@
 """Aligned columns of text that fit the width they are given."""
 
+import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from hil.log.account import printable
 
@@ -14,9 +15,20 @@ def terminal_width() -> int:
     return max(LEAST_WIDTH, min(MOST_WIDTH, shutil.get_terminal_size((100, 24)).columns))
 
 
+def say(lines: Iterable[str]) -> None:
+    """Print lines; a reader of the output that has left (``| head``) changes nothing of what the command returns."""
+    try:
+        print("\n".join(lines), flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+
+
 def cut(text: str, width: int) -> str:
-    """Text of at most ``width`` letters; ``~`` stands for what is left out."""
-    return text if len(text) <= width else text[: max(0, width - 1)] + "~"
+    """Text of at most ``width`` letters; ``~`` stands for what is left out before the end, which tells the most."""
+    if len(text) <= width:
+        return text
+    behind = max(0, width - 1) * 2 // 3
+    return text[: max(0, width - 1) - behind] + "~" + text[len(text) - behind :]
 
 
 def columns(heads: Sequence[str], rows: Sequence[Sequence[str]], width: int, left: Sequence[int] = (0,)) -> list[str]:

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from hil.cli.columns import terminal_width, wrapped
+from hil.cli.columns import say, terminal_width, wrapped
 from hil.cli.log_options import LOGS, add_force, add_timezone
 from hil.cli.progress import Progress
 from hil.log.convert import Conversion, convert
@@ -49,15 +49,16 @@ def run(args: argparse.Namespace) -> int:
             "passed_over": dict(account.passed_over),
             "notes": [*done.notes, *account.notes],
         }
-        print(json.dumps(result))
+        say([json.dumps(result)])
     else:
         text = (
             f"{done.source} ({done.format}) -> {done.path}: {done.frames_read:,} frames read, "
             f"{done.frames_written:,} written, equal"
         )
-        print("\n".join(wrapped(text, terminal_width())))
-    for note in _notes(done):
-        print("\n".join(wrapped(note, terminal_width())), file=sys.stderr if args.json else sys.stdout)
+        say(line for note in (text, *_notes(done)) for line in wrapped(note, terminal_width()))
+    if args.json:
+        for note in _notes(done):
+            print("\n".join(wrapped(note, terminal_width())), file=sys.stderr)
     return 0 if account.whole else 1
 
 
@@ -68,7 +69,9 @@ def _notes(done: Conversion) -> Iterator[str]:
     for kind, count in account.passed_over.items():
         yield f"{count:,} {kind} passed over"
     if account.rejected:
-        yield f"{account.rejected:,} pieces of {done.source} are no frames and were left out:"
+        single = account.rejected == 1
+        what = f"piece of {done.source} is no frame" if single else f"pieces of {done.source} are no frames"
+        yield f"{account.rejected:,} {what} and left out:"
         yield from (f"  at byte {one.offset}: {one.text}" for one in account.first_rejected)
     if account.truncated_at is not None:
         yield f"{done.source} is cut off at byte {account.truncated_at}"

@@ -7,15 +7,17 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from hil.cli.columns import terminal_width
+from hil.cli.columns import say, terminal_width
 from hil.cli.log_options import (
     LOGS,
     add_databases,
     add_force,
     add_timezone,
     bit_rates,
+    check_found,
     databases,
     paths,
+    unused,
     words_of,
 )
 from hil.cli.progress import Progress
@@ -23,6 +25,7 @@ from hil.cli.summary_json import summary_values
 from hil.cli.summary_text import summary_lines
 from hil.errors import BrakebenchError
 from hil.log.account import printable
+from hil.log.atomic_write import check_folder
 from hil.log.choice import Choice, Moment
 from hil.log.export.blocks import Block, Field, Layout, blocks_of
 from hil.log.several import Logs
@@ -69,34 +72,39 @@ def run(args: argparse.Namespace) -> int:
     databases_, files = databases(args.dbc)
     choice = _choice(args)
     wanted = choice.wanted(databases_)
-    contents = Contents(databases_, wanted, bit_rates(args.bitrate), args.e2e_legacy)
+    rates = bit_rates(args.bitrate)
+    contents = Contents(databases_, wanted, rates, args.e2e_legacy)
     _check_out(args)
     limit = None if args.limit_mb is None else int(args.limit_mb * 1_000_000)
     warnings = (*databases_.warnings, *(w for one in databases_.all() for w in one.warnings))
     with (
         Logs(paths(args.log), ReadOptions(timezone=args.timezone), limit) as logs,
-        Progress(2 if args.out else 1) as progress,
+        Progress(1 if args.out is None else 2) as progress,
     ):
         for table in choice.frames(logs.tables(progress)):
             contents.add(table)
         summary = contents.summary()
-        _check_found(logs, choice, summary)
+        check_found(choice, summary.frames, logs)
+        named = {"--channel": choice.channels, "--bitrate": filter(None, rates), "--dbc": databases_.by_channel}
+        if not args.dbc:
+            del named["--dbc"]
+        logs.notes += [note for option, names in named.items() for note in unused(option, names, logs)]
         if summary.backwards is not None and not choice.of_frames:
             line = logs.line_of(summary.backwards.frame - 1)
             summary = replace(summary, backwards=replace(summary.backwards, line=line))
         rows = None
-        if args.out and (summary.frames or logs.whole):
+        if args.out is not None and summary.frames:
             progress.part(1, "writing")
             blocks = blocks_of(choice.frames(logs.tables(progress)), databases_.decoder(wanted))
             rows = _write(args, blocks, contents, summary, [*files, *(part.path for part in logs.parts)])
     if args.json:
         values = summary_values(logs, contents, summary, warnings)
-        print(json.dumps(values | {"out": args.out, "rows": rows}, allow_nan=False))
+        say([json.dumps(values | {"out": args.out, "rows": rows}, allow_nan=False)])
     else:
         lines = summary_lines(logs, contents, summary, args.timezone, terminal_width(), warnings)
         if rows is not None:
             lines += ["", f"signals: {printable(args.out)} ({rows:,} rows, {len(contents.signals)} signals)"]
-        print("\n".join(lines))
+        say(lines)
     return _exit_code(logs, contents, summary)
 
 
@@ -107,28 +115,19 @@ def _choice(args: argparse.Namespace) -> Choice:
 
 def _check_out(args: argparse.Namespace) -> None:
     if args.limit_mb is not None and not 0 < args.limit_mb < 1e9:
-        raise BrakebenchError("--limit-mb takes a number above 0")
-    if args.out:
+        raise BrakebenchError(f"--limit-mb {args.limit_mb:g}: expected a number of megabytes above 0")
+    if args.out is not None:
         from hil.log.export.messages import check_target
 
         check_target(args.out)
+        if not args.out.endswith("/"):
+            check_folder(Path(args.out))
         if Path(args.out).exists() and not args.force:
             raise BrakebenchError(f"{args.out}: exists already; use --force to replace it, or give another name")
     elif args.resample is not None or args.names:
         raise BrakebenchError("--resample and --names say how signals are written; give --out as well")
     if args.resample is not None and not 1e-9 <= args.resample < 1e9:
-        raise BrakebenchError("--resample takes a step above 0 s, 0.01 for 10 ms")
-
-
-def _check_found(logs: Logs, choice: Choice, summary: Summary) -> None:
-    """Refuse a choice that leaves nothing, so that a slip of the pen is no empty result."""
-    if summary.frames or not choice.of_frames or not any(part.frames for part in logs.parts):
-        return
-    where = f"channel {', '.join(choice.channels)}" if choice.channels else "this span of time"
-    raise BrakebenchError(
-        f"{logs.parts[0].path}: none of its {sum(part.frames for part in logs.parts):,} frames is of {where}; "
-        f"its channels are {', '.join(map(printable, logs.channels))}"
-    )
+        raise BrakebenchError(f"--resample {args.resample:g}: expected a step above 0 in seconds, 0.01 for 10 ms")
 
 
 def _write(
@@ -149,9 +148,7 @@ def _write(
 
 def _exit_code(logs: Logs, contents: Contents, summary: Summary) -> int:
     """0 whole; 1 something of the log is missing; 2 no frame could be read."""
-    if logs.whole and not contents.counts.rejected:
-        return 0
     if not summary.frames:
         print("brakebench: no frame could be read; give a CAN log", file=sys.stderr)
         return 2
-    return 1
+    return 0 if logs.whole and not contents.counts.rejected else 1

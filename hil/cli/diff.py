@@ -4,19 +4,19 @@ import argparse
 import json
 import math
 from collections.abc import Iterator
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 from dbc.database import Signal
-from hil.cli.columns import columns, terminal_width, wrapped
-from hil.cli.log_options import LOGS, add_databases, add_timezone, databases, words_of
+from hil.cli.columns import columns, say, terminal_width, wrapped
+from hil.cli.log_options import LOGS, add_databases, add_timezone, check_found, databases, words_of
 from hil.cli.progress import Progress
 from hil.errors import BrakebenchError
-from hil.log.choice import Choice
-from hil.log.compare.diff import LogDifference, Tolerance, diff_logs
+from hil.log.choice import Choice, matches
+from hil.log.compare.diff import LogDifference, MessageDifference, Tolerance, diff_logs
 from hil.log.compare.diff_signals import SignalDifference
 from hil.log.several import Logs
+from hil.log.signals.databases import Databases
 from hil.log.source import ReadOptions
 
 SHOWN = 10
@@ -29,7 +29,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="which signals of two logs differ",
         description="Compare the signals of two logs, frame by frame: which differ, from when, by how much.",
         epilog="Frames are paired by their stamps, within half a cycle. Tolerance is one raw step, and none for single "
-        "bits and named values. Exit codes: 0 equal within the tolerances, 1 they differ, 2 unusable.",
+        "bits and named values. Exit codes: 0 equal within the tolerances, 1 they differ, or something of a log was "
+        "cut off or rejected, 2 unusable.",
     )
     parser.add_argument("first", metavar="A", type=Path, help=LOGS)
     parser.add_argument("second", metavar="B", type=Path, help="the other one")
@@ -55,22 +56,29 @@ def run(args: argparse.Namespace) -> int:
     """Compare and say what differs."""
     databases_, _ = databases(args.dbc)
     choice = Choice(tuple(args.channel), messages=words_of(args.messages), signals=words_of(args.signals))
-    tolerance = _tolerance(args.tolerance)
+    tolerance = _tolerance(args.tolerance, databases_)
     options = ReadOptions(timezone=args.timezone)
     with Logs([args.first], options) as first, Logs([args.second], options) as second, Progress() as progress:
         found = diff_logs(first, second, databases_, choice, tolerance, progress.part(0, "comparing"))
         for logs in (first, second):
             if not any(part.frames for part in logs.parts):
                 raise BrakebenchError(f"{logs.parts[0].path}: no frame could be read; give a CAN log")
-        whole = {str(logs.parts[0].path): logs.whole for logs in (first, second)}
+        check_found(choice, len(found.messages) + len(found.only_first) + len(found.only_second), first, second)
+        if not (found.messages or found.only_first or found.only_second):
+            raise BrakebenchError(
+                f"{args.first} and {args.second}: nothing to compare: no frame of them is of a chosen message of the "
+                "databases; give the database of these logs with --dbc"
+            )
+        whole = [first.whole, second.whole]
     if args.json:
-        print(json.dumps(_values(found, args, whole), allow_nan=False))
+        say([json.dumps(_values(found, args, whole), allow_nan=False)])
     else:
-        print("\n".join(_lines(found, args, whole, terminal_width())))
-    return 0 if found.equal else 1
+        say(_lines(found, args, whole, terminal_width()))
+    return 0 if found.equal and all(whole) else 1
 
 
-def _tolerance(words: list[str]) -> Tolerance:
+def _tolerance(words: list[str], of: Databases) -> Tolerance:
+    names = [(message.name, signal.name) for message in of.messages() for signal in message.signals] if words else []
     given: list[tuple[str, float]] = []
     for word in words:
         pattern, _, text = word.rpartition("=")
@@ -80,38 +88,41 @@ def _tolerance(words: list[str]) -> Tolerance:
             value = math.nan
         if not pattern or not value >= 0:
             raise BrakebenchError(f"--tolerance {word}: expected a name and a number, as WHEELS.*=0.5")
+        if not any(matches(*name, pattern) for name in names):
+            raise BrakebenchError(f"--tolerance {word}: no signal of the database is called {pattern!r}")
         given.append((pattern, value))
 
     def tolerance(name: str, signal: Signal) -> float | None:
         for pattern, value in reversed(given):
-            if fnmatchcase(name if "." in pattern else signal.name, pattern):
+            if matches(name.rpartition(".")[0], signal.name, pattern):
                 return value
         return None
 
     return tolerance
 
 
-def _lines(found: LogDifference, args: argparse.Namespace, whole: dict[str, bool], width: int) -> Iterator[str]:
+def _lines(found: LogDifference, args: argparse.Namespace, whole: list[bool], width: int) -> Iterator[str]:
     different = sorted((one for one in found.signals if not one.equal), key=lambda one: one.first_s or 0.0)
     clock = "by their stamps" if found.same_clock else "from the first frame of each on (they do not overlap in time)"
     text = (
-        f"{args.first} and {args.second}, {clock}: {len(found.signals)} signals of {len(found.messages)} messages "
-        f"compared, {len(different)} differ"
+        f"A {args.first} and B {args.second}, {clock}: {len(found.signals)} signals of {len(found.messages)} messages "
+        f"compared, {len(different)} {'differs' if len(different) == 1 else 'differ'}"
     )
     yield from wrapped(text, width)
-    yield from (line for path, good in whole.items() if not good for line in wrapped(f"{path} is not whole", width))
+    for path in dict.fromkeys(path for path, good in zip((args.first, args.second), whole, strict=True) if not good):
+        yield from wrapped(f"{path}: something was cut off or rejected; brakebench decode tells what", width)
     if different:
         heads = ("signal", "unit", "compared", "differ", "one-sided", "from s", "greatest", "at s", "rms")
         yield ""
         yield from columns(heads, [_row(one) for one in different], width, left=(0, 1))
-    unpaired = [one for one in found.messages if not one.equal]
-    notes = [
-        f"{one.name}: {one.first:,} and {one.second:,} frames; {one.unpaired_first:,} and {one.unpaired_second:,} "
-        f"have no partner, the first at {one.unpaired_s or 0.0:.3f} s"
-        for one in unpaired[:SHOWN]
-    ]
+    unpaired = sorted((one for one in found.messages if not one.equal), key=lambda one: one.unpaired_s or 0.0)
+    if unpaired:
+        yield ""
+        frames = ("frames without a partner", "in A", "in B", "only in A", "only in B", "from s")
+        yield from columns(frames, [_unpaired_row(one) for one in unpaired[:SHOWN]], width)
     if len(unpaired) > SHOWN:
-        notes.append(f"and {len(unpaired) - SHOWN} more messages with frames that have no partner")
+        yield f"and {len(unpaired) - SHOWN} more messages with frames that have no partner (all of them with --json)"
+    notes: list[str] = []
     for path, only in ((args.first, found.only_first), (args.second, found.only_second)):
         if only:
             shown = ", ".join(f"{name} ({count:,})" for name, count in list(only.items())[:SHOWN])
@@ -124,6 +135,11 @@ def _lines(found: LogDifference, args: argparse.Namespace, whole: dict[str, bool
     if notes:
         yield ""
     yield from (line for note in notes for line in wrapped(note, width, "    "))
+
+
+def _unpaired_row(one: MessageDifference) -> tuple[str, ...]:
+    alone = (f"{n:,}" if n else "" for n in (one.unpaired_first, one.unpaired_second))
+    return one.name, f"{one.first:,}", f"{one.second:,}", *alone, f"{one.unpaired_s or 0.0:.3f}"
 
 
 def _row(one: SignalDifference) -> tuple[str, ...]:
@@ -141,12 +157,12 @@ def _row(one: SignalDifference) -> tuple[str, ...]:
     )
 
 
-def _values(found: LogDifference, args: argparse.Namespace, whole: dict[str, bool]) -> dict[str, Any]:
+def _values(found: LogDifference, args: argparse.Namespace, whole: list[bool]) -> dict[str, Any]:
     return {
         "first": str(args.first),
         "second": str(args.second),
         "equal": found.equal,
-        "whole": list(whole.values()),
+        "whole": whole,
         "same_clock": found.same_clock,
         "signals": {
             one.name: {

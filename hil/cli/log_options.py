@@ -3,16 +3,21 @@
 import argparse
 import glob
 import os
+from collections.abc import Iterable
 from datetime import UTC, datetime, tzinfo
 from pathlib import Path
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from dbc.database import Database
 from hil.errors import BrakebenchError
+from hil.log.account import printable
+from hil.log.choice import Choice
 from hil.log.foreign.database_files import read_database
+from hil.log.several import UNDATED_NS, Logs
 from hil.log.signals.databases import Databases
 from hil.log.source import STDIN
 from hil.log.summary.summary import BitRates
+from hil.log.wall_clock import wall_clock_of
 
 LOGS = "a log (candump, ASC, BLF, TRC, MF4, CSV, pcap, Parquet; also packed with gzip); - is standard input"
 ZONE = "zone of wall clocks that name none: an IANA name (Asia/Tokyo), UTC or local (default: UTC)"
@@ -77,7 +82,7 @@ def _local() -> tzinfo:
 
 
 def paths(words: list[str]) -> list[Path]:
-    """Files of the arguments; a pattern (``drive_*.blf``) stands for all files that match it.
+    """Files of the arguments, each once; a pattern (``drive_*.blf``) stands for all files that match it.
 
     Raises
     ------
@@ -94,7 +99,10 @@ def paths(words: list[str]) -> list[Path]:
         if not matched:
             raise BrakebenchError(f"{word}: no file matches this pattern")
         found += matched
-    return list(dict.fromkeys(found))
+    distinct: dict[Path, Path] = {}
+    for path in found:
+        distinct.setdefault(path.resolve(), path)
+    return list(distinct.values())
 
 
 def databases(words: list[str]) -> tuple[Databases, list[Path]]:
@@ -112,15 +120,21 @@ def databases(words: list[str]) -> tuple[Databases, list[Path]]:
     files: list[Path] = []
     read: list[Database] = []
     for word in words:
-        channel, equals, name = word.partition("=")
-        if not equals or Path(word).exists():
-            channel, name = "", word
-        path = Path(name)
+        channel, path = _database(word)
         if path not in files:
             files.append(path)
             read.append(read_database(path))
         (by_channel.setdefault(channel, []) if channel else general).append(read[files.index(path)])
     return Databases.joined(general, by_channel), files
+
+
+def _database(word: str) -> tuple[str, Path]:
+    """Channel ("" for all) and file; of several ``=`` the first one behind which a file is called so parts them."""
+    parts = word.split("=")
+    if len(parts) == 1 or Path(word).exists():
+        return "", Path(word)
+    pairs = [("=".join(parts[:k]), Path("=".join(parts[k:]))) for k in range(1, len(parts))]
+    return next((pair for pair in pairs if pair[1].is_file()), pairs[0])
 
 
 def bit_rates(words: list[str]) -> dict[str, BitRates]:
@@ -145,6 +159,44 @@ def bit_rates(words: list[str]) -> dict[str, BitRates]:
             )
         by_channel[channel] = numbers[0], numbers[1] if len(numbers) == 2 else None
     return by_channel
+
+
+def check_found(choice: Choice, frames: int, *logs: Logs) -> None:
+    """Refuse a choice that leaves no frame of logs that have some, so that a slip of the pen is no empty result.
+
+    Raises
+    ------
+    BrakebenchError
+        It says what the logs have: channels, or the span of time.
+    """
+    held = [one for one in logs if any(part.frames for part in one.parts)]
+    if frames or not choice.of_frames or not held:
+        return
+    name = " and ".join(str(one.parts[0].path) for one in held)
+    known = dict.fromkeys(channel for one in held for channel in one.channels)
+    if choice.channels and not set(choice.channels) & set(known):
+        raise BrakebenchError(f"{name}: no channel {', '.join(choice.channels)}; {channels_of(known)}")
+    last_s = max((one.last_ns - one.first_ns) / 1e9 for one in held)
+    first_ns = held[0].first_ns
+    when = f", which is stamped {wall_clock_of(first_ns, UTC)} UTC" if first_ns >= UNDATED_NS else ""
+    on = f" on channel {', '.join(choice.channels)}" if choice.channels else ""
+    raise BrakebenchError(
+        f"{name}: no frame{on} between --from and --to; give times within 0 to {last_s:.3f} s from its first frame"
+        f"{when}"
+    )
+
+
+def channels_of(names: Iterable[str]) -> str:
+    """Channels that a log has, as messages name them."""
+    return f"its channels are {', '.join(map(printable, names))}"
+
+
+def unused(option: str, channels: Iterable[str], logs: Logs) -> list[str]:
+    """Notes on channels that an option names and the log does not have."""
+    missing = [name for name in channels if name not in logs.channels]
+    if not missing or not logs.channels:
+        return []
+    return [f"{option}: the log has no channel {', '.join(map(printable, missing))}; {channels_of(logs.channels)}"]
 
 
 def words_of(text: list[str]) -> tuple[str, ...]:

@@ -2,11 +2,20 @@
 
 import argparse
 import importlib
+import io
+import os
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
+from types import FrameType
+from typing import NoReturn
 
 from hil.errors import BrakebenchError
+
+INTERRUPTED_EXIT_CODE = 130  # 128 + SIGINT, as a shell reports it
 
 COMMANDS = (
     "run",
@@ -34,9 +43,18 @@ COMMANDS = (
 """Subcommands in the order of the help; each is a module of this package."""
 
 
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are safe on a terminal, whatever was typed."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong, and exit."""
+        self.print_usage(sys.stderr)
+        self.exit(2, f"{self.prog}: error: {_safe(message)}\n")
+
+
 def build_parser(commands: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
     """Parser of the command line, with some or all commands."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="brakebench",
         description="CAN-bus brake ECU emulator and hardware-in-the-loop bench.",
         epilog="Exit codes: 0 ok, 1 an expectation failed, 2 wrong use or input, 3 the bench broke.",
@@ -52,16 +70,65 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     words = sys.argv[1:] if arguments is None else list(arguments)
     named = [word for word in words[:1] if word in COMMANDS]  # importing one command is faster than all
-    args = build_parser(named or COMMANDS).parse_args(words)
-    try:
-        code: int = args.run(args)
-    except BrakebenchError as error:
-        print(f"brakebench: {error}", file=sys.stderr)
-        return error.exit_code
-    except BrokenPipeError:
-        sys.stderr.close()  # the reader of our output has left
-        return 0
+    _take_all_letters()
+    with _interrupts() as came:
+        try:
+            args = build_parser(named or COMMANDS).parse_args(words)
+            code: int = args.run(args)
+            if sys.stdout is not None:
+                sys.stdout.flush()
+        except BrakebenchError as error:
+            return INTERRUPTED_EXIT_CODE if came else _complain(error, error.exit_code)
+        except KeyboardInterrupt:
+            return INTERRUPTED_EXIT_CODE
+        except BrokenPipeError:  # the reader of our output has left
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+            return 0
+        except OSError as error:
+            return INTERRUPTED_EXIT_CODE if came else _complain(error, BrakebenchError.exit_code)
+        except Exception:
+            if came:  # a library may turn the interrupt into an error of its own
+                return INTERRUPTED_EXIT_CODE
+            raise
     return code
+
+
+def _complain(error: Exception, code: int) -> int:
+    print(f"brakebench: {_safe(str(error))}", file=sys.stderr)
+    return code
+
+
+def _safe(text: str) -> str:
+    from hil.log.account import printable  # numpy comes with it
+
+    return "\n".join(printable(line) for line in text.splitlines())
+
+
+def _take_all_letters() -> None:
+    """Have letters that the output's encoding does not know appear escaped, instead of an error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+@contextmanager
+def _interrupts() -> Iterator[list[int]]:
+    """Yield a list that holds the interrupts (Ctrl-C) that came; each raises KeyboardInterrupt, as ever."""
+    came: list[int] = []
+
+    def interrupted(number: int, _: FrameType | None) -> None:
+        came.append(number)
+        raise KeyboardInterrupt
+
+    ours = threading.current_thread() is threading.main_thread()
+    ours = ours and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if ours:
+        signal.signal(signal.SIGINT, interrupted)
+    try:
+        yield came
+    finally:
+        if ours:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
 """``brakebench plot``: signals of a log over time, as a picture or a page."""
 
 import argparse
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from datetime import tzinfo
 from pathlib import Path
@@ -11,12 +10,21 @@ import numpy as np
 import numpy.typing as npt
 
 from dbc.database import Signal
-from hil.cli.log_options import LOGS, add_databases, add_force, add_timezone, databases, paths, words_of
+from hil.cli.columns import say, terminal_width, wrapped
+from hil.cli.log_options import (
+    LOGS,
+    add_databases,
+    add_force,
+    add_timezone,
+    check_found,
+    databases,
+    paths,
+    words_of,
+)
 from hil.cli.progress import Progress
 from hil.errors import BrakebenchError
-from hil.log.atomic_write import atomic_write
+from hil.log.atomic_write import atomic_write, check_folder
 from hil.log.choice import Choice, Moment, matches
-from hil.log.frames import FrameTable
 from hil.log.several import UNDATED_NS, Logs
 from hil.log.signals.decode import Decoder
 from hil.log.signals.decoded import Column, Values
@@ -56,29 +64,35 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Read the signals and draw them."""
-    if args.out.suffix not in SUFFIXES:
-        raise BrakebenchError(f"{args.out}: plots are written as {', '.join(SUFFIXES)}")
+    suffix = args.out.suffix.lower()
+    if suffix not in SUFFIXES:
+        got = f"the suffix {args.out.suffix!r}" if suffix else "no suffix"
+        raise BrakebenchError(f"{args.out}: plots are written as {', '.join(SUFFIXES)}; got {got}")
+    check_folder(args.out)
     databases_, files = databases(args.dbc)
     begin, end = (None if text is None else Moment.parse(text, args.timezone) for text in (args.begin, args.end))
     choice = Choice(tuple(args.channel), begin, end, signals=words_of(args.signal))
     decoder = databases_.decoder(choice.wanted(databases_))
     with Logs(paths([args.log]), ReadOptions(timezone=args.timezone)) as logs, Progress() as progress:
         gathered = gather(logs, decoder, choice, progress)
-        whole = logs.whole
+        whole = logs.whole and not decoder.totals.rejected
         read = [*files, *(part.path for part in logs.parts)]
     if not gathered.signals:
-        raise BrakebenchError(f"{args.log}: no frame of {', '.join(args.signal)} in it")
+        check_found(choice, gathered.frames, logs)
+        hint = "" if args.dbc else "; give the database of this log with --dbc"
+        raise BrakebenchError(f"{args.log}: no frame of {', '.join(args.signal)} in it{hint}")
     plots = panels(gathered, order_of(choice, list(gathered.signals)))
     samples = sum(signal.count for signal in gathered.signals.values())
     subtitle = _subtitle(gathered, samples, args.timezone)
     with atomic_write(args.out, args.force, read) as temporary:
-        if args.out.suffix == ".html":
+        if suffix == ".html":
             temporary.write_text(courses_page(plots, Path(args.log).name, subtitle), encoding="utf-8")
         else:
             write_picture(plots, Path(args.log).name, subtitle, temporary)
-    print(f"{args.out}: {len(gathered.signals)} signals, {samples:,} values")
+    notes = [f"{args.out}: {len(gathered.signals)} signals, {samples:,} values"]
     if not whole:
-        print("something of the log was cut off or rejected; brakebench decode tells what")
+        notes.append("something of the log was cut off, rejected or too short; brakebench decode tells what")
+    say(line for note in notes for line in wrapped(note, terminal_width()))
     return 0 if whole else 1
 
 
@@ -113,32 +127,29 @@ class Gathered:
 
 @dataclass(slots=True)
 class Signals:
-    """Signals by ``MESSAGE.SIGNAL``, and the stamp of the log's first frame."""
+    """Signals by ``MESSAGE.SIGNAL``, the number of chosen frames, and the stamp of the log's first frame."""
 
     signals: dict[str, Gathered] = field(default_factory=dict)
+    frames: int = 0
     first_ns: int = 0
 
 
 def gather(logs: Logs, decoder: Decoder, choice: Choice, progress: Progress) -> Signals:
     """Read the chosen signals of a log."""
     found = Signals()
-
-    def noted(tables: Iterable[FrameTable]) -> Iterable[FrameTable]:
-        first = True
-        for table in tables:
-            if first and len(table):
-                found.first_ns, first = int(table.time_ns[0]), False
-            yield table
-
-    for table in choice.frames(noted(logs.tables(progress))):
+    for table in choice.frames(logs.tables(progress)):
+        found.frames += len(table)
         for name, column in decoder.add(table).columns.items():
             if not len(column.rows):
                 continue
             if name not in found.signals:
                 if len(found.signals) >= MOST_SIGNALS:
-                    raise BrakebenchError(f"more than {MOST_SIGNALS} signals; name fewer to see something")
+                    raise BrakebenchError(
+                        f"{' '.join(choice.signals)}: more than {MOST_SIGNALS} signals of the log; name fewer"
+                    )
                 found.signals[name] = Gathered(column.signal, column.values.dtype)
             found.signals[name].add(table.time_ns[column.rows], column.values)
+    found.first_ns = logs.first_ns
     return found
 
 

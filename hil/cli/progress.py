@@ -3,6 +3,7 @@
 import sys
 from typing import IO, Self
 
+from hil.log.compiling import listeners
 from hil.rt.clock import monotonic_ns
 
 QUIET_S = 2.0  # nothing is shown before
@@ -39,9 +40,13 @@ class Progress:
         self._share = 0.0
 
     def __enter__(self) -> Self:
+        if self._live:
+            listeners.append(self._compiling)
         return self
 
     def __exit__(self, *_: object) -> None:
+        if self._live:
+            listeners.remove(self._compiling)
         if self._width:
             self._stream.write("\r" + " " * self._width + "\r")
             self._stream.flush()
@@ -63,7 +68,12 @@ class Progress:
         self._shown_s = now
         share = self._share = min(1.0, max(self._share, (self._part + done) / self._parts))  # never back
         left = f", {duration_text(passed / share * (1 - share))} left" if share > 0.005 else ""
-        line = f"{self._what}  {100 * share:3.0f} %{left}"
+        self._show(f"{self._what}  {100 * share:3.0f} %{left}")
+
+    def _compiling(self) -> None:
+        self._show("compiling what reads this log, once after installation: some seconds")
+
+    def _show(self, line: str) -> None:
         self._stream.write("\r" + line.ljust(self._width))
         self._stream.flush()
         self._width = max(self._width, len(line))

@@ -25,7 +25,7 @@ def summary_lines(
     lines = [line for part in logs.parts for line in wrapped(_part(part), width)]
     lines += wrapped(_account(logs, counts, summary, zone), width)
     if summary.channels:
-        lines += ["", *_channels(summary, width)]
+        lines += ["", *_channels(summary, logs.first_ns, width)]
     if summary.ids:
         lines += ["", *_ids(contents, summary, width)]
     notes = [*_notes(logs, contents, counts, summary), *_warned(warnings)]
@@ -56,12 +56,12 @@ def _count(n: int, what: str) -> str:
     return f"{n:,} {what}{'' if n == 1 else 's'}"
 
 
-def _channels(summary: Summary, width: int) -> Iterator[str]:
+def _channels(summary: Summary, begin_ns: int, width: int) -> Iterator[str]:
     heads = ("channel", "frames", "error", "remote", "FD", "Tx", "seconds", "load", "worst 1 s", "at s", "bit rate")
     rows = []
     for one in summary.channels[:SHOWN_CHANNELS]:
         load, worst = _loads(one)
-        at = _seconds(one.worst_at_ns - summary.began_ns) if worst else ""
+        at = _seconds(one.worst_at_ns - begin_ns) if worst else ""
         counts = [f"{n:,}" if n else "" for n in (one.errors, one.remote, one.fd, one.sent)]
         rate = "" if one.bit_rate is None else _rate(one.bit_rate)
         if rate and one.data_bit_rate:
@@ -108,7 +108,7 @@ def _ids(contents: Contents, summary: Summary, width: int) -> Iterator[str]:
         rows.append(
             (
                 one.channel if several else "",
-                one.name[2:].upper(),
+                _id_text(one),
                 contents.name(one.channel, one.can_id, one.extended) or "-",
                 f"{one.count:,}",
                 *_cycle(one.cycle),
@@ -129,10 +129,18 @@ def _cycle(cycle: Cycle | None) -> tuple[str, ...]:
     )
 
 
+def _usual_ns(cycle: Cycle) -> float:
+    return float(cycle.nominal_ns or cycle.p50_ns) or 1.0
+
+
+def _cycles(cycle: Cycle) -> str:
+    return f"{cycle.max_ns / _usual_ns(cycle):.3g} cycles of {milliseconds(_usual_ns(cycle))} ms"
+
+
 def _some(notes: list[str], more: str) -> Iterator[str]:
     yield from notes[:SHOWN]
     if len(notes) > SHOWN:
-        yield f"{more}: and {len(notes) - SHOWN} more (all of them with --json)"
+        yield f"{more}: {len(notes) - SHOWN} more (all of them with --json)"
 
 
 def _notes(logs: Logs, contents: Contents, counts: DecodedCounts, summary: Summary) -> Iterator[str]:
@@ -140,7 +148,7 @@ def _notes(logs: Logs, contents: Contents, counts: DecodedCounts, summary: Summa
     yield from _losses(logs, counts)
     back = summary.backwards
     if back is not None:
-        where = _seconds(back.time_ns - summary.began_ns)
+        where = _seconds(back.time_ns - logs.first_ns)
         line = "" if back.line is None else f" (line {back.line:,})"
         yield (
             f"stamps run back {_count(back.count, 'time')}, first at frame {back.frame:,}{line}, "
@@ -150,14 +158,14 @@ def _notes(logs: Logs, contents: Contents, counts: DecodedCounts, summary: Summa
     ids = summary.ids
 
     def name(one: IdSummary) -> str:
-        return f"{one.channel} {one.name} {contents.name(one.channel, one.can_id, one.extended) or ''}".rstrip()
+        return f"{one.channel} {_id_text(one)} {contents.name(one.channel, one.can_id, one.extended) or ''}".rstrip()
 
     gaps = [(one, one.cycle) for one in ids if one.cycle is not None and one.cycle.gaps]
-    gaps.sort(key=lambda pair: pair[1].max_ns / max(pair[1].p50_ns, 1.0), reverse=True)
+    gaps.sort(key=lambda pair: pair[1].max_ns / _usual_ns(pair[1]), reverse=True)
     yield from _some(
         [
-            f"gap: {name(one)} is silent for {milliseconds(cycle.max_ns)} ms "
-            f"from {_seconds(cycle.max_at_ns - summary.began_ns)} s on"
+            f"gap: {name(one)} is silent for {milliseconds(cycle.max_ns)} ms ({_cycles(cycle)}) "
+            f"from {_seconds(cycle.max_at_ns - logs.first_ns)} s on"
             for one, cycle in gaps
         ],
         "gap",
@@ -180,11 +188,20 @@ def _notes(logs: Logs, contents: Contents, counts: DecodedCounts, summary: Summa
     yield from _transport(counts)
     unknown = sorted((one for one in ids if _is_unknown(contents, one)), key=lambda one: -one.count)
     if unknown:
-        shown = ", ".join(f"{one.channel} {one.name} ({one.count:,})" for one in unknown[:SHOWN_UNKNOWN])
+        shown = ", ".join(f"{one.channel} {_id_text(one)} ({one.count:,})" for one in unknown[:SHOWN_UNKNOWN])
         more = f", and {len(unknown) - SHOWN_UNKNOWN} more" if len(unknown) > SHOWN_UNKNOWN else ""
-        yield f"unknown: {shown}{more}"
+        hint = (
+            "; give the database of this log with --dbc"
+            if contents.databases.guessed and counts.unknown > counts.decoded
+            else ""
+        )
+        yield f"unknown: {shown}{more}{hint}"
     if summary.other_frames:
         yield f"{_count(summary.other_frames, 'frame')} of more than {len(ids):,} identifiers have no statistics"
+
+
+def _id_text(one: IdSummary) -> str:
+    return one.name[2:].upper()
 
 
 def _is_unknown(contents: Contents, one: IdSummary) -> bool:

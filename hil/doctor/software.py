@@ -48,11 +48,11 @@ def _pip(*names: str) -> str:
 
 
 def mdf_line(present: bool) -> Line:
-    """Whether MF4 logs can be read and written."""
+    """Whether all commands read MF4 logs: ``explain`` reads them by asammdf, the others by themselves."""
     if present:
-        return Line("MF4 logs", Status.OK, "can be read and written (asammdf)")
+        return Line("MF4 logs", Status.OK, "read by every command (asammdf for explain)")
     return Line(
-        "MF4 logs", Status.MISSING, "asammdf is not installed; every other format works", _pip("brakebench[mdf]")
+        "MF4 logs", Status.MISSING, "explain needs asammdf for them; every other command works", _pip("brakebench[mdf]")
     )
 
 

@@ -40,11 +40,12 @@ class Moment:
             pass
         try:
             stamp = datetime.fromisoformat(text)
-        except ValueError:
+            time_ns = wall_clock_ns(stamp.replace(tzinfo=None), stamp.tzinfo or zone)
+        except (ValueError, OverflowError):
             raise BrakebenchError(
                 f"{text!r} is no time; give seconds from the first frame (12.5) or a date and time (2024-05-01T12:00)"
             ) from None
-        return cls(wall_clock_ns(stamp.replace(tzinfo=None), stamp.tzinfo or zone), False)
+        return cls(time_ns, False)
 
 
 @dataclass(frozen=True, slots=True)

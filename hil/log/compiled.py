@@ -9,6 +9,9 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 from numba import njit
+from numba.core import event
+
+from hil.log.compiling import listeners
 
 F = TypeVar("F", bound=Callable[..., Any])
 Decorator = Callable[[F], F]
@@ -17,6 +20,20 @@ compiled = cast(Decorator[Any], njit(cache=True, nogil=True, error_model="numpy"
 """For a pass that Python calls."""
 inlined = cast(Decorator[Any], njit(error_model="numpy"))
 """For what such a pass calls; LLVM puts it in place (faster here than Numba's own ``inline="always"``, by a half)."""
+
+
+class _Told(event.Listener):
+    """Passes on that a compilation begins; what comes from the cache on disk is none."""
+
+    def on_start(self, event: event.Event) -> None:
+        for tell in listeners:
+            tell()
+
+    def on_end(self, event: event.Event) -> None:
+        pass
+
+
+cast(Any, event).register("numba:compile", _Told())
 
 NO_DIGIT = 16
 HEX = np.full(256, NO_DIGIT, np.uint8)

@@ -13,7 +13,7 @@ from hil.log.formats import writable
 from hil.log.frames import FrameFlag, FrameTable, LogError, LogFacts
 from hil.log.read import Log, Progress, open_log
 from hil.log.source import DEFAULT, ReadOptions
-from hil.log.write import kept, losses, write_tables
+from hil.log.write import cannot_hold, kept, losses, write_tables
 
 KINDS = FrameFlag.REMOTE | FrameFlag.ERROR
 
@@ -45,14 +45,18 @@ def convert(
     Raises
     ------
     LogError
-        When the source cannot be read, the target exists or is the source, its format cannot hold the frames, or what
-        was written does not read back as the same frames.
+        When the source cannot be read or has no frame, the target exists or is the source, its format cannot hold the
+        frames, or what was written does not read back as the same frames.
     """
     form = writable(target)
     with open_log(source, options=options) as log, atomic_write(target, overwrite, [source]) as temporary:
         facts = LogFacts.of(log.tables(_part(progress, 0)))
         account = log.account
+        if not facts.frames:
+            raise LogError(source, f"no frame could be read{_instead(account)}; give a CAN log")
         facts = replace(facts, start_ns=account.start_ns)
+        if (problem := cannot_hold(facts, form)) is not None:
+            raise LogError(target, problem)
         write_tables(log.tables(_part(progress, 1)), facts, temporary, form, options.timezone)
         with open_log(temporary, form.name, options) as back:
             frames_written, difference = _compare(log, back, facts, _part(progress, 2))
@@ -63,6 +67,13 @@ def convert(
     return Conversion(
         log.path, log.format.name, account, target, facts.frames, frames_written, tuple(losses(facts, form))
     )
+
+
+def _instead(account: Account) -> str:
+    """What a log holds that has no frame."""
+    found = [f"{count:,} {kind}" for kind, count in account.passed_over.most_common(3)]
+    found += [f"{account.rejected:,} pieces that are none"] if account.rejected else []
+    return f", but {', '.join(found)}" if found else ""
 
 
 def _part(progress: Progress | None, part: int) -> Progress | None:

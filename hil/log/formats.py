@@ -8,6 +8,7 @@ from datetime import tzinfo
 from pathlib import Path
 from typing import IO
 
+from dbc.database import DatabaseError, sniff_database
 from hil.log.account import Account
 from hil.log.frames import FrameTable, LogError, LogFacts
 from hil.log.source import ReadOptions, Source
@@ -85,7 +86,8 @@ def _first_line(pattern: bytes) -> Callable[[bytes], int]:
 
 _CANDUMP = rb"\(\d{1,10}(?:\.\d{1,9})?\)\s+\S+\s+[0-9A-F]+#"
 _SCREEN = (
-    rb"(?:\(\d[\d.: -]*\)[ \t]+)?\S+[ \t]+(?:[RT]X[ \t]+\S+[ \t]+\S+[ \t]+)?[0-9A-F]{3,8}[ \t]+\[\d{1,2}\][ \t\r\n]"
+    rb"(?:\(\d[\d.: -]*\)[ \t]+)?\S+[ \t]+(?:[RT]X[ \t]+\S+[ \t]+\S+[ \t]+)?[0-9A-F]{3,8}[ \t]+"
+    rb"(?:\[\d{1,2}\]|\{[9A-F]\})[ \t\r\n]"
 )
 _ASC = rb"\d+\.\d+\s+(?:CANFD\s+)?\d+\s+\S|date\s+\w|base\s+(?:hex|dec)|begin triggerblock"
 _TRC = rb";\$(?:FILEVERSION|STARTTIME|COLUMNS)=|;.*\.trc\b|\d+\)?\s+\d+(?:\.\d+)?\s+\S+\s+\S+\s+"
@@ -129,10 +131,19 @@ def format_of(source: Source) -> Format:
         problem = "gzip file that cannot be unpacked" if source.packed else "empty: no log in it"
         raise LogError(source.path, f"{problem}; give a log file")
     form = told(head)
+    if form is None and (kind := _database_kind(head)):
+        raise LogError(source.path, f"is a database ({kind.upper()}), no log; give a log, and this with --dbc")
     if form is None:
         names = ", ".join(f.name for f in FORMATS)
         raise LogError(source.path, f"no log of a known format, its first bytes are {head[:24]!r}; known are {names}")
     return form
+
+
+def _database_kind(head: bytes) -> str:
+    try:
+        return sniff_database(head)
+    except DatabaseError:
+        return ""
 
 
 def told(head: bytes) -> Format | None:
@@ -151,5 +162,6 @@ def writable(path: Path) -> Format:
     """
     form = WRITABLE.get(path.suffix.lower())
     if form is None:
-        raise LogError(path, f"unknown suffix {path.suffix!r}; known are {', '.join(WRITABLE)}")
+        got = f"suffix {path.suffix!r} names no format" if path.suffix else "no suffix names its format"
+        raise LogError(path, f"{got} that is written; known are {', '.join(WRITABLE)}")
     return form

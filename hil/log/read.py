@@ -8,7 +8,7 @@ from dbc.database import Database
 from hil.log.account import Account
 from hil.log.builder import ROWS, recording_of
 from hil.log.formats import BY_NAME, format_of, told
-from hil.log.frames import FrameTable, Recording
+from hil.log.frames import FrameTable, LogError, Recording
 from hil.log.signals.decode import DecodedLog, decode_log
 from hil.log.source import DEFAULT, ReadOptions, Source
 
@@ -33,7 +33,7 @@ class Log:
     Raises
     ------
     LogError
-        When it cannot be opened, or its format is none of the known ones.
+        When it cannot be opened, or its format is none of the known ones; no format has the name ``form``.
     """
 
     def __init__(
@@ -48,6 +48,8 @@ class Log:
         self.options = options
         self.account = Account()
         try:
+            if form is not None and form not in BY_NAME:
+                raise LogError(self.path, f"no format is called {form!r}; known are {', '.join(BY_NAME)}")
             self.format = format_of(self.source) if form is None else BY_NAME[form]
         except BaseException:
             self.source.close()
@@ -109,7 +111,7 @@ def open_log(
     """Open a log; parameters and errors as of `Log`.
 
     >>> with open_log("drive.blf") as log:  # doctest: +SKIP
-    ...     frames = log.frames().to_arrow().to_pandas()
+    ...     frames = log.frames().to_arrow()
     ...     time_s, speed = log.signals(parse_database(Path("car.dbc").read_bytes())).series("WHEELS.FL")
     """
     return Log(path, form, options, limit_bytes)

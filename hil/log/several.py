@@ -11,7 +11,7 @@ import numpy.typing as npt
 from hil.log.account import Account
 from hil.log.frames import FrameTable, LogError
 from hil.log.read import Log, Progress, open_log
-from hil.log.source import DEFAULT, STDIN, ReadOptions
+from hil.log.source import DEFAULT, ReadOptions
 
 UNDATED_NS = 1_000_000_000 * 1_000_000_000  # stamps below (before September 2001) count from some start, not from 1970
 
@@ -50,6 +50,8 @@ class Logs:
     parts : the logs, by their first stamp.
     notes : what concerns them together.
     channels : names that the last reading met.
+    first_ns : stamp of the first frame, where times relative to the log begin; 0 before a reading and without a frame.
+    last_ns : greatest stamp.
 
     Raises
     ------
@@ -62,10 +64,9 @@ class Logs:
         self.limit_bytes = limit_bytes
         self.notes: list[str] = []
         self.channels: tuple[str, ...] = ()
-        self._kept: dict[Path, Log] = {}  # standard input can be opened only once; one log alone need not be again
-        if len({str(path) for path in paths}) < len(paths):
-            twice = next(path for path in paths if list(paths).count(path) > 1)
-            raise LogError(twice, "is given twice; name every log once")
+        self.first_ns = self.last_ns = 0
+        self._kept: dict[Path, Log] = {}  # a pipe can be opened only once; one log alone need not be again
+        _check_distinct(paths)
         try:
             self.parts = [self._look(path, len(paths) == 1) for path in paths]
         except BaseException:
@@ -94,7 +95,7 @@ class Logs:
 
     def _look(self, path: Path, alone: bool) -> Part:
         log = open_log(path, options=self.options, limit_bytes=self.limit_bytes)
-        keep = alone or str(path) == STDIN
+        keep = alone or log.source.once
         if keep:
             self._kept[path] = log
         try:
@@ -123,6 +124,7 @@ class Logs:
             _Reading(self._tables(part, told(place)), part, numbers) for place, part in enumerate(self.parts)
         ]  # fmt: skip
         active: list[_Reading] = []
+        begun = False
         while waiting or active:
             if not active:
                 active.append(waiting.pop(0))
@@ -135,7 +137,12 @@ class Logs:
                 else:
                     until = min(until, active[-1].until)
             if until is not None:
-                yield _merged([one.take(until) for one in active], tuple(numbers))
+                table = _merged([one.take(until) for one in active], tuple(numbers))
+                if not begun:
+                    begun, self.first_ns = True, int(table.time_ns[0])
+                    self.last_ns = self.first_ns
+                self.last_ns = max(self.last_ns, int(table.time_ns.max()))
+                yield table
         self.channels = tuple(numbers)
         yield FrameTable.empty(channels=self.channels)
 
@@ -162,6 +169,17 @@ class Logs:
             part.account = log.account
             if kept is None:
                 log.source.close()
+
+
+def _check_distinct(paths: Sequence[Path]) -> None:
+    """Refuse a log that is given twice, under whatever name or link: its frames would count twice."""
+    known: dict[Path, Path] = {}
+    for path in paths:
+        whole = path.resolve()
+        if whole in known:
+            other = "" if str(known[whole]) == str(path) else f", as {known[whole]} too"
+            raise LogError(path, f"is given twice{other}; name every log once")
+        known[whole] = path
 
 
 class _Reading:

@@ -50,8 +50,13 @@ class Source:
 
     Parameters
     ----------
-    path : a file, which may be packed with gzip; ``-`` is standard input, which is kept in a temporary file.
+    path : a file, which may be packed with gzip; ``-`` is standard input. Standard input and pipes are kept in a
+        temporary file.
     limit_bytes : most bytes that are read (unpacked); what lies behind counts as cut off. None reads all.
+
+    Attributes
+    ----------
+    once : it cannot be opened a second time.
 
     Raises
     ------
@@ -65,10 +70,17 @@ class Source:
         self.account = Account()
         self._kept: IO[bytes] | None = None
         try:
-            self._raw: IO[bytes] = _spooled(sys.stdin.buffer) if str(path) == STDIN else self.path.open("rb")
+            self._raw: IO[bytes] = _standard_input() if str(path) == STDIN else self.path.open("rb")
+            self.once = str(path) == STDIN or not self._raw.seekable()
+            if self.once:
+                self._raw = _spooled(self._raw)
             self.size = self._raw.seek(0, 2)
             self._raw.seek(0)
             self.packed = self._raw.read(2) == _GZIP
+        except IsADirectoryError as error:
+            raise LogError(
+                path, "is a folder; give a log file, or several as a quoted pattern: 'FOLDER/*.blf'"
+            ) from error
         except OSError as error:
             raise LogError(path, f"cannot be opened: {error.strerror or error}; give a log file") from error
         self._position = 0
@@ -228,6 +240,12 @@ def _by_bytes(inflater: Any, packed: bytes) -> bytes:
     except zlib.error:
         pass
     return bytes(content)
+
+
+def _standard_input() -> IO[bytes]:
+    if sys.stdin is None:
+        raise OSError("standard input is closed")
+    return sys.stdin.buffer
 
 
 def _spooled(stream: IO[bytes]) -> IO[bytes]:

@@ -12,7 +12,6 @@ from hil.log.builder import NAME_BYTES
 from hil.log.formats import Format, writable
 from hil.log.frames import FrameFlag, FrameTable, LogError, LogFacts
 
-_NO_NAME_LETTER = re.compile(r"[^!-~]")
 MAX_CHANNEL = 255  # of formats that number their channels
 
 
@@ -26,18 +25,26 @@ def channel_numbers(channels: tuple[str, ...]) -> list[int]:
 def candump_names(channels: tuple[str, ...]) -> tuple[str, ...]:
     """Channel names as a candump log can hold them.
 
-    A blank, and every letter that is no visible ASCII, becomes an underscore; a name is cut to 32 letters, and one
-    that another channel then has as well gets a number behind it.
+    A blank, and every letter that is not visible, becomes an underscore; a name is cut to 32 bytes, and one that
+    another channel then has as well gets a number behind it.
     """
     held: dict[str, None] = {}
     counts: Counter[str] = Counter()
     for channel in channels:
-        plain = name = _NO_NAME_LETTER.sub("_", channel)[:NAME_BYTES] or "_"
+        plain = name = _cut("".join(c if _held(c) else "_" for c in channel), NAME_BYTES) or "_"
         while name in held:
             counts[plain] += 1
-            name = f"{plain[: NAME_BYTES - 8]}_{counts[plain] + 1}"
+            name = f"{_cut(plain, NAME_BYTES - 8)}_{counts[plain] + 1}"
         held[name] = None
     return tuple(held)
+
+
+def _held(letter: str) -> bool:
+    return letter.isprintable() and not letter.isspace()
+
+
+def _cut(name: str, size: int) -> str:
+    return name.encode()[:size].decode(errors="ignore")
 
 
 def write_log(frames: FrameTable, path: Path) -> None:
@@ -99,9 +106,10 @@ def losses(facts: LogFacts, form: Format) -> list[str]:
         pairs = zip(facts.channels, candump_names(facts.channels), strict=True)
         replaced = [f"{old!r} is {new}" for old, new in pairs if old != new]
         if replaced:
-            notes.append(f"candump has only visible ASCII letters in channel names: {', '.join(replaced)}")
+            notes.append(f"candump has no blanks in channel names, and at most 32 bytes: {', '.join(replaced)}")
     if facts.errors and not form.error_content:
-        notes.append(f"{form.name} keeps neither class nor data of the {facts.errors} error frames")
+        frames = "the error frame" if facts.errors == 1 else f"the {facts.errors:,} error frames"
+        notes.append(f"{form.name} keeps neither class nor data of {frames}")
     if facts.finer_than_us and form.resolution_ns >= 1000:
         notes.append(f"{form.name} keeps stamps to the microsecond")
     if facts.flags & FrameFlag.SENT and not form.sent:

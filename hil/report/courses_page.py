@@ -27,7 +27,7 @@ _SCRIPT = """
 const figure = JSON.parse(document.getElementById("data").textContent);
 Plotly.newPlot("plot", figure.data, figure.layout, {responsive: true, displaylogo: false, scrollZoom: false});
 """
-_PANEL_PX, _LINE_PX, _GAP_PX, _BOTTOM_PX = 170, 18, 16, 46
+_PANEL_PX, _LINE_PX, _GAP_PX, _TOP_PX, _BOTTOM_PX = 170, 18, 16, 30, 46  # the buttons stand in the top margin
 
 
 def courses_page(plots: Sequence[Courses], title: str, subtitle: str) -> str:
@@ -59,8 +59,8 @@ def courses_figure(plots: Sequence[Courses]) -> dict[str, Any]:
     axis = {"zeroline": False, "ticks": "outside", "ticklen": 4, "gridcolor": _GRID, "linecolor": _RULE}
     axis |= {"tickcolor": _RULE, "automargin": True}
     layout: dict[str, Any] = {
-        "height": total + _BOTTOM_PX + 10,
-        "margin": {"l": 70, "r": 16, "t": 10, "b": _BOTTOM_PX},
+        "height": total + _BOTTOM_PX + _TOP_PX,
+        "margin": {"l": 70, "r": 16, "t": _TOP_PX, "b": _BOTTOM_PX},
         "paper_bgcolor": "white",
         "plot_bgcolor": "white",
         "font": {"size": 12, "color": _SOFT},

@@ -196,12 +196,14 @@ def test_decode_reads_candumps_own_file(observed: Observed) -> None:
     decoded = json.loads(done.stdout)
     frames = by_id([(line.can_id, line.data) for line in observed.seen])
     assert (decoded["format"], decoded["truncated_at"]) == ("candump", None)
-    assert (decoded["frames"], decoded["unknown"], decoded["rejected"]) == (len(observed.seen), 1, 1)
-    assert decoded["decoded"] == len(observed.seen) - 2
+    assert (decoded["frames"], decoded["unknown"], decoded["rejected"]) == (len(observed.seen), 1, 0)
+    assert decoded["decoded"] == len(observed.seen) - 1
+    assert decoded["messages"]["MOTOR_DEMAND_REAR"]["short"] == 1  # the one cansend cut short
     counts = {name: message["count"] for name, message in decoded["messages"].items()}
     expected = {spec.name: len(frames[can_id]) for can_id, spec in contract(BusName.VEHICLE).by_id.items()}
-    expected["MOTOR_DEMAND_REAR"] -= 1  # the one cansend cut short
     assert counts == expected
+    corrupt = sum(one["corrupt"] for one in decoded["protection"].values())
+    assert corrupt == 2  # that one, and the garbage
 
 
 def test_a_killed_plant_takes_the_motor_demand_to_zero_and_no_pressure(

@@ -41,6 +41,8 @@ def read_blf(source: Source, account: Account, options: ReadOptions) -> Iterator
         header_size = layout.FILE_HEADER_SIZE
     account.start_ns = layout.start_ns(fields[11:19], options.timezone)
     account.local_start = account.start_ns is not None
+    if account.start_ns is None and any(fields[11:19]):
+        account.note("the start time in the header cannot be read: stamps count from 1970")
     begin = len(head) + len(source.read(header_size - len(head)))
     builder = FrameBuilder(account)
     fast = True if options.fast is None and source.size > FEW_BYTES else options.fast

@@ -5,13 +5,14 @@ big-endian in the first, in the byte order of the capturing machine (which is th
 """
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from hil.log.frames import FrameFlag
+from hil.log.account import Account
+from hil.log.frames import FrameFlag, FrameTable, LogError
 from hil.log.source import Source
 
 SOCKETCAN, COOKED, COOKED_2 = 227, 113, 276
@@ -88,6 +89,17 @@ def frame_of(packet: bytes, size: int, link: int, order: str) -> Packet | str | 
     if len(data) < length and not flags & FrameFlag.REMOTE:  # captured in part
         return None
     return Packet(word & 0x1FFF_FFFF, bool(word & _EXTENDED), data, flags, length, interface)
+
+
+def with_can(tables: Iterable[FrameTable], source: Source, account: Account) -> Iterator[FrameTable]:
+    """Yield the tables of a capture; LogError at the end of one that has other packets only, of a network say."""
+    frames = 0
+    for table in tables:
+        frames += len(table)
+        yield table
+    if not frames and account.passed_over and account.whole:
+        kinds = ", ".join(f"{count} of {kind}" for kind, count in account.passed_over.items())
+        raise LogError(source.path, f"no CAN frame in it ({kinds}); give the capture of a CAN interface")
 
 
 class Window:

@@ -11,7 +11,17 @@ import numpy.typing as npt
 
 from hil.log.account import Account
 from hil.log.builder import FrameBuilder
-from hil.log.capture.packets import COOKED_2, FRAME_BYTES, HEADER, XL_BYTES, Packet, Window, frame_of, words_at
+from hil.log.capture.packets import (
+    COOKED_2,
+    FRAME_BYTES,
+    HEADER,
+    XL_BYTES,
+    Packet,
+    Window,
+    frame_of,
+    with_can,
+    words_at,
+)  # fmt: skip
 from hil.log.capture.pcapng import read_pcapng, write_pcapng
 from hil.log.frames import FrameTable, LogError
 from hil.log.source import FEW_BYTES, ReadOptions, Source
@@ -32,7 +42,7 @@ def read_pcap(source: Source, account: Account, options: ReadOptions) -> Iterato
     Raises
     ------
     LogError
-        When the file's header is none.
+        When the file's header is none, or all its packets are of something else.
     """
     window = Window(source)
     header = window.peek(24)
@@ -42,7 +52,8 @@ def read_pcap(source: Source, account: Account, options: ReadOptions) -> Iterato
         raise LogError(source.path, f"no pcap file: its header is {header!r}", 0)
     link = int(struct.unpack_from(order + "I", header, 20)[0]) & 0x03FF_FFFF  # the bits above tell of a checksum
     window.at = 24
-    yield from _Records(window, account, link, order, _MAGIC[magic]).tables(options.fast)
+    records = _Records(window, account, link, order, _MAGIC[magic])
+    yield from with_can(records.tables(options.fast), source, account)
 
 
 class _Records:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from hil.log.account import Account
 from hil.log.builder import FrameBuilder
-from hil.log.capture.packets import COOKED_2, HEADER, SOCKETCAN, Window, frame_of, words_at
+from hil.log.capture.packets import COOKED_2, HEADER, SOCKETCAN, Window, frame_of, with_can, words_at
 from hil.log.frames import FrameFlag, FrameTable, LogError, LogFacts
 from hil.log.source import FEW_BYTES, ReadOptions, Source
 
@@ -39,13 +39,13 @@ def read_pcapng(source: Source, account: Account, options: ReadOptions) -> Itera
     Raises
     ------
     LogError
-        When the file does not begin with a section.
+        When the file does not begin with a section, or all its packets are of something else.
     """
     window = Window(source)
     blocks = _Blocks(window, account)
     if not blocks.begin_section(window.peek(12)):
         raise LogError(source.path, f"no pcapng file: it begins with {window.peek(12)!r}", 0)
-    yield from blocks.tables(options.fast)
+    yield from with_can(blocks.tables(options.fast), source, account)
 
 
 class _Interface:

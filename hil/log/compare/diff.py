@@ -97,7 +97,7 @@ def diff_logs(
     found.only_second = {name: n for name, n in counts[1].items() if name not in counts[0]}
     if wanted is None:
         found.unknown = _unknown(sides, (ours, other))
-    begin_ns = ours.first_ns - starts[0]
+    begin_ns = first.first_ns - starts[0]
     names_of: dict[str, list[str]] = {}
     for name, signal in sides[0].signals.items():
         names_of.setdefault(signal.message, []).append(name)

@@ -1,10 +1,9 @@
 """Decoded signals message by message: a folder of Parquet files, or an MF4 file with a group each."""
 
-import os
 import re
 import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import Self
 
@@ -12,9 +11,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
-from hil.log.atomic_write import atomic_write
+from hil.log.atomic_write import atomic_write, orderly_end, temporary_stem
 from hil.log.export.blocks import Block, Field, Layout
-from hil.log.export.tables import batch_of, check_suffix, export_blocks, schema_of
+from hil.log.export.tables import batch_of, check_suffix, export_blocks, opened, schema_of
 from hil.log.frames import LogError
 
 MAX_FILES = 800  # open at the same time
@@ -71,10 +70,17 @@ def _atomic_folder(path: Path, overwrite: bool, read: Iterable[Path]) -> Iterato
         raise LogError(path, "exists already; use --force to write into it, or give another name")
     if path.exists() and not path.is_dir():
         raise LogError(path, "is a file; give another name for the folder")
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    temporary = path.with_name(temporary_stem(path.name))
+    with orderly_end(), _placed(path, temporary, read):
+        yield temporary
+
+
+@contextmanager
+def _placed(path: Path, temporary: Path, read: Iterable[Path]) -> Iterator[None]:
+    """Have a temporary folder in the block; its files are in ``path`` behind it."""
     try:
         temporary.mkdir(parents=True)
-        yield temporary
+        yield
         if not path.exists():
             temporary.replace(path)
             return
@@ -125,6 +131,7 @@ class MessageFolder(AbstractContextManager["MessageFolder"]):
             raise LogError(
                 folder, f"{len(self._groups)} messages; at most {MAX_FILES} files are written, choose with --messages"
             )
+        self._open = ExitStack()
         self._writers: dict[str, pa.parquet.ParquetWriter] = {}
         self._held: dict[str, list[pa.RecordBatch]] = {}
         self._cells: dict[str, int] = {}
@@ -143,6 +150,7 @@ class MessageFolder(AbstractContextManager["MessageFolder"]):
         for writer in self._writers.values():
             writer.close()
         self._writers.clear()
+        self._open.close()
 
     def write(self, block: Block) -> None:
         """Write further rows."""
@@ -166,7 +174,7 @@ class MessageFolder(AbstractContextManager["MessageFolder"]):
         batches = self._held.pop(message, [])
         self._cells.pop(message, None)
         if message not in self._writers:
-            file = self._folder / f"{self._names[message]}.parquet"
+            file = self._open.enter_context(opened(self._folder / f"{self._names[message]}.parquet"))
             self._writers[message] = pa.parquet.ParquetWriter(file, self._schema(message), compression="zstd")
         self._writers[message].write_table(pa.Table.from_batches(batches))
 

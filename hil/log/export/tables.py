@@ -5,6 +5,7 @@ Tables are written block after block, so that memory does not grow with the log.
 
 import json
 import math
+import os
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -66,7 +67,8 @@ def check_suffix(path: Path, suffixes: tuple[str, ...]) -> None:
     """Refuse a file whose suffix names no known kind of output."""
     if path.suffix not in suffixes:
         known = f"{', '.join(suffixes[:-1])} or {suffixes[-1]}"
-        raise LogError(path, f"signals are written as {known}, got {path.suffix or 'no suffix'!r}")
+        got = f"the suffix {path.suffix!r}" if path.suffix else "no suffix"
+        raise LogError(path, f"signals are written as {known}, or into a FOLDER/ with a slash; got {got}")
 
 
 class WideTable(AbstractContextManager["WideTable"]):
@@ -76,9 +78,11 @@ class WideTable(AbstractContextManager["WideTable"]):
         self._layout = layout
         self._schema = schema_of(layout, layout.fields, "{0.name}")
         self._writer: pa.parquet.ParquetWriter | None = None
+        self._opened: pa.OSFile | None = None
         self._file: IO[bytes] | None = None
         if path.suffix == ".parquet":
-            self._writer = pa.parquet.ParquetWriter(path, self._schema, compression="zstd")
+            self._opened = opened(path)
+            self._writer = pa.parquet.ParquetWriter(self._opened, self._schema, compression="zstd")
         else:
             self._file = path.open("wb")
             self._file.write((",".join(_quoted(name) for name in self._schema.names) + "\n").encode())
@@ -100,6 +104,8 @@ class WideTable(AbstractContextManager["WideTable"]):
         self._write_held()
         if self._writer is not None:
             self._writer.close()
+        if self._opened is not None:
+            self._opened.close()
         if self._file is not None:
             self._file.close()
 
@@ -131,6 +137,11 @@ def group_rows(rows: int) -> int:
     least where they are equal, whatever the number of columns.
     """
     return max(LEAST_ROWS, math.isqrt(rows * BYTES_PER_CHUNK // BYTES_PER_CELL))
+
+
+def opened(path: Path) -> pa.OSFile:
+    """File to write; pyarrow itself refuses a path that is no UTF-8."""
+    return pa.OSFile(os.fsencode(path), "wb")
 
 
 def _quoted(name: str) -> str:

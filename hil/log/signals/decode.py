@@ -40,7 +40,7 @@ from hil.log.signals.decoded import (
 from hil.log.signals.extract import Found, Group, pieces_of, work_out
 from hil.log.signals.extract_compiled import extract_all
 from hil.log.signals.j1939 import Joined, Transport
-from hil.log.signals.lookup import Databases, Lookup
+from hil.log.signals.lookup import Databases, Lookup, group_number
 from hil.log.signals.message_frames import frames_of, stamps_of, with_joined, words_of
 from hil.log.signals.signal_plan import SNA, MessagePlan, Words
 from hil.log.signals.sources import Sources
@@ -192,7 +192,7 @@ class Decoder:
             name = table.channels[one.channel]
             slot = self._lookup.group_slot(self._lookup.network(name), one.can_id)
             if slot is None:
-                group = f"{name} PGN {one.can_id >> 8 & 0x3FFFF:#06x}"
+                group = f"{name} PGN {group_number(one.can_id):#06x}"
                 if len(self._unknown_groups) < KEPT:
                     self._unknown_groups.add(group)
                 log.transport.unknown[group if group in self._unknown_groups else OTHERS] += 1

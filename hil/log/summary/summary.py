@@ -82,7 +82,6 @@ class Statistics:
             frames=int(whole[Whole.FRAMES]),
             first_ns=int(whole[Whole.LEAST]),
             last_ns=int(whole[Whole.GREATEST]),
-            began_ns=int(whole[Whole.FIRST]),
             channels=tuple(sorted(channels, key=lambda one: one.name)),
             ids=tuple(rows),
             other_frames=int(whole[Whole.OTHER]),
@@ -117,9 +116,9 @@ class Statistics:
         known = rate is not None and (data_rate is not None or not of[Channel.SWITCHED])
         duration_ns = of[Channel.GREATEST] - of[Channel.LEAST]
         mean = of[Channel.BUSY] / duration_ns if duration_ns >= LEAST_SPAN_NS else None
-        worst: float | None = float(of[Channel.WORST_BUSY])
-        if duration_ns < 1_000_000_000:  # no whole second
-            worst = None
+        worst: float | None = None
+        if mean is not None and duration_ns >= 1_000_000_000:  # a whole second
+            worst = max(float(of[Channel.WORST_BUSY]), mean * 1e9)  # the mean has the begun last second too
         per_s = 1e9 if rate is None else rate / 1000.0
         return ChannelSummary(
             name=name,

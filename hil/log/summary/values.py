@@ -121,7 +121,6 @@ class Summary:
     Attributes
     ----------
     first_ns, last_ns : least and greatest stamp; 0 without a frame.
-    began_ns : stamp of the first frame.
     channels, ids : sorted by channel and identifier.
     other_frames : frames of identifiers beyond the first 4,096, which have no statistics of their own.
     backwards : stamps running back, in the order of the log.
@@ -130,7 +129,6 @@ class Summary:
     frames: int
     first_ns: int
     last_ns: int
-    began_ns: int
     channels: tuple[ChannelSummary, ...]
     ids: tuple[IdSummary, ...]
     other_frames: int

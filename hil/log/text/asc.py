@@ -23,6 +23,7 @@ GERMAN = {"mär": 3, "mrz": 3, "mai": 5, "okt": 10, "dez": 12}
 MONTH_NUMBERS = {name.lower(): k + 1 for k, name in enumerate(MONTHS)} | GERMAN
 BOM = b"\xef\xbb\xbf"
 MAX_NS = 4_000_000_000_000_000_000  # of the compiled pass
+WIDE_BIT = 0x8000_0000  # of an identifier in a database
 ASC_REMOTE, ASC_FD = 0x10, 0x1000  # in the flags of a CANFD line
 
 _STAMP = re.compile(rb"(-?)(\d{1,10})(?:\.(\d{1,9}))?")
@@ -170,7 +171,7 @@ class AscParser:
         """``ID Rx d 8 11 22 ...``, ``ID Rx r 8``."""
         if len(words) < 3:
             return None
-        identifier, direction, kind = _ID[self.base].fullmatch(words[0]), words[1].lower(), words[2].lower()
+        identifier, direction, kind = self._identifier(words), words[1].lower(), words[2].lower()
         if identifier is None or direction not in (b"rx", b"tx", b"txrq") or kind not in (b"d", b"r"):
             return None
         if direction == b"txrq":
@@ -178,13 +179,13 @@ class AscParser:
             return False
         coded = len(words) > 3 and _LENGTH_CODE.fullmatch(words[3]) is not None
         flags = FrameFlag.SENT if direction == b"tx" else FrameFlag(0)
-        can_id, wide = int(identifier[1], self.base), bool(identifier[2])
+        can_id, wide = identifier
         if kind == b"r":
             if len(words) > 3 and not coded and words[3].lower() != b"length":
                 return None
             length = min(int(words[3], 16 if len(words[3]) == 1 else 10), 8) if coded else 0
             added = self._add(builder, channel, can_id, wide, b"", flags | FrameFlag.REMOTE, length)
-            return len(words) > 3 if added else None
+            return self._ends_whole(words, len(words) > 3) if added else None
         if not coded:
             return None
         code = int(words[3], 16 if len(words[3]) == 1 else 10)
@@ -195,7 +196,26 @@ class AscParser:
             return None
         if not self._add(builder, channel, can_id, wide, held, flags, 0):
             return None
-        return code == 0 or len(words) > 4 + len(held) or (self.base == 16 and len(words[-1]) == 2)
+        behind = code == 0 or len(words) > 4 + len(held) or (self.base == 16 and len(words[-1]) == 2)
+        return self._ends_whole(words, behind)
+
+    def _identifier(self, words: list[bytes]) -> tuple[int, bool] | None:
+        """Number, and whether it has 29 bits; where the message's name stands instead, the one behind ``ID =``."""
+        match = _ID[self.base].fullmatch(words[0])
+        if match is not None:
+            return int(match[1], self.base), bool(match[2])
+        behind = words.index(b"ID") if b"ID" in words else len(words)
+        if words[behind + 1 : behind + 2] != [b"="]:
+            return None
+        match = _ID[10].fullmatch(b"".join(words[behind + 2 : behind + 3]))
+        if match is None:
+            return None
+        number = int(match[1])
+        return number & ~WIDE_BIT, bool(match[2]) or bool(number & WIDE_BIT)
+
+    def _ends_whole(self, words: list[bytes], behind: bool) -> bool:
+        """Whether nothing can be missing behind a frame; the number of a message that is named stands last."""
+        return behind and _ID[self.base].fullmatch(words[0]) is not None
 
     def _bytes(self, words: list[bytes]) -> bytes:
         """The bytes at the begin of the words."""

@@ -72,7 +72,7 @@ class CandumpParser:
             flags |= FrameFlag.BIT_RATE_SWITCH if bits & 1 else FrameFlag(0)
             flags |= FrameFlag.ERROR_STATE if bits & 2 else FrameFlag(0)
         time_ns = int(match[1]) * 1_000_000_000 + int((match[2] or b"").ljust(9, b"0"))
-        channel = match[3].decode("ascii", "backslashreplace")
+        channel = match[3].decode("utf-8", "backslashreplace")
         can_id &= ~ERROR_BIT if flags & FrameFlag.ERROR else 0xFFFF_FFFF
         if not builder.add(time_ns, channel, can_id, wide, payload, flags, length):
             builder.reject(offset, line.strip())

@@ -135,7 +135,7 @@ class ScreenParser:
             data = _data(rest, length)
         if time_ns is None or data is None:
             return False
-        channel = match[6].decode("ascii", "backslashreplace")
+        channel = match[6].decode("utf-8", "backslashreplace")
         added = builder.add(time_ns, channel, can_id, wide, data, flags, length)
         if added and flags & FrameFlag.FD and not match[7]:
             self._say_fd()

@@ -88,9 +88,9 @@ class TrcParser:
         cells = dict(zip(self.columns, words, strict=False))
         kind = cells.get("T", cells.get("d", b"")).upper()
         state = STATES.get(kind)
-        if state is None and "T" not in cells and "d" not in cells:  # version 1.0
+        if state is None and "T" not in cells:  # version 1
             state = "hardware status" if cells.get("I", b"").upper() == b"FFFFFFFF" else state
-            state = "error" if cells.get("D", b"").startswith(b"ERROR") else state
+            state = "error" if "d" not in cells and cells.get("D", b"").startswith(b"ERROR") else state
         if state is not None:
             self.account.passed_over[state] += 1
             return False

@@ -3,6 +3,7 @@ import io
 import json
 import sys
 
+import numba
 import pyarrow.csv
 import pyarrow.parquet
 import pytest
@@ -88,9 +89,9 @@ def test_text_accounts_for_every_frame(log, dbc, capsys):
     assert "2 not a frame" in out
     assert "at byte 38: bad" in out
     assert "M: frames shorter than the database says" in out
-    assert "unknown: can0 0x7ff (1)" in out
+    assert "unknown: can0 7FF (1)" in out
     assert "cut off at byte" in out
-    assert "length: can0 0x001 M changes 2 times between 1, 2 bytes" in out
+    assert "length: can0 001 M changes 2 times between 1, 2 bytes" in out
 
 
 def test_a_whole_log_ends_with_0_and_names_what_is_odd_in_its_values(whole, dbc, capsys):
@@ -313,7 +314,7 @@ def test_columns_are_cut_to_the_width_and_empty_ones_left_out():
     lines = columns(("name", "empty", "n"), [("a" * 100, "", "1"), ("b", "", "22")], 40)
     assert lines[0] == "name".ljust(36) + "   n"
     assert max(map(len, lines)) == 40
-    assert lines[1].endswith("~   1")
+    assert lines[1] == "a" * 12 + "~" + "a" * 23 + "   1"  # the end of a name tells more than its begin
     assert wrapped("  a bb \x1bcc", 8) == ["  a bb", "  \\x1bcc"]
 
 
@@ -344,3 +345,78 @@ def test_the_line_of_a_stamp_that_runs_back_is_named(tmp_path, dbc, capsys):
     assert "stamps run back 1 time, first at frame 3 (line 5)" in capsys.readouterr().out
     run(tmp_path / "back.log", "--dbc", dbc, "--json")
     assert json.loads(capsys.readouterr().out)["stamps_back"]["first_line"] == 5
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+def test_a_terminal_is_told_that_something_is_compiled():
+    import hil.log.compiled  # noqa: F401 (tells of compilations once it is loaded)
+
+    terminal, file = Terminal(), io.StringIO()
+    for stream in (terminal, file):
+        with Progress(stream=stream):
+            numba.njit(lambda a: a + 1)(1)
+    assert terminal.getvalue().startswith("\rcompiling what reads this log, once after installation: some seconds")
+    assert terminal.getvalue().endswith(" \r")
+    assert file.getvalue() == ""
+
+
+def test_times_count_from_the_first_frame_of_the_log_whatever_part_is_chosen(tmp_path, dbc, capsys):
+    stamps = [100 + k / 10 for k in range(80) if not 40 < k < 50]
+    (tmp_path / "gap.log").write_text("".join(f"({t:.6f}) can0 001#0101\n" for t in stamps))
+    for words in ((), ("--from", "2"), ("--from", "2", "--to", "6")):
+        assert run(tmp_path / "gap.log", "--dbc", dbc, *words) == 0
+        out = capsys.readouterr().out
+        assert "gap: can0 001 M is silent for 1000 ms (10 cycles of 100 ms) from 4.000 s on" in out
+
+
+def test_a_log_counts_once_under_whatever_name(log, dbc, tmp_path, result):
+    (tmp_path / "link.log").symlink_to(log)
+    assert result(log, tmp_path / "link.log", f"{tmp_path}/*.log", "--dbc", dbc, code=1)["frames"] == 6
+
+
+def test_a_channel_that_only_an_option_knows_is_told(whole, dbc, result):
+    words = ["--dbc", dbc, "--dbc", f"can3={dbc}", "--bitrate", "can4=500000", "--bitrate", "250000"]
+    notes = result(whole, *words, "--channel", "can0", "--channel", "can5")["notes"]
+    assert sorted(notes) == [
+        "--bitrate: the log has no channel can4; its channels are can0",
+        "--channel: the log has no channel can5; its channels are can0",
+        "--dbc: the log has no channel can3; its channels are can0",
+    ]
+
+
+def test_a_log_of_another_car_asks_for_its_database(whole, dbc, capsys):
+    hint = "give the database of this log with --dbc"
+    assert run(whole) == 0
+    assert hint in " ".join(capsys.readouterr().out.split())
+    assert run(whole, "--dbc", dbc) == 0
+    assert hint not in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], r"a\.dbc: is a database \(DBC\), no log; give a log, and this with --dbc"),
+        (["--from", "9"], r"no frame between --from and --to; give times within 0 to 1\.500 s from its first frame$"),
+        (["--from", "2", "--to", "1"], "no frame between --from and --to"),
+        (["--channel", "can7", "--from", "0"], r"no channel can7; its channels are can0"),
+        (["--resample", "0", "--out", "a.csv"], "--resample 0: expected a step above 0 in seconds, 0.01 for 10 ms"),
+        (["--limit-mb", "0"], "--limit-mb 0: expected a number of megabytes above 0"),
+        (["--out", "no/folder/a.csv"], "there is no folder no/folder; create it, or give another name"),
+        (["--out", "a"], "written as .*, or into a FOLDER/ with a slash; got no suffix"),
+    ],
+)
+def test_wrong_use_says_what_to_do(words, message, whole, dbc, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(BrakebenchError, match=message):
+        run(whole if words else dbc, "--dbc", dbc, *words)
+
+
+def test_channels_of_databases_are_those_of_the_log(tmp_path, dbc, capsys):
+    path = tmp_path / "a.csv"
+    path.write_text("time_s,channel,id,extended,flags,length,data\n1.0,my bus,1,0,,2,0101\n1.1,b=c,1,0,,2,0101\n")
+    assert run(path, "--dbc", f"my bus={dbc}", "--dbc", f"b=c={dbc}", "--dbc", f"can7={dbc}", "--json") == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["decoded"], result["unknown"]) == (2, 0)
+    assert result["notes"] == ["--dbc: the log has no channel can7; its channels are my bus, b=c"]
+    with pytest.raises(BrakebenchError, match=r"b=none\.dbc: cannot be opened"):
+        run(path, "--dbc", "a=b=none.dbc")

@@ -96,7 +96,10 @@ def test_lost_frames_do_not_shift_the_others(compare):
         "first": 50, "second": 47, "unpaired_first": 3, "unpaired_second": 0, "unpaired_s": 0.2
     }  # fmt: skip
     assert all(one["differing"] == 0 for one in found["signals"].values())
-    assert "50 and 47 frames" in out
+    assert out.endswith(
+        "frames without a partner  in A  in B  only in A  from s\n"
+        "M                           50    47          3   0.200\n"
+    )
 
 
 def test_logs_of_another_time_are_compared_from_their_first_frames(compare):
@@ -116,8 +119,25 @@ def test_messages_and_identifiers_of_one_log_only(compare):
 def test_wrong_use_is_refused(tmp_path, compare):
     with pytest.raises(BrakebenchError, match="expected a name and a number"):
         compare(lines(SAME), lines(SAME), "--tolerance", "S", code=2)
-    with pytest.raises(BrakebenchError, match="no signal"):
-        compare(lines(SAME), lines(SAME), "--signals", "Q", code=2)
+    for words in (("--signals", "Q"), ("--tolerance", "Q*=1")):
+        with pytest.raises(BrakebenchError, match="no signal of the database is called 'Q"):
+            compare(lines(SAME), lines(SAME), *words, code=2)
+
+
+def test_nothing_compared_is_no_equality(compare):
+    with pytest.raises(BrakebenchError, match=r"a\.log and .*b\.log: no channel can7; its channels are can0$"):
+        compare(lines(SAME), lines(SAME), "--channel", "can7", code=2)
+    for words in ((), ("--messages", "M")):
+        with pytest.raises(BrakebenchError, match=r"nothing to compare: .*; give the database .* --dbc"):
+            compare(["(1.0) can0 7FF#01\n"], ["(1.0) can0 7FF#02\n"], *words, code=2)
+
+
+def test_times_count_from_the_first_frame_of_the_log_whatever_is_chosen(compare):
+    begin = "(999.000000) can1 7FE#\n"
+    changed = [*SAME[:30], (500, 1, 0, 1.5), *SAME[31:]]
+    for words in ((), ("--channel", "can0")):
+        found, _ = compare([begin, *lines(SAME)], [begin, *lines(changed)], *words, code=1)
+        assert found["signals"]["M.S"]["first_s"] == pytest.approx(1.3)
 
 
 def test_pairs_are_one_to_one_and_near():

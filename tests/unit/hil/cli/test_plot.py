@@ -80,15 +80,19 @@ def test_what_cannot_be_drawn_is_refused(log, tmp_path):
     with pytest.raises(BrakebenchError, match="plots are written as"):
         run(log, "S", "--dbc", tmp_path / "a.dbc", "--out", tmp_path / "a.txt")
     (tmp_path / "other.log").write_text("(1.0) can0 002#00\n")
-    with pytest.raises(BrakebenchError, match="no frame of S"):
+    with pytest.raises(BrakebenchError, match=r"no frame of S in it$"):
         run(tmp_path / "other.log", "S", "--dbc", tmp_path / "a.dbc", "--out", tmp_path / "a.png")
+    with pytest.raises(BrakebenchError, match="no frame of MODE in it; give the database of this log with --dbc"):
+        run(tmp_path / "other.log", "MODE", "--out", tmp_path / "a.png")
+    with pytest.raises(BrakebenchError, match="no channel can7; its channels are can0"):
+        run(log, "S", "--dbc", tmp_path / "a.dbc", "--channel", "can7", "--out", tmp_path / "a.png")
 
 
 def test_a_damaged_log_is_drawn_and_told(log, tmp_path, capsys):
     with log.open("a") as file:
         file.write("rubbish\n")
-    assert run(log, "S", "--dbc", tmp_path / "a.dbc", "--out", tmp_path / "a.svg") == 1
-    assert "cut off or rejected" in capsys.readouterr().out
+    assert run(log, "S", "--dbc", tmp_path / "a.dbc", "--out", tmp_path / "a.SVG") == 1
+    assert "cut off, rejected" in capsys.readouterr().out
 
 
 def test_many_values_are_thinned_and_the_peak_stays():

@@ -54,6 +54,8 @@ def test_a_log_given_twice_is_refused(write):
     path = write("a.log", [1], "can0")
     with pytest.raises(LogError, match="given twice"):
         Logs([path, path])
+    with pytest.raises(LogError, match=r"is given twice, as .*a\.log too"):
+        Logs([path, path.parent / ".." / path.parent.name / "a.log"])
 
 
 def test_one_bad_log_is_named(write, tmp_path):

@@ -116,7 +116,7 @@ def test_standard_input_can_be_read_again_and_again():
 def test_what_cannot_be_opened(tmp_path):
     with pytest.raises(LogError, match="cannot be opened: No such file"):
         Source(tmp_path / "none")
-    with pytest.raises(LogError, match="cannot be opened: Is a directory"):
+    with pytest.raises(LogError, match="is a folder; give a log file"):
         Source(tmp_path)
     (tmp_path / "empty").write_bytes(b"")
     with pytest.raises(LogError, match="empty: no log in it"):
@@ -149,3 +149,9 @@ def test_output_appears_whole_or_not_at_all(tmp_path):
     with pytest.raises(LogError, match="cannot be written"):
         write()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_format_that_is_none_is_refused(tmp_path):
+    (tmp_path / "a.log").write_text("(1.0) can0 123#11\n")
+    with pytest.raises(LogError, match="no format is called 'xyz'; known are candump, "):
+        open_log(tmp_path / "a.log", form="xyz")

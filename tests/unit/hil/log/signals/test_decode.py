@@ -7,7 +7,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from dbc.contract import database_text
 from dbc.database import parse_database
+from dbc.frame import BusName
 from hil.log.frames import FrameFlag, FrameTable, Recording
 from hil.log.signals.decode import NOT_A_FRAME, TOO_SHORT, decode_log, own_databases
 
@@ -195,6 +197,33 @@ def test_our_own_databases_load_without_a_warning():
     for database in own_databases().values():
         assert database.warnings == ()
         assert database.messages
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bus", list(BusName))
+def test_ten_thousand_payloads_of_each_of_our_messages_equal_cantools(bus):
+    text = database_text(bus)
+    oracle = cantools.database.load_string(text, database_format="dbc", strict=False)
+    database, draw = parse_database(text), np.random.default_rng(1)
+    for message in oracle.messages:
+        n = 10_000
+        table = FrameTable.empty(n, 8, ("can0",))
+        table.can_id[:], table.length[:] = message.frame_id, message.length
+        edges = draw.choice(np.array([0, 1, 127, 128, 254, 255], np.uint8), (n, message.length))
+        noise = draw.integers(0, 256, (n, message.length), np.uint8)
+        table.data[:, : message.length] = np.where(draw.random((n, 1)) < 0.3, edges, noise)
+        log = decode_log(Recording(Path("memory"), "candump", table), database)
+        assert log.decoded == n
+        expected = [message.decode(row[: message.length].tobytes()) for row in table.data]
+        for signal in message.signals:
+            wanted = {
+                row: getattr(values[signal.name], "value", values[signal.name])
+                for row, values in enumerate(expected)
+                if str(values[signal.name]) != "SNA"
+            }
+            column = log.columns[f"{message.name}.{signal.name}"]
+            assert column.rows.tolist() == list(wanted)
+            assert column.values.tolist() == list(wanted.values())
 
 
 def test_an_empty_log_decodes_to_nothing():

@@ -96,7 +96,7 @@ def test_all_ways_agree(data):
 
 
 @pytest.mark.slow
-@settings(max_examples=2000, deadline=None)
+@settings(max_examples=700, deadline=None)
 @given(st.data())
 def test_all_ways_agree_on_many(data):
     ways_agree(data)

@@ -246,3 +246,8 @@ def test_any_frames_are_accounted_for_in_one_piece_or_in_several(data):
     for name, (rows, values) in joined_columns(logs).items():
         np.testing.assert_array_equal(rows, whole.columns[name].rows)
         np.testing.assert_array_equal(values, whole.columns[name].values)
+
+
+def test_the_group_of_a_message_to_one_address_has_no_address():
+    log = decoded(transfer(bytes(20), 0xEE00, to=0x33))
+    assert log.transport.unknown == {"can0 PGN 0xee00": 1}

@@ -151,3 +151,12 @@ def test_every_interval_falls_between_the_edges_of_its_bin():
     assert (edges[bins] <= values).all()
     assert (values < edges[bins + 1]).all()
     assert (np.diff(edges) / edges[:-1]).max() < 0.008
+
+
+@pytest.mark.parametrize("fast", [False, True])
+def test_the_worst_second_is_not_below_the_mean(fast):
+    # 151 frames in 1.5 s: a hundred in the first whole second, one more at the end of both
+    times = START + np.arange(151) * 10 * MS
+    channel = counted([table(times, 0x123)], fast, lambda _: (500_000, None)).result().channels[0]
+    assert channel.load == pytest.approx(151 * 135 / 500_000 / 1.5)
+    assert channel.worst_load == channel.load

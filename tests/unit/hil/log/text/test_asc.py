@@ -45,6 +45,10 @@ def frame(log, row=0):
         ("0.1 1 1FFFFFFFX rx D 1 1", (0x1FFFFFFF, True, 0, 1, b"\x01")),
         ("0.1 1 123 Rx d 8 0 1 2 3 4 5 6 7", (0x123, False, 0, 8, bytes(range(8)))),
         ("0.1 1 123 Rx d 2 11 22  Length = 121950 BitCount = 64 ID = 291", (0x123, False, 0, 2, b"\x11\x22")),
+        ("0.1 1 EngineData Rx d 2 11 22  Length = 1 BitCount = 64 ID = 291", (0x123, False, 0, 2, b"\x11\x22")),
+        ("0.1 1 Data_1 Tx d 1 11 Length = 1 BitCount = 64 ID = 18219x", (0x472B, True, SENT, 1, b"\x11")),
+        ("0.1 1 Data_1 Rx d 1 11 Length = 1 BitCount = 64 ID = 2147483939x", (0x123, True, 0, 1, b"\x11")),
+        ("0.1 1 EngineData Rx r 8 Length = 0 BitCount = 55 ID = 291", (0x123, False, REMOTE, 8, b"")),
         ("0.1\t1\t123\tRx\td\t1\t11\r", (0x123, False, 0, 1, b"\x11")),
         ("0.1 1 123 Rx d e 00 01 02 03 04 05 06 07", (0x123, False, 0, 8, bytes(range(8)))),
         ("0.1 1 123 Rx d 9 " + "0A " * 12, (0x123, False, FD, 12, b"\x0a" * 12)),
@@ -224,6 +228,7 @@ WHOLE = [
 ]
 OPEN = [
     "0.1 1 123 Rx d 2 11 2",
+    "0.1 1 Data Rx d 1 11 Length = 1 BitCount = 64 ID = 29",
     "0.1 1 123 Rx r",
     "0.1 CANFD 1 Rx 123 1 0 2 2 11 22 0 0 1000",
     "0.1 1 123 Rx d 2 11",

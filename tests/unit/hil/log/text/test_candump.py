@@ -206,15 +206,24 @@ def test_written_lines_read_back(read):
 
 def test_names_that_candump_cannot_hold_are_replaced_and_said(read):
     names = ("my bus", "my_bus", "b\xfcs", "x" * 40, "x" * 41, "", "can0")
-    assert candump_names(names) == ("my_bus", "my_bus_2", "b_s", "x" * 32, "x" * 24 + "_2", "_", "can0")
+    assert candump_names(names) == ("my_bus", "my_bus_2", "b\xfcs", "x" * 32, "x" * 24 + "_2", "_", "can0")
     builder = FrameBuilder()
     for name in names:
         builder.add(1_000_000_000, name, 1, False, b"\1", 0, 0)
     table, form = builder.take(), BY_NAME["candump"]
     facts = LogFacts.of([table])
-    assert_equal(read(written(table))[0].frames, kept(table, facts, form))
+    assert_equal(read(written(table).encode())[0].frames, kept(table, facts, form))
     assert "'my bus' is my_bus" in " ".join(losses(facts, form))
     assert losses(replace(facts, channels=("can0", "vehicle")), form) == []
+
+
+def test_channel_names_are_utf_8(read):
+    text = "(0000000001.000000) b\xfcs\u65e5 123#11\n"
+    frames = read(text.encode())[0].frames
+    assert frames.channels == ("b\xfcs\u65e5",)
+    assert written(frames) == text
+    assert candump_names(("\u65e5" * 11, "\u65e5" * 12)) == ("\u65e5" * 10, "\u65e5" * 8 + "_2")
+    assert read(b"(1.5) b\xfcs 123#11\n")[0].frames.channels == ("b\\xfcs",)
 
 
 def test_many_channels_of_one_name_are_told_apart():

@@ -178,3 +178,10 @@ MIXED = "".join(STAMP + line + "\n" for line, _ in LINES) + "".join(
 @pytest.mark.slow
 def test_mutants(tmp_path, monkeypatch):
     check_mutants(tmp_path / "a.log", MIXED.encode("latin-1"), "candump_screen", 2000, 4, monkeypatch)
+
+
+def test_a_log_of_length_codes_alone_is_told(tmp_path):
+    path = tmp_path / "a.log"
+    path.write_text(" (1700000000.000100)  can0  123   {D}  11 22 33 44 55 66 77 88\n")
+    with open_log(path) as log:
+        assert (log.format.name, len(log.frames())) == ("candump_screen", 1)

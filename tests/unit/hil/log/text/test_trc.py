@@ -100,6 +100,7 @@ def test_buses_are_channels(read):
     [
         ("1.0", "     2)     1842     0008  4  ERROR 00 19 08 08", "error"),
         ("1.0", "     3)     1843 FFFFFFFF  4  00 00 00 04  BUSLIGHT", "hardware status"),
+        ("1.1", "     2)     1283.2  Rx     FFFFFFFF  4  00 00 00 04   BUSLIGHT", "hardware status"),
         ("1.1", "     3)     1843.0  Warng  FFFFFFFF  4  00 00 00 08  BUSHEAVY", "warning"),
         ("1.3", "     3)     1843.0 1 Warng  FFFFFFFF - 4  00 00 00 08  BUSHEAVY", "warning"),
         ("2.0", "     3      1843.0 ST      Rx 4  00 00 00 08", "hardware status"),
