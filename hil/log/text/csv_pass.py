@@ -6,7 +6,7 @@ All of them end a row the same way and give back the begin of the first row they
 
 import numpy as np
 
-from hil.log.compiled import HEX, NO_BYTE, NO_DIGIT, are_digits, byte_of, compiled, of_digits, word
+from hil.log.compiled import HEX, NO_BYTE, NO_DIGIT, are_digits, byte_of, compiled, inlined, of_digits, word
 
 _MAX_STANDARD, _MAX_EXTENDED = 0x7FF, 0x1FFF_FFFF
 _MAX_SECONDS = 9_000_000_000
@@ -39,14 +39,13 @@ def _number(buffer, p, most):  # type: ignore[no-untyped-def]
 def _seconds(buffer, p):  # type: ignore[no-untyped-def]
     """Nanoseconds of ``-s.f`` before a comma, and what follows it; -1 for a stamp of another form."""
     size = buffer.shape[0]
-    if p + _QUICK <= size and buffer[p + 10] == _POINT and buffer[p + 20] == _COMMA:  # as we write it
+    if p + _QUICK <= size and buffer[p + 10] == _POINT and buffer[p + 20] == _COMMA:  # as we write it, it may be
         first, last = word(buffer, p), word(buffer, p + 11)
         ninth, tenth, end = int(buffer[p + 8]) - 48, int(buffer[p + 9]) - 48, int(buffer[p + 19]) - 48
         if are_digits(first) and are_digits(last) and 0 <= ninth <= 9 and 0 <= tenth <= 9 and 0 <= end <= 9:
             seconds = of_digits(first) * 100 + ninth * 10 + tenth
             if seconds <= _MAX_SECONDS:
                 return seconds * 1_000_000_000 + of_digits(last) * 10 + end, p + 21
-        return 0, -1
     negative = p < size and buffer[p] == _MINUS
     if negative:
         p += 1
@@ -146,20 +145,41 @@ def _length_fits(length, fd):  # type: ignore[no-untyped-def]
     return length <= 8 or (fd and (length in (12, 16, 20, 24, 32, 48, 64)))
 
 
+@inlined
+def _short_name(names, name_lengths, channel):  # type: ignore[no-untyped-def]
+    """A channel's name with its comma as a `word`, and the mask of its bytes; a mask of 0 for one that is longer."""
+    text, length = np.uint64(0), 0
+    if channel < names.shape[0] and 0 < name_lengths[channel] < 8:
+        length = int(name_lengths[channel])
+    for j in range(length):
+        if names[channel, j] == _COMMA or names[channel, j] == _QUOTE:  # it is quoted in the file
+            return text, np.uint64(0), 0
+        text |= np.uint64(names[channel, j]) << np.uint64(8 * j)
+    if length == 0:
+        return text, np.uint64(0), 0
+    text |= np.uint64(_COMMA) << np.uint64(8 * length)
+    return text, np.uint64(0xFFFF_FFFF_FFFF_FFFF) >> np.uint64(56 - 8 * length), length
+
+
 @compiled
 def take_rows(buffer, begin, names, name_lengths, columns, n):  # type: ignore[no-untyped-def]
     """Add our own rows, ``time_s,channel,id,extended,flags,length,data``."""
     times, channels, ids, wide, lengths, data, flags = columns
     rows, width, size = times.shape[0], data.shape[1], buffer.shape[0]
     channel, p = 0, begin
+    text, mask, letters = _short_name(names, name_lengths, channel)
     while p < size and n < rows:
         start = p
         time_ns, p = _seconds(buffer, p)
         if p < 0:
             return start, n
-        channel, p = _name(buffer, p, names, name_lengths, channel)
-        if p < 0:
-            return start, n
+        if letters and p + 8 <= size and word(buffer, p) & mask == text:  # as in the row before
+            p += letters + 1
+        else:
+            channel, p = _name(buffer, p, names, name_lengths, channel)
+            if p < 0:
+                return start, n
+            text, mask, letters = _short_name(names, name_lengths, channel)
         at = p
         can_id, p = _number(buffer, p, 9)
         if p == at or p + 3 >= size or buffer[p] != _COMMA or buffer[p + 2] != _COMMA:
@@ -167,9 +187,13 @@ def take_rows(buffer, begin, names, name_lengths, columns, n):  # type: ignore[n
         extended = buffer[p + 1] == 49
         if not extended and buffer[p + 1] != 48:
             return start, n
-        bits, p = _words(buffer, p + 3)
-        if p < 0:
-            return start, n
+        bits, p = 0, p + 3
+        if p < size and buffer[p] == _COMMA:
+            p += 1
+        else:
+            bits, p = _words(buffer, p)
+            if p < 0:
+                return start, n
         error = bits & _ERROR != 0
         at = p
         length, p = _number(buffer, p, 2)

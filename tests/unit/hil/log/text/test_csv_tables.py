@@ -12,7 +12,7 @@ from hil.log.frames import FrameFlag, LogError, LogFacts
 from hil.log.read import open_log
 from hil.log.text import lines
 from hil.log.text.csv_tables import COLUMNS as HEADER
-from hil.log.text.csv_tables import nanoseconds, write_csv
+from hil.log.text.csv_tables import OwnRows, PythonCanRows, nanoseconds, write_csv
 
 DATA = Path(__file__).parents[4] / "data" / "logs"
 OWN = HEADER + "\n"
@@ -260,6 +260,33 @@ def test_what_is_written_reads_back_exactly(read):
             assert np.array_equal(getattr(frames, column), getattr(table, column)), column
     assert [row[1] for row in rows(frames)] == [row[1] for row in rows(table)]
     assert all(len(row) == 7 for row in csv.reader(io.StringIO(content.decode())))
+
+
+@pytest.mark.parametrize(
+    ("rows_of", "head", "row"),
+    [
+        (OwnRows, OWN, "1700000000.{k:09d},{name},160,0,,8,7F10000000000000\n"),
+        (
+            PythonCanRows,
+            PYTHON_CAN,
+            "1700000000.{k:02d},0xa0,0,0,0,8,fxAAAAAAAAA=\n",
+        ),  # a comma where ours has one
+        (PythonCanRows, PYTHON_CAN, "1700000000.{k:06d},0x18fef100,1,0,0,8,fxAAAAAAAAA=\n"),
+    ],
+)
+def test_the_compiled_pass_takes_every_plain_row(rows_of, head, row):
+    names = ["can0", "can0", "c", "a longer name", "can1", "can12345"]
+    builder = builder_module.FrameBuilder()
+    reader = rows_of(Path("a.csv"), builder.account)
+    text = [row.format(k=k, name=names[k % 6]) for k in range(60)]
+    assert reader.line(head.strip().encode(), 0, builder)
+    for line in text[:6]:  # the careful way meets the names first
+        reader.line(line.strip().encode(), 0, builder)
+    buffer = np.frombuffer("".join(text[6:]).encode(), np.uint8)
+    assert reader.take(buffer, 0, builder) == len(buffer)
+    table = builder.take()
+    if rows_of is OwnRows:
+        assert [table.channels[c] for c in table.channel] == [names[k % 6] for k in range(60)]
 
 
 def test_a_very_long_channel_name_bounds_the_memory(read):
