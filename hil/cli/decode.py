@@ -134,13 +134,15 @@ def _write(
     args: argparse.Namespace, blocks: Iterable[Block], contents: Contents, summary: Summary, read: list[Path]
 ) -> int:
     from hil.log.export.messages import write_signals
-    from hil.log.export.resample import resampled
+    from hil.log.export.resample import raster_rows, resampled
 
     fields = tuple(Field(one.message, one.signal, one.dtype) for one in contents.signals.values())
     several = contents.counts.several_channels and args.resample is None
-    layout = Layout(fields, several, args.names, summary.first_ns, contents.channel_of())
+    rows = summary.frames
     if args.resample is not None:
-        blocks = resampled(blocks, fields, summary.first_ns, summary.last_ns, round(args.resample * 1e9))
+        raster = summary.first_ns, summary.last_ns, round(args.resample * 1e9)
+        rows, blocks = raster_rows(*raster), resampled(blocks, fields, *raster)
+    layout = Layout(fields, several, args.names, summary.first_ns, contents.channel_of(), rows)
     return write_signals(blocks, layout, args.out, args.force, read)
 
 

@@ -3,11 +3,9 @@
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from dbc.database import Signal
 from hil.log.choice import Choice
-from hil.log.compare.diff_signals import Ints, SignalDifference, dense, difference, pairs
+from hil.log.compare.diff_signals import Pairs, SignalDifference, difference, pairs
 from hil.log.compare.series import MessageSeries, collect
 from hil.log.read import Progress
 from hil.log.several import Logs
@@ -15,7 +13,7 @@ from hil.log.signals.databases import Databases
 from hil.log.summary.contents import Contents
 from hil.log.summary.values import Summary
 
-VALUES_AT_ONCE = 8_000_000  # of both logs together: about 300 MB
+VALUES_AT_ONCE = 8_000_000  # of both logs together: 64 MB
 
 Tolerance = Callable[[str, Signal], float | None]
 """Tolerance of a signal ("MESSAGE.SIGNAL") in its own unit; None for the one it has by itself."""
@@ -84,8 +82,8 @@ def diff_logs(
     The k-th frame of a message is compared with its k-th frame in the other log where both have equally many and the
     stamps agree within half a cycle; else every frame of the first log with the nearest one of the other, not farther
     than half a cycle (the median of the first log). Stamps are taken as they are where the two logs overlap in time,
-    else from the first frame of each log on. Messages are compared group by group, so that memory does not grow with
-    the logs; a group is at least one message. Both logs are read once, and once again for each group.
+    else from the first frame of each log on. Signals are compared group by group, so that memory grows with one
+    signal at most. Both logs are read once, and once again for each group.
     """
     wanted = choice.wanted(databases)
     readings = _Readings(progress)
@@ -103,22 +101,25 @@ def diff_logs(
     names_of: dict[str, list[str]] = {}
     for name, signal in sides[0].signals.items():
         names_of.setdefault(signal.message, []).append(name)
-    sizes = {
-        name: (n + counts[1][name]) * (1 + len(names_of.get(name, ())))
-        for name, n in counts[0].items()
-        if name in counts[1]
-    }
-    groups = list(_groups(sizes))
+    shared = {name: n + counts[1][name] for name, n in counts[0].items() if name in counts[1]}
+    groups = list(_groups(shared, names_of))
     readings.total = 2 + 2 * len(groups)
-    for messages in groups:
-        names = [name for message in messages for name in names_of.get(message, ())]
+    paired: dict[str, Pairs] = {}
+    for group in groups:
+        names = [name for some in group.values() for name in some]
         one, two = (
-            collect(choice.frames(logs.tables(readings.next())), databases.decoder(names)) for logs in (first, second)
+            collect(choice.frames(logs.tables(readings.next())), databases.decoder(names), count)
+            for logs, count in zip((first, second), counts, strict=True)
         )
-        for message in sorted(messages & one.keys() & two.keys()):
+        for message in sorted(group.keys() & one.keys() & two.keys()):
             one[message].time_ns -= starts[0]
             two[message].time_ns -= starts[1]
-            _compare(found, message, one[message], two[message], tolerance, begin_ns)
+            if message not in paired:
+                paired[message] = _pair(found, message, one[message], two[message], begin_ns)
+            _compare(found, message, one[message], two[message], paired[message], tolerance, begin_ns)
+        last = next(reversed(group))  # only its signals may go on in the next group
+        paired = {name: some for name, some in paired.items() if name == last}
+        del one, two
     return found
 
 
@@ -168,17 +169,29 @@ def _unknown(sides: list[Contents], summaries: tuple[Summary, Summary]) -> dict[
     return {name: pair for name, pair in pairs.items() if pair[0] != pair[1]}
 
 
-def _groups(sizes: Mapping[str, int]) -> Iterator[set[str]]:
-    names: set[str] = set()
+def _groups(frames: Mapping[str, int], names_of: Mapping[str, list[str]]) -> Iterator[dict[str, list[str]]]:
+    """Signals by message, as many as fit into memory; the stamps of a message take as much as one signal."""
+    group: dict[str, list[str]] = {}
     total = 0
-    for name, size in sizes.items():
-        if names and total + size > VALUES_AT_ONCE:
-            yield names
-            names, total = set(), 0
-        names.add(name)
-        total += size
-    if names:
-        yield names
+    for message, n in frames.items():
+        for name in names_of.get(message, ()):
+            size = n if message in group else 2 * n
+            if group and total + size > VALUES_AT_ONCE:
+                yield group
+                group, total, size = {}, 0, 2 * n
+            group.setdefault(message, []).append(name)
+            total += size
+    if group:
+        yield group
+
+
+def _pair(found: LogDifference, name: str, one: MessageSeries, two: MessageSeries, begin_ns: int) -> Pairs:
+    paired = pairs(one.time_ns, two.time_ns)
+    n, m = len(one.time_ns), len(two.time_ns)
+    alone = one.time_ns[paired.alone(n)], two.time_ns[paired.alone(m, second=True)]
+    starts = [int(times.min() - begin_ns) / 1e9 for times in alone if len(times)]
+    found.messages.append(MessageDifference(name, n, m, len(alone[0]), len(alone[1]), min(starts, default=None)))
+    return paired
 
 
 def _compare(
@@ -186,28 +199,15 @@ def _compare(
     name: str,
     one: MessageSeries,
     two: MessageSeries,
+    paired: Pairs,
     tolerance: Tolerance,
     begin_ns: int,
 ) -> None:
-    mine, theirs = pairs(one.time_ns, two.time_ns)
-    n, m = len(one.time_ns), len(two.time_ns)
-    alone = [_alone(one.time_ns, mine), _alone(two.time_ns, theirs)]
-    starts = [float((times[0] - begin_ns) / 1e9) for times in alone if len(times)]
-    found.messages.append(MessageDifference(name, n, m, len(alone[0]), len(alone[1]), min(starts, default=None)))
     for signal in one.signals:
         if signal in two.signals:
-            limit = tolerance(f"{name}.{signal}", one.signals[signal].signal)
+            full, samples = f"{name}.{signal}", (one.signals[signal], two.signals[signal])
+            limit = tolerance(full, samples[0].signal)
             if limit is None:
-                limit = own_tolerance(one.signals[signal].signal)
-            a, there_a = dense(one.signals[signal], n, mine)
-            b, there_b = dense(two.signals[signal], m, theirs)
-            times_s = (one.time_ns[mine] - begin_ns) / 1e9
-            unit = one.signals[signal].signal.unit
-            found.signals.append(difference(f"{name}.{signal}", unit, limit, times_s, (a, there_a), (b, there_b)))
-
-
-def _alone(times: Ints, paired: Ints) -> Ints:
-    """Stamps of the frames without a partner, ascending."""
-    alone = np.ones(len(times), np.bool_)
-    alone[paired] = False
-    return np.sort(times[alone])
+                limit = own_tolerance(samples[0].signal)
+            times = one.time_ns, two.time_ns
+            found.signals.append(difference(full, limit, times, samples, paired, begin_ns))

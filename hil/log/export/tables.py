@@ -4,6 +4,7 @@ Tables are written block after block, so that memory does not grow with the log.
 """
 
 import json
+import math
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager
@@ -21,7 +22,9 @@ from hil.log.frames import LogError
 from hil.log.signals.decoded import Column, DecodedLog, Rows, Values
 
 SUFFIXES = (".parquet", ".csv")
-CELLS_PER_BATCH = 1_000_000
+CELLS_PER_BATCH = 1_000_000  # of a CSV file
+LEAST_ROWS = 1024
+BYTES_PER_CELL, BYTES_PER_CHUNK = 20, 1900  # in memory: a value, and what a Parquet writer keeps of a column of a group
 
 
 def export(log: DecodedLog, path: Path, overwrite: bool = False, read: Iterable[Path] = ()) -> None:
@@ -43,7 +46,8 @@ def export(log: DecodedLog, path: Path, overwrite: bool = False, read: Iterable[
     fields = tuple(
         Field(name.rpartition(".")[0], column.signal, column.values.dtype) for name, column in log.columns.items()
     )
-    export_blocks([block_of(log)], Layout(fields, log.several_channels), path, overwrite, read)
+    layout = Layout(fields, log.several_channels, rows=len(log.recording.frames))
+    export_blocks([block_of(log)], layout, path, overwrite, read)
 
 
 def export_blocks(
@@ -82,6 +86,11 @@ class WideTable(AbstractContextManager["WideTable"]):
         else:
             self._file = path.open("wb")
             self._file.write((",".join(_quoted(name) for name in self._schema.names) + "\n").encode())
+        self._held: list[pa.RecordBatch] = []
+        self._n_held = 0
+        self._step = max(LEAST_ROWS, CELLS_PER_BATCH // max(1, len(self._schema)))
+        if self._writer is not None:
+            self._step = group_rows(layout.rows)
         self._options = pa.csv.WriteOptions(include_header=False, quoting_style="needed")
 
     def __enter__(self) -> Self:
@@ -92,6 +101,7 @@ class WideTable(AbstractContextManager["WideTable"]):
 
     def close(self) -> None:
         """Finish the file."""
+        self._write_held()
         if self._writer is not None:
             self._writer.close()
         if self._opened is not None:
@@ -101,13 +111,32 @@ class WideTable(AbstractContextManager["WideTable"]):
 
     def write(self, block: Block) -> None:
         """Write further rows, in portions of bounded memory."""
-        step = max(1024, CELLS_PER_BATCH // max(1, len(self._schema)))
-        for begin in range(0, len(block), step):
-            batch = batch_of(block, self._layout, self._layout.fields, self._schema, begin, begin + step)
+        begin = 0
+        while begin < len(block):
+            end = min(len(block), begin + self._step - self._n_held)
+            self._held.append(batch_of(block, self._layout, self._layout.fields, self._schema, begin, end))
+            self._n_held += end - begin
+            if self._n_held == self._step:
+                self._write_held()
+            begin = end
+
+    def _write_held(self) -> None:
+        if self._held:
+            table = pa.Table.from_batches(self._held)
+            self._held, self._n_held = [], 0
             if self._writer is not None:
-                self._writer.write_batch(batch)
+                self._writer.write_table(table)
             else:
-                pa.csv.write_csv(batch, self._file, self._options)
+                pa.csv.write_csv(table, self._file, self._options)
+
+
+def group_rows(rows: int) -> int:
+    """Rows of a group of a Parquet file of so many rows.
+
+    A writer holds one group, and until the end some 2 kB for each column of each group written. Both together are
+    least where they are equal, whatever the number of columns.
+    """
+    return max(LEAST_ROWS, math.isqrt(rows * BYTES_PER_CHUNK // BYTES_PER_CELL))
 
 
 def opened(path: Path) -> pa.OSFile:

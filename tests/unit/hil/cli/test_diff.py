@@ -144,16 +144,24 @@ def test_pairs_are_one_to_one_and_near():
     rng = np.random.default_rng(5)
     one = np.sort(rng.integers(0, 10_000, 300))
     two = np.sort(np.concatenate((one[::2] + rng.integers(-2, 3, 150), rng.integers(0, 10_000, 40))))
-    a, b = pairs(one, two)
+    found = pairs(one, two)
+    a, b = found.first, found.second
     assert len(np.unique(a)) == len(a) == len(np.unique(b))
     assert (np.abs(one[a] - two[b]) <= np.median(np.diff(one)) / 2).all()
     assert len(a) > 140
 
 
-def test_messages_compared_in_groups_give_the_same(compare, monkeypatch):
+@pytest.mark.parametrize("at_once", [1, 100, 250, 320])
+def test_signals_compared_in_groups_give_the_same(compare, monkeypatch, at_once):
     other = [*lines(SAME), *(f"({1000.001 + k / 10:.6f}) can0 002#{k:02X}\n" for k in range(5))]
-    changed = [line.replace("002#03", "002#09") for line in other]
+    changed = [line.replace("002#03", "002#09") for line in other[:30] + other[31:]]
+    changed[12] = changed[12].replace("0164", "01FF")
     whole, _ = compare(other, changed, code=1)
-    monkeypatch.setattr("hil.log.compare.diff.VALUES_AT_ONCE", 1)
-    assert compare(other, changed, code=1)[0] == whole
+    monkeypatch.setattr("hil.log.compare.diff.VALUES_AT_ONCE", at_once)
+    monkeypatch.setattr("hil.log.compare.diff_signals.AT_ONCE", 7)
+    found, _ = compare(other, changed, code=1)
+    assert whole["signals"]["M.S"].pop("rms") == pytest.approx(found["signals"]["M.S"].pop("rms"))
+    assert found == whole
+    assert list(found["messages"]) == ["M", "N"]
+    assert whole["messages"]["M"]["unpaired_first"] == 1
     assert whole["signals"]["N.U"]["greatest"] == 6

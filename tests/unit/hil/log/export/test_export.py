@@ -7,7 +7,8 @@ import pytest
 
 from dbc.database import parse_database
 from hil.log.export import tables as export_module
-from hil.log.export.tables import export
+from hil.log.export.blocks import Field, Layout, block_of
+from hil.log.export.tables import LEAST_ROWS, export, export_blocks, group_rows
 from hil.log.frames import LogError
 from hil.log.read import read_log
 from hil.log.signals.decode import decode_log
@@ -51,6 +52,33 @@ def test_parquet_has_one_row_a_frame_and_units(tmp_path, decode, monkeypatch, ce
     assert table.schema.field("time").metadata == {b"unit": b"s"}
     assert table.schema.field("M.S").metadata == {b"unit": b"km/h"}
     assert json.loads(table.schema.field("M.T").metadata[b"values"]) == {"0": "off", "1": "on"}
+
+
+def test_pieces_of_a_log_become_few_groups_of_rows(tmp_path, decode):
+    pieces = [decode(LOG * 25), decode(LOG * 3 + "(3.0) can1 001#0001\n"), *[decode(LOG * 100)] * 12]
+    layout = Layout(
+        tuple(Field(name.partition(".")[0], c.signal, c.values.dtype) for name, c in pieces[0].columns.items()),
+        with_channel=True,
+        names=True,
+        rows=5000,
+    )
+    export_blocks(map(block_of, pieces), layout, tmp_path / "a.parquet")
+    file = pyarrow.parquet.ParquetFile(tmp_path / "a.parquet")
+    groups = [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)]
+    assert groups == [LEAST_ROWS] * 4 + [4913 - 4 * LEAST_ROWS]
+    table = file.read()
+    assert table.column("channel").to_pylist() == ["can0"] * 112 + ["can1"] + ["can0"] * 4800
+    numbers, names = table.column("M.T").to_pylist(), table.column("M.T (name)").to_pylist()
+    assert names == [None if number is None else ("off", "on")[number] for number in numbers]
+    export_blocks(map(block_of, pieces), layout, tmp_path / "a.csv")
+    with (tmp_path / "a.csv").open(newline="") as csv_file:
+        rows = list(csv.DictReader(csv_file))
+    assert [row["M.T (name)"] or None for row in rows] == names
+
+
+def test_row_groups_grow_with_the_root_of_the_log():
+    assert group_rows(0) == LEAST_ROWS
+    assert group_rows(40_000_000) == pytest.approx(2 * group_rows(10_000_000), abs=2)
 
 
 def test_csv_leaves_cells_empty(tmp_path, decode):
