@@ -36,7 +36,8 @@ from hil.report.courses_picture import write_picture
 from hil.report.thin import thinned
 
 SUFFIXES = (".html", ".png", ".svg", ".pdf")
-MOST_SAMPLES, KEPT_SAMPLES = 1_000_000, 250_000  # of one signal in memory; beyond, peaks are kept
+MOST_SAMPLES = 2_000_000  # of all signals in memory; beyond, peaks are kept
+LEAST_SAMPLES = 8  # of one signal and table
 MOST_SIGNALS, MOST_TOGETHER, MOST_NAMES = 60, 8, 24
 SILENCE = 10.0  # cycles without a frame leave a gap in the line
 
@@ -98,23 +99,37 @@ def run(args: argparse.Namespace) -> int:
 
 @dataclass(slots=True)
 class Gathered:
-    """One signal being gathered; ``parts`` are stamps and values, thinned when there are many."""
+    """One signal being gathered.
+
+    Attributes
+    ----------
+    count, held : values that came, and that are in memory.
+    coarse : values that came for one in memory; alike for all of the log, so that its beginning looks as its end does.
+    parts : stamps and values.
+    """
 
     signal: Signal
     dtype: np.dtype[np.generic]
     count: int = 0
     held: int = 0
+    coarse: float = 1.0
     parts: list[tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]] = field(default_factory=list)
 
     def add(self, time_ns: npt.NDArray[np.int64], values: Values) -> None:
         """Add further values."""
-        self.count += len(values)
-        self.held += len(values)
-        self.parts.append((time_ns, values.astype(np.float64)))
-        if self.held > MOST_SAMPLES:
+        y = values.astype(np.float64)
+        kept = thinned(y, max(LEAST_SAMPLES, int(len(y) / self.coarse)))
+        self.parts.append((time_ns[kept], y[kept]))
+        self.count += len(y)
+        self.held += len(kept)
+
+    def thin(self, most: int) -> None:
+        """Keep half of ``most`` values where there are more."""
+        if self.held > most:
             times, y = self.joined()
-            kept = thinned(y, KEPT_SAMPLES)
+            kept = thinned(y, max(LEAST_SAMPLES, most // 2))
             self.parts = [(times[kept], y[kept])]
+            self.coarse *= self.held / len(kept)
             self.held = len(kept)
 
     def joined(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
@@ -149,6 +164,8 @@ def gather(logs: Logs, decoder: Decoder, choice: Choice, progress: Progress) -> 
                     )
                 found.signals[name] = Gathered(column.signal, column.values.dtype)
             found.signals[name].add(table.time_ns[column.rows], column.values)
+        for one in found.signals.values():
+            one.thin(MOST_SAMPLES // len(found.signals))
     found.first_ns = logs.first_ns
     return found
 

@@ -13,7 +13,8 @@ from hil.log.account import Account
 from hil.log.frames import LogError
 
 HEAD_BYTES = 65_536  # enough to tell the format
-FEW_BYTES = 200_000  # a log below this is read without the compiled pass, which costs half a second to load
+FEW_BYTES = 1_000_000  # a log of fewer is read without the compiled pass, whose loading takes longer (0.3 s)
+PACKING = 10  # a log is so many times as large as its gzip file, about
 STDIN = "-"
 PACKED_BYTES = 16_384
 GZIP_BITS = 31  # zlib's name for a gzip frame around the stream
@@ -123,6 +124,10 @@ class Source:
             raise LogError(self.path, f"cannot be read: {error}", self._position) from error
         self._position += len(content)
         return content
+
+    def few(self, taken: int) -> bool:
+        """Whether the log is small, as far as can be told where ``taken`` bytes of it have been read."""
+        return taken < FEW_BYTES and self.size < (FEW_BYTES // PACKING if self.packed else FEW_BYTES)
 
     @property
     def done(self) -> float:

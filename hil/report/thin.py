@@ -1,7 +1,5 @@
 """Fewer samples where a page would grow too large; no peak and no gap is lost."""
 
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,13 +34,15 @@ def thinned(y: NDArray[np.float64], limit: int) -> NDArray[np.intp]:
     if n <= limit:
         return np.arange(n)
     edges = np.linspace(0, n, (limit - 2) // 3 + 1).astype(np.intp)
-    missing = np.isnan(y)
-    keep = [0, n - 1]
-    for start, stop in pairwise(edges.tolist()):
-        gap = missing[start:stop]
-        if gap.any():
-            keep.append(int(start + np.argmax(gap)))
-        if not gap.all():
-            piece = y[start:stop]
-            keep += [int(start + np.nanargmin(piece)), int(start + np.nanargmax(piece))]
-    return np.unique(np.array(keep, dtype=np.intp))
+    bucket = np.repeat(np.arange(len(edges) - 1), np.diff(edges))
+    kept = [np.array([0, n - 1]), _first_of_each(np.isnan(y), bucket)]
+    for extreme in (np.fmin, np.fmax):
+        kept.append(_first_of_each(y == extreme.reduceat(y, edges[:-1])[bucket], bucket))
+    return np.unique(np.concatenate(kept))
+
+
+def _first_of_each(marked: NDArray[np.bool_], bucket: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Index of the first marked sample of each bucket that has one."""
+    at: NDArray[np.intp] = np.flatnonzero(marked)
+    first: NDArray[np.bool_] = np.diff(bucket[at], prepend=-1) != 0
+    return at[first]

@@ -124,6 +124,10 @@ class Window:
         """Where the reader stands in the source."""
         return self.base + self.at
 
+    def few(self) -> bool:
+        """Whether the source is small, as far as can be told here."""
+        return self._source.few(self.base)
+
     def left(self, size: int) -> int:
         """How many bytes are left, as far as there are up to ``size`` of them."""
         if len(self.data) - self.at < size and not self._ended:

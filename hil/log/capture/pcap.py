@@ -24,7 +24,7 @@ from hil.log.capture.packets import (
 )  # fmt: skip
 from hil.log.capture.pcapng import read_pcapng, write_pcapng
 from hil.log.frames import FrameTable, LogError
-from hil.log.source import FEW_BYTES, ReadOptions, Source
+from hil.log.source import ReadOptions, Source
 
 __all__ = ["read_pcap", "read_pcapng", "write_pcapng"]
 
@@ -71,7 +71,7 @@ class _Records:
         while window.left(16):
             if builder.full:
                 yield builder.take()
-            compiled = len(window.data) > FEW_BYTES or window.base > 0 if fast is None else fast
+            compiled = not window.few() if fast is None else fast
             if compiled and self.link in HEADER:
                 self._take()
                 if builder.full or not window.left(16):

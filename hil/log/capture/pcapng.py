@@ -15,7 +15,7 @@ from hil.log.account import Account
 from hil.log.builder import FrameBuilder
 from hil.log.capture.packets import COOKED_2, HEADER, SOCKETCAN, Window, frame_of, with_can, words_at
 from hil.log.frames import FrameFlag, FrameTable, LogError, LogFacts
-from hil.log.source import FEW_BYTES, ReadOptions, Source
+from hil.log.source import ReadOptions, Source
 
 SECTION, INTERFACE, PACKET, SIMPLE_PACKET, ENHANCED_PACKET = 0x0A0D0D0A, 1, 2, 3, 6
 _PACKETS = (PACKET, SIMPLE_PACKET, ENHANCED_PACKET)
@@ -110,7 +110,7 @@ class _Blocks:
         while window.left(12):
             if builder.full:
                 yield builder.take()
-            compiled = len(window.data) > FEW_BYTES or window.base > 0 if fast is None else fast
+            compiled = not window.few() if fast is None else fast
             if compiled and self.interfaces:
                 self._take()
                 if builder.full or not window.left(12):

@@ -23,7 +23,6 @@ from pathlib import Path
 
 import numpy as np
 
-from dbc.contract import database_text
 from dbc.database import Database, parse_database
 from dbc.frame import BusName
 from hil.log.frames import FrameTable, Recording
@@ -63,6 +62,8 @@ MAX_CELLS = 8_000_000
 @cache
 def own_databases() -> dict[str, Database]:
     """Our two databases, by the channel name that our recordings give their bus."""
+    from dbc.contract import database_text  # loads cantools
+
     return {bus.value: parse_database(database_text(bus), f"our {bus.value} database") for bus in BusName}
 
 

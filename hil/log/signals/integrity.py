@@ -7,8 +7,6 @@ import numpy as np
 import numpy.typing as npt
 
 from dbc import e2e
-from dbc.codec import COUNTER_SIGNAL, CRC_SIGNAL
-from dbc.contract import contract
 from dbc.database import Message
 from dbc.frame import BusName
 from hil.log.frames import FrameFlag, Recording
@@ -159,6 +157,8 @@ def has_profile_layout(message: Message) -> bool:
     The check value is the signal CRC in the first byte, the counter ALIVE_COUNTER in the low nibble of the second; the
     data id is the DBC's attribute E2EDataID, which the signals do not show.
     """
+    from dbc.codec import COUNTER_SIGNAL, CRC_SIGNAL  # loads cantools, which few logs need
+
     masks = {signal.name: signal.mask() for signal in message.signals if signal.name in (CRC_SIGNAL, COUNTER_SIGNAL)}
     return 2 <= message.length <= 64 and masks == {CRC_SIGNAL: 0x00FF, COUNTER_SIGNAL: 0x0F00}
 
@@ -170,6 +170,8 @@ def check_integrity(recording: Recording, legacy: bool = False) -> dict[str, Int
     message that came on several channels are added up. ``legacy`` checks by the legacy check value, which an older
     recording has (`Integrity.is_legacy`).
     """
+    from dbc.contract import contract
+
     frames = recording.frames
     plain = (frames.flags & (FrameFlag.REMOTE | FrameFlag.ERROR) == 0) & ~frames.extended
     found: dict[str, Integrity] = {}

@@ -1,5 +1,6 @@
 """Summary of a log, in memory that does not grow with it: identifiers, cycle times, bus load, order of the stamps."""
 
+import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -11,7 +12,7 @@ from hil.log.summary.numpy_counts import count_rows
 from hil.log.summary.state import CODES, Channel, Id, State, Whole, bin_edges
 from hil.log.summary.values import Backwards, ChannelSummary, Cycle, IdSummary, Summary
 
-FEW_FRAMES = 20_000  # a log of fewer is counted without the compiled pass, which takes half a second to load
+FEW_FRAMES = 50_000  # a log of fewer is counted without the compiled pass where none is loaded, which takes 0.3 s
 GAP = 2.5  # an interval longer than so many cycles is a gap
 CYCLIC_SHARE = 0.8  # of the intervals within half a median of the median: such an identifier is sent cyclically
 LEAST_SPAN_NS = 10_000_000  # shorter logs have no bus load
@@ -41,7 +42,7 @@ class Statistics:
     def add(self, table: FrameTable) -> None:
         """Count further frames; all tables share one channel numbering."""
         if self._fast is None and len(table):
-            self._fast = len(table) >= FEW_FRAMES
+            self._fast = len(table) >= FEW_FRAMES or "hil.log.compiled" in sys.modules
         self._know_channels(table.channels)
         if not self._fast:
             count_rows(table, self._state, self._places)

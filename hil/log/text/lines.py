@@ -9,7 +9,7 @@ import numpy.typing as npt
 from hil.log.account import Account
 from hil.log.builder import FrameBuilder
 from hil.log.frames import FrameTable
-from hil.log.source import FEW_BYTES, Source
+from hil.log.source import Source
 
 BLOCK_BYTES = 256 * 1024  # stays in the cache
 MAX_LINE_BYTES = 4096
@@ -48,7 +48,7 @@ def read_lines(source: Source, account: Account, parser: LineParser, fast: bool 
     left = wait = 0  # calls of the compiled pass that took nothing, one after the other; lines to go before the next
     for offset, block in _blocks(source, account):
         end = block.rfind(b"\n") + 1
-        compiled = len(block) > FEW_BYTES or offset > 0 if fast is None else fast
+        compiled = not source.few(offset) if fast is None else fast
         buffer = np.frombuffer(block, np.uint8, end)
         at = 0
         while at < len(block):

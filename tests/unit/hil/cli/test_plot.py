@@ -105,16 +105,27 @@ def test_many_values_are_thinned_and_the_peak_stays():
     assert (max(trace["y"]), min(trace["y"])) == (50.0, -60.0)
 
 
-def test_gathering_keeps_peaks_in_bounded_memory(monkeypatch):
-    monkeypatch.setattr(plot, "MOST_SAMPLES", 1000)
-    monkeypatch.setattr(plot, "KEPT_SAMPLES", 100)
+def test_gathering_keeps_peaks_in_bounded_memory_everywhere_alike():
     gathered = plot.Gathered(None, np.dtype(np.float64))
-    y = np.sin(np.arange(10_000))
-    y[5_000] = 9.0
-    for begin in range(0, 10_000, 500):
+    y = np.sin(np.arange(100_000))
+    y[50_000] = 9.0
+    for begin in range(0, 100_000, 500):
         gathered.add(np.arange(begin, begin + 500), y[begin : begin + 500])
+        gathered.thin(5000)
     times, values = gathered.joined()
-    assert gathered.count == 10_000
-    assert len(times) <= 1500
+    assert gathered.count == 100_000
+    assert len(times) == gathered.held <= 5000
     assert values.max() == 9.0
     assert (np.diff(times) > 0).all()
+    parts = np.histogram(times, 10, (0, 100_000))[0]
+    assert parts.min() > 0.5 * parts.max()
+
+
+def test_many_signals_share_the_memory(log, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(plot, "MOST_SAMPLES", 200)
+    held = []
+    monkeypatch.setattr(plot, "panels", lambda gathered, _: held.append(gathered) or [])
+    monkeypatch.setattr(plot, "courses_page", lambda *_: "")
+    assert run(log, "S", "R", "T", "B", "--dbc", tmp_path / "a.dbc", "--out", tmp_path / "a.html") == 0
+    assert "4 signals, 1,600 values" in capsys.readouterr().out
+    assert 4 * 8 <= sum(one.held for one in held[0].signals.values()) <= 200
