@@ -1,12 +1,19 @@
 """For all tests: how long one takes says nothing on a shared machine, and the first one compiles."""
 
+import os
+
 import pytest
 from hypothesis import HealthCheck, settings
 
 pytest_plugins = ["drawn", "shared"]
 SLOW_LIMIT_S = 3600.0  # ends what hangs; a busy machine takes ten times as long as an idle one
 
-settings.register_profile("brakebench", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    "brakebench",
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+    derandomize=bool(os.environ.get("CI")),  # a change is judged by the same examples every time
+)
 settings.load_profile("brakebench")
 
 

@@ -71,7 +71,8 @@ def assert_same(a, b):
 def assert_same_counts(a, b):
     for name in ("frames", "decoded", "unknown", "rejected", "reasons", "unknown_ids", "messages", "signals"):
         assert getattr(a, name) == getattr(b, name), name
-    assert (a.transport, a.several_channels) == (b.transport, b.several_channels)
+    assert a.transport == b.transport
+    assert a.several_channels == b.several_channels
     assert sorted(a.notes) == sorted(b.notes)
 
 

@@ -82,3 +82,26 @@ def blocks_of(tables: Iterable[FrameTable], decoder: Decoder) -> Iterator[Block]
     """Yield the signals of tables as rows to be written, one row per frame."""
     for table in tables:
         yield block_of(decoder.add(table))
+
+
+def grouped(layout: Layout) -> dict[str, list[Field]]:
+    """Columns by message."""
+    groups: dict[str, list[Field]] = {}
+    for one in layout.fields:
+        groups.setdefault(one.message, []).append(one)
+    return groups
+
+
+def of_message(block: Block, message: str, fields: list[Field]) -> Block | None:
+    """Rows of one message as a block of their own; None where it has none."""
+    rows = block.rows.get(message)
+    if rows is None or not len(rows):
+        return None
+    columns = {}
+    for one in fields:
+        if one.name in block.columns:
+            at, values = block.columns[one.name]
+            columns[one.name] = np.searchsorted(rows, at), values
+    channel = None if block.channel is None else block.channel[rows]
+    n = np.arange(len(rows))
+    return Block(block.time_ns[rows], channel, block.channels, columns, {message: n})

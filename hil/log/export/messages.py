@@ -7,12 +7,11 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import Self
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
 from hil.log.atomic_write import atomic_write, orderly_end, temporary_stem
-from hil.log.export.blocks import Block, Field, Layout
+from hil.log.export.blocks import Block, Layout, grouped, of_message
 from hil.log.export.tables import batch_of, check_suffix, export_blocks, opened, schema_of
 from hil.log.frames import LogError
 
@@ -95,29 +94,6 @@ def _placed(path: Path, temporary: Path, read: Iterable[Path]) -> Iterator[None]
         raise LogError(path, f"cannot be written: {error.strerror or error}") from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-
-
-def grouped(layout: Layout) -> dict[str, list[Field]]:
-    """Columns by message."""
-    groups: dict[str, list[Field]] = {}
-    for one in layout.fields:
-        groups.setdefault(one.message, []).append(one)
-    return groups
-
-
-def of_message(block: Block, message: str, fields: list[Field]) -> Block | None:
-    """Rows of one message as a block of their own; None where it has none."""
-    rows = block.rows.get(message)
-    if rows is None or not len(rows):
-        return None
-    columns = {}
-    for one in fields:
-        if one.name in block.columns:
-            at, values = block.columns[one.name]
-            columns[one.name] = np.searchsorted(rows, at), values
-    channel = None if block.channel is None else block.channel[rows]
-    n = np.arange(len(rows))
-    return Block(block.time_ns[rows], channel, block.channels, columns, {message: n})
 
 
 class MessageFolder(AbstractContextManager["MessageFolder"]):

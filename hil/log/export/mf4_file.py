@@ -8,8 +8,7 @@ from typing import Self
 import numpy as np
 
 from dbc.database import Signal
-from hil.log.export.blocks import Block, Field, Layout
-from hil.log.export.messages import grouped, of_message
+from hil.log.export.blocks import Block, Field, Layout, grouped, of_message
 from hil.log.mf4.signals import SignalsWriter
 
 

@@ -155,6 +155,7 @@ class Decoder:
             with np.errstate(over="ignore", invalid="ignore"), _uncollected():  # a float may hold anything
                 self._decode(log, table, words, assigned, joined, fast)
             self._note(log)
+        log.transport.open = self._transport.open
         self._totals.merge(log)
         return log
 
@@ -204,7 +205,6 @@ class Decoder:
         log.transport.frames = len(rows)
         log.decoded += len(rows)
         log.transport.broken = Counter(self._transport.broken)
-        log.transport.open = self._transport.open
         return found
 
     def _decode(

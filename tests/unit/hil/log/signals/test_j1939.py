@@ -251,3 +251,13 @@ def test_any_frames_are_accounted_for_in_one_piece_or_in_several(data):
 def test_the_group_of_a_message_to_one_address_has_no_address():
     log = decoded(transfer(bytes(20), 0xEE00, to=0x33))
     assert log.transport.unknown == {"can0 PGN 0xee00": 1}
+
+
+def test_a_table_without_frames_leaves_open_transfers_open():
+    frames = transfer()[:2]
+    table = table_of(frames)
+    decoder = Decoder(LONG)
+    decoder.add(table)
+    assert decoder.totals.transport.open == 1
+    decoder.add(table.take(slice(2, None)))
+    assert decoder.totals.transport.open == 1
