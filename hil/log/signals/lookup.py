@@ -117,7 +117,7 @@ class Lookup:
                     )
             here: dict[tuple[int, int], int] = {}
             for (can_id, _), message, slot in own:
-                if getattr(message, "pgn_match", False):
+                if message.pgn_match:
                     here.setdefault((WITHOUT_PRIORITY, can_id & 0x3FF_FFFF), slot)
                     group = GROUP, group_number(can_id)
                     if can_id & 0xFF == 0xFE or group not in here:  # Vector's "any source" address goes first
@@ -125,7 +125,7 @@ class Lookup:
             for (can_id, extended), message, slot in own:
                 if not extended and can_id < 2048:
                     dense[can_id] = slot if dense[can_id] < 0 else dense[can_id]
-                elif extended and not getattr(message, "pgn_match", False):
+                elif extended and not message.pgn_match:
                     earlier = groups.get((WITHOUT_PRIORITY, can_id & 0x3FF_FFFF))
                     earlier = groups.get((GROUP, group_number(can_id))) if earlier is None else earlier
                     self.by_key.setdefault(key(number, IDENTIFIER, can_id), slot if earlier is None else earlier)

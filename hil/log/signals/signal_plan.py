@@ -168,9 +168,7 @@ def plan_message(message: Message, name: str, wanted: Wanted) -> MessagePlan:
     plain = all(
         plan.kind != OTHER and plan.parent is None and plan.word == 0 and not plan.straddles for plan in signals
     )
-    return MessagePlan(
-        name, message, signals, least, full, plain, ints, floats, bool(getattr(message, "pgn_match", False))
-    )
+    return MessagePlan(name, message, signals, least, full, plain, ints, floats, message.pgn_match)
 
 
 def _ends(message: Message, by_name: dict[str, Signal]) -> dict[str, int]:
