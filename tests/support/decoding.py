@@ -1,33 +1,21 @@
 """What the tests of decoding share."""
 
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from dbc.database import Database, Message, parse_database
+from dbc.database import parse_database
 from hil.log.frames import FrameTable, Recording
-
-
-@dataclass(frozen=True, slots=True)
-class GroupMessage(Message):
-    """A message that stands for its J1939 parameter group."""
-
-    pgn_match: bool = True
 
 
 def as_j1939(database):
     """The database with every 29-bit message standing for its parameter group."""
-
-    def changed(message):
-        if not message.extended:
-            return message
-        values = {name: getattr(message, name) for name in Message.__dataclass_fields__} | {"pgn_match": True}
-        return GroupMessage(**values)
-
-    return Database(
-        database.source, {key: changed(message) for key, message in database.messages.items()}, database.warnings
-    )
+    messages = {
+        key: replace(message, pgn_match=True) if message.extended else message
+        for key, message in database.messages.items()
+    }
+    return replace(database, messages=messages)
 
 
 def database_of(*lines, source="database"):
