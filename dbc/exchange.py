@@ -4,57 +4,15 @@ from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
 from dbc.contract import Message, MessageSpec, spec_of
-from dbc.e2e import COUNTER_MODULUS, Checker, Status
+from dbc.e2e import COUNTER_MODULUS, Status
 from dbc.frame import BusName, Frame, LinkEvent, Received
+from dbc.reception import Reception
 
 M = TypeVar("M", bound=Message)
 LAST_COUNTER = COUNTER_MODULUS - 1
 # on the way of every frame: without the Python-made __new__ of a NamedTuple and the slow look-up of an enum's member
 _new = tuple.__new__
-_VEHICLE, _OK, _OK_SOME_LOST, _NO_NEW_DATA = (
-    BusName.VEHICLE, Status.OK, Status.OK_SOME_LOST, Status.NO_NEW_DATA,
-)  # fmt: skip
-
-
-class Reception:
-    """State of one received message.
-
-    Attributes
-    ----------
-    message : the last usable message, None before the first.
-    fresh : whether the last call of `Receiver.accept` brought a usable one.
-    valid_in_row : usable frames since the last unusable one.
-    bad_in_row : unusable frames since the last usable one.
-    last_valid_ns : tick of the last usable frame, None before the first.
-    """
-
-    def __init__(self, spec: MessageSpec) -> None:
-        self.spec = spec
-        self.checker = None if spec.data_id is None else Checker(spec.data_id, spec.length)
-        self._check = self._check_length if self.checker is None else self.checker.check
-        self._decode = spec.decode
-        self.message: Message | None = None
-        self.status = Status.NO_NEW_DATA
-        self.fresh = False
-        self.valid_in_row = 0
-        self.bad_in_row = 0
-        self.last_valid_ns: int | None = None
-
-    def accept(self, now_ns: int, data: bytes) -> None:
-        """Check one payload and keep its message when it is usable."""
-        status = self.status = self._check(data)
-        if status is _OK or status is _OK_SOME_LOST:
-            self.message = self._decode(data)
-            self.fresh = True
-            self.valid_in_row += 1
-            self.bad_in_row = 0
-            self.last_valid_ns = now_ns
-        else:
-            self.valid_in_row = 0
-            self.bad_in_row += 1
-
-    def _check_length(self, data: bytes) -> Status:
-        return Status.OK if len(data) == self.spec.length else Status.WRONG_CRC
+_VEHICLE, _NO_NEW_DATA = BusName.VEHICLE, Status.NO_NEW_DATA
 
 
 class Receiver:

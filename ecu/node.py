@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from dbc.bench_messages import EcuReception, StimulusEcu
-from dbc.exchange import Receiver, Reception, Transmitter
+from dbc.exchange import Receiver, Transmitter
 from dbc.frame import BusName, Frame, LinkState, Received
 from dbc.messages import (
     BatteryStatus,
@@ -13,6 +13,7 @@ from dbc.messages import (
     BrakeEstimateRear,
     BrakePedal,
     BrakeStatus,
+    BrakeTroubleCode,
     EhbDemandFront,
     EhbDemandRear,
     EhbPressureFront,
@@ -24,11 +25,14 @@ from dbc.messages import (
     MotorStatusFront,
     MotorStatusRear,
     Steering,
+    TroubleStatus,
     WheelSpeedFront,
     WheelSpeedRear,
 )
+from dbc.reception import Reception
 from ecu.law.step import initial_memory, step
-from ecu.law.types import Brake, Health, Inputs, Outputs
+from ecu.law.trouble_codes import Trouble
+from ecu.law.types import WELL, Brake, Health, Inputs, Outputs
 from ecu.parameters.ecu import EcuParameters
 
 SOURCES: tuple[type[tuple[Any, ...]], ...] = (  # in the order of law.types.Source
@@ -44,7 +48,8 @@ SOURCES: tuple[type[tuple[Any, ...]], ...] = (  # in the order of law.types.Sour
     BatteryStatus,
 )
 _NO_COUNTER = 15
-_WELL = Health(0.0, True, 0)
+_NO_TROUBLE = BrakeTroubleCode(0, TroubleStatus.NONE, 0, 0, 0)
+_MOST_CODES = 255
 _LINK_DOWN = {LinkState.BUS_OFF: True, LinkState.DISCONNECTED: True, LinkState.RESTARTED: False}
 _LINK_DOWN[LinkState.ERROR_ACTIVE] = False
 _BRAKE = {EhbState.DEMAND: Brake.DEMAND, EhbState.OWN_PEDAL_MAP: Brake.OWN_MAP, EhbState.FAILED: Brake.FAILED}
@@ -67,11 +72,16 @@ def _brake(message: Any) -> Brake:
 
 
 def _health(reception: Reception, now_ns: int) -> Health:
-    if reception.fresh and not reception.bad_in_row:  # mostly
-        return _WELL
-    last_ns = reception.last_valid_ns
+    r = reception
+    if r.odd_ns != now_ns:
+        if r.fresh and not r.bad_in_row:  # mostly
+            return WELL
+        odd = (0, 0, 0)
+    else:
+        odd = (r.bad, r.foreign, r.doubled)
+    last_ns = r.last_valid_ns
     age_s = math.inf if last_ns is None else (now_ns - last_ns) * 1e-9
-    return Health(age_s, reception.fresh, reception.bad_in_row)
+    return Health(age_s, r.fresh, r.bad_in_row, *odd)
 
 
 class EcuNode:
@@ -97,6 +107,12 @@ class EcuNode:
         self._transmitter = Transmitter()
         self._last_ns: int | None = None
         self._link_down = False
+        self._next_code = 0
+
+    @property
+    def trouble_codes(self) -> tuple[Trouble, ...]:
+        """Every trouble code found since the start, active or not, in order of appearance."""
+        return self.memory.troubles.troubles
 
     def step(self, now_ns: int, inbox: list[Received]) -> list[Frame]:
         """Advance to ``now_ns`` and return the frames to send."""
@@ -107,7 +123,7 @@ class EcuNode:
         elapsed_ns = self.period_ns if self._last_ns is None else now_ns - self._last_ns
         self._last_ns = now_ns
         self.memory, self.outputs = step(self.memory, self._inputs(now_ns), self.parameters, elapsed_ns * 1e-9)
-        return self._transmitter.frames(now_ns, self._outgoing(self.outputs))
+        return self._transmitter.frames(now_ns, self._outgoing(now_ns, self.outputs))
 
     def _inputs(self, now_ns: int) -> Inputs:
         """What the receiver holds, as the law takes it."""
@@ -134,7 +150,18 @@ class EcuNode:
             health=tuple([_health(reception, now_ns) for reception in self._receptions]),
         )
 
-    def _outgoing(self, o: Outputs) -> tuple[tuple[Any, ...], ...]:
+    def _trouble(self, now_ns: int) -> BrakeTroubleCode:
+        """The trouble code that is told next: one after the other, without end."""
+        troubles = self.memory.troubles.troubles
+        if not troubles:
+            return _NO_TROUBLE
+        index = self._next_code % len(troubles)
+        self._next_code = index + self._transmitter.due(BrakeTroubleCode, now_ns)
+        code, active, occurrences, *_ = troubles[index]
+        status = TroubleStatus.ACTIVE if active else TroubleStatus.STORED
+        return BrakeTroubleCode(code.number, status, occurrences, min(len(troubles), _MOST_CODES), index)
+
+    def _outgoing(self, now_ns: int, o: Outputs) -> tuple[tuple[Any, ...], ...]:
         """The law's outputs as messages, with the report of what was consumed."""
         p, m, t, mu, c = o.pressure_demand_pa, o.motor_demand_nm, o.wheel_torque_nm, o.pad_friction, o.confidence
         counters = [_NO_COUNTER if (n := self._receiver.counter(t)) is None else n for t in SOURCES]
@@ -146,6 +173,7 @@ class EcuNode:
             BrakeStatus(o.mode, int(o.faults), o.blending_factor, o.demanded_deceleration_mps2),
             BrakeEstimateFront(t[0], mu[0], c[0], t[1], mu[1], c[1]),
             BrakeEstimateRear(t[2], mu[2], c[2], t[3], mu[3], c[3]),
+            self._trouble(now_ns),
             EcuReception._make((*counters, self._receiver.lost, self._receiver.corrupt)),
         )
 
