@@ -11,11 +11,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TextIO
 
+from dbc.contract import contract
+from dbc.frame import BusName
 from hil.bench.bench_run import BenchRun, BenchState
 from hil.bench.real import RealBench
 from hil.bench.result import RunResult, Signals, measure
 from hil.bench.run_report import build_report
 from hil.bench.virtual import VirtualBench
+from hil.bus.timed.line import is_timed, open_line
 from hil.log.export.tables import export
 from hil.report.figure import write_figure
 from hil.report.html import write_html
@@ -84,7 +87,9 @@ def run_scenario(
     stop = StopSignal()
     bench_run: BenchRun
     if virtual:
-        bench_run = VirtualBench(scenario, folder, seed, say, stop)
+        bit_rate = contract(BusName.VEHICLE).bit_rate
+        line = open_line(bus, bit_rate, seed) if is_timed(bus) else None
+        bench_run = VirtualBench(scenario, folder, seed, say, stop, line=line)
     else:
         bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without)
     with bench_run:

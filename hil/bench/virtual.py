@@ -14,6 +14,7 @@ from hil.bench.port import check_owned, owned_by
 from hil.bench.recorder import Recorder
 from hil.bench.result import Signals
 from hil.bench.stimulus import BENCH_PHASE_NS, StimulusNode
+from hil.bus.timed.line import TimedLine
 from hil.faults.frames import on_faulty_line
 from hil.log.frames import FrameTable, Recording
 from hil.rt.lockstep import Member, Step, lockstep
@@ -50,6 +51,7 @@ def simulate(
     plant: Node | None = None,
     ecu: Node | None = None,
     each_tick: Callable[[Step], None] | None = None,
+    line: TimedLine | None = None,
 ) -> Signals:
     """Run a scenario to its end without any file, and return what a recording of both buses would hold.
 
@@ -58,6 +60,7 @@ def simulate(
     seed : of all noise.
     plant, ecu : nodes in the places of our own.
     each_tick : sees every step: member 0 the plant, 1 the controller, 2 the bench.
+    line : a timed vehicle bus; None: frames arrive at once.
 
     Raises
     ------
@@ -68,9 +71,15 @@ def simulate(
     stimulus_node = StimulusNode(scenario.blending, scenario.faults)
     frames: list[Frame] = []
     times: list[int] = []
-    for step in lockstep(members(scenario, plant or own_plant, ecu or own_ecu, stimulus_node, seed)):
-        frames += step.frames
-        times += [step.now_ns] * len(step.frames)
+    taking_part = members(scenario, plant or own_plant, ecu or own_ecu, stimulus_node, seed)
+    for step in lockstep(taking_part) if line is None else line.lockstep(taking_part):
+        if line is None:
+            frames += step.frames
+            times += [step.now_ns] * len(step.frames)
+        else:
+            heard = [one for one in line.heard() if isinstance(one, Frame)]
+            frames += heard
+            times += [frame.time_ns for frame in heard]
         if each_tick is not None:
             each_tick(step)
         if step.member == _STIMULUS_NODE:
@@ -136,6 +145,7 @@ class VirtualBench(BenchRun):
     ----------
     scenario, out, seed, say, stop : as of `BenchRun`.
     plant, ecu : nodes in the places of our own.
+    line : a timed vehicle bus; None: frames arrive at once.
     """
 
     spec = SPEC
@@ -151,8 +161,12 @@ class VirtualBench(BenchRun):
         stop: StopSignal | None = None,
         plant: Node | None = None,
         ecu: Node | None = None,
+        line: TimedLine | None = None,
     ) -> None:
         super().__init__(scenario, out, seed, say, stop)
+        self._line = line
+        if line is not None:
+            self.spec, self.note = line.spec, line.note
         self._nodes = (plant, ecu)
         self._tap = _Tap()
         self._recorder: Recorder | None = None
@@ -165,14 +179,13 @@ class VirtualBench(BenchRun):
         plant, ecu = (
             given or own for given, own in zip(self._nodes, own_nodes(self.scenario, self._seed), strict=True)
         )
-        self._steps = lockstep(
-            members(self.scenario, _Process(PLANT, plant), _Process(ECU, ecu), self.stimulus_node, self._seed)
-        )
+        taking_part = members(self.scenario, _Process(PLANT, plant), _Process(ECU, ecu), self.stimulus_node, self._seed)
+        self._steps = lockstep(taking_part) if self._line is None else self._line.lockstep(taking_part)
         self.alive_at_end = 2
 
     def _pass_period(self) -> int:
         for step in self._steps:
-            self._tap.heard += step.stamped()
+            self._tap.heard += step.stamped() if self._line is None else self._line.heard()
             if step.member == _STIMULUS_NODE:
                 break
         self._ticks += 1

@@ -28,6 +28,7 @@ COMMANDS = (
     "convert",
     "diff",
     "plot",
+    "bus-analysis",
     "identify",
     "verify",
     "reproduce",
@@ -61,7 +62,7 @@ def build_parser(commands: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, nargs=0, help="show program's version number and exit")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in commands:
-        importlib.import_module(f"hil.cli.{name}").add_parser(subparsers)
+        importlib.import_module(f"hil.cli.{name.replace('-', '_')}").add_parser(subparsers)
     return parser
 
 

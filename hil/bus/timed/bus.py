@@ -1,0 +1,342 @@
+"""A CAN bus in virtual time: arbitration, acknowledge, errors, bus-off; integer nanoseconds, the same each time."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from dbc.frame import BusName, LinkState
+from dbc.frame_length import FD_TAIL, FrameBits
+from hil.bus.timed import disturbance
+from hil.bus.timed.controller import SEQUENCES_TO_RECOVER, Controller, Reception
+from hil.bus.timed.disturbance import WRONG_RATE_BITS, Disturbance, Seen
+from hil.bus.timed.frame_length import PAUSE, Length, exact_bits
+from hil.bus.timed.noise import BitErrors
+from hil.bus.timed.transmit_queue import Request, TransmitQueue
+from hil.bus.timed.wire import WireFrame
+
+FLAG, DELIMITER = 6, 8  # bits of an error frame
+SUSPEND = 8  # bits that an error-passive sender waits behind the pause
+RECESSIVE_END = 8  # delimiter of the acknowledge and end of frame
+SEQUENCE = 11  # recessive bits that count once towards the recovery from bus-off
+_NEVER = 1 << 62
+
+
+class Sent(NamedTuple):
+    """A frame that was sent and acknowledged.
+
+    Attributes
+    ----------
+    controller : name of its sender.
+    queued_ns, start_ns, end_ns, free_ns : asked for; start of frame; end of frame; end of the pause behind it, from
+        which on the bus is free (where the analysis of response times ends a frame).
+    """
+
+    controller: str
+    frame: WireFrame
+    queued_ns: int
+    start_ns: int
+    end_ns: int
+    free_ns: int
+
+
+@dataclass(slots=True)
+class _Attempt:
+    """A frame on the wire, and how it will end."""
+
+    frame: WireFrame
+    requests: list[tuple[Controller, Request]]
+    receivers: list[Controller]
+    start_ns: int
+    end_ns: int
+    free_ns: int
+    recessive_from_ns: int
+    error: Disturbance | None = None
+    missing: tuple[Controller, ...] = ()  # receivers that read it wrong and flagged nothing that others could see
+    losing: tuple[Controller, ...] = ()  # error-passive senders of the same identifier with other data
+
+
+class TimedBus:
+    """The wire; controllers `join` it.
+
+    Parameters
+    ----------
+    bit_rate : nominal, bit/s.
+    data_bit_rate : of CAN FD frames with a bit rate switch, bit/s; None: they are sent at the nominal one.
+    name : which bus its link events name.
+    bit_error_rate : probability that everybody reads a bit on the wire wrong.
+    seed : of all bit errors.
+    length : bits of a frame; `hil.bus.timed.frame_length.most_bits` fixes lengths at their bound.
+    on_sent : is told of each frame that was sent.
+
+    Attributes
+    ----------
+    now_ns : the time it has been advanced to.
+    sent, errors : frames sent and acknowledged, error frames.
+    busy_ns : time the wire was taken, pauses included.
+    """
+
+    def __init__(
+        self,
+        bit_rate: int,
+        data_bit_rate: int | None = None,
+        *,
+        name: BusName = BusName.VEHICLE,
+        bit_error_rate: float = 0.0,
+        seed: int = 1,
+        length: Length = exact_bits,
+        on_sent: Callable[[Sent], None] | None = None,
+    ) -> None:
+        for rate in (bit_rate, bit_rate if data_bit_rate is None else data_bit_rate):
+            if not 0 < rate <= 1_000_000_000:
+                raise ValueError(f"bit rate {rate}; expected bit/s above 0")
+        self.bit_rate = bit_rate
+        self.data_bit_rate = data_bit_rate
+        self.name = name
+        self.controllers: list[Controller] = []
+        self.now_ns = 0
+        self.sent = self.errors = self.busy_ns = 0
+        self._seed = seed
+        self._length = length
+        self._on_sent = on_sent
+        self._noise = BitErrors(bit_error_rate, f"{seed} wire")
+        self._free_ns = 0
+        self._recessive_from_ns = 0
+        self._attempt: _Attempt | None = None
+
+    def join(
+        self,
+        name: str,
+        *,
+        fifo: bool = False,
+        queue_length: int = 64,
+        bit_rate: int | None = None,
+        listen_only: bool = False,
+        restart_after_ns: int | None = 0,
+        bit_error_rate: float = 0.0,
+    ) -> Controller:
+        """Add a controller.
+
+        Parameters
+        ----------
+        name : for people.
+        fifo, queue_length : its transmit queue; by priority unless ``fifo``.
+        bit_rate : where it is set to another one than the bus.
+        listen_only : neither acknowledges nor flags errors nor sends.
+        restart_after_ns : time from bus-off to the begin of the recovery, ns; None: only `Controller.restart` does.
+        bit_error_rate : probability that it alone reads a bit wrong.
+        """
+        queue, noise = TransmitQueue(fifo, queue_length), BitErrors(bit_error_rate, f"{self._seed} {name}")
+        rate = self.bit_rate if bit_rate is None else bit_rate
+        controller = Controller(self, name, queue, rate, listen_only, restart_after_ns, noise)
+        self.controllers.append(controller)
+        return controller
+
+    def set_bit_error_rate(self, rate: float) -> None:
+        """Change the probability of bit errors from the next frame on."""
+        self._noise = BitErrors(rate, f"{self._seed} wire {self.now_ns}")
+
+    def advance(self, now_ns: int) -> None:
+        """Let time pass: frames that end by then are received; those that start by then were asked for before.
+
+        Raises
+        ------
+        ValueError
+            Where the time has been passed already.
+        """
+        if now_ns < self.now_ns:
+            raise ValueError(f"time {now_ns} ns; the bus has been advanced to {self.now_ns} ns, give times in order")
+        while True:
+            if self._attempt is not None:
+                if self._attempt.end_ns > now_ns:
+                    break
+                self._end(self._attempt)
+            start_ns = self._next_start_ns()
+            recovered = self._next_recovered()
+            if recovered is not None and recovered[0] <= min(start_ns, now_ns):
+                recovered[1].recovered(recovered[0])
+                continue
+            if start_ns >= now_ns:
+                break
+            self._attempt = self._begin(start_ns)
+        self.now_ns = now_ns
+
+    def bits_ns(self, bits: int) -> int:
+        """Time of nominal bits, ns."""
+        return bits * 1_000_000_000 // self.bit_rate
+
+    def _start_ns(self, controller: Controller) -> int:
+        """When a controller can offer its head to arbitration."""
+        if not len(controller.queue) or not controller.present:
+            return _NEVER
+        return max(self._free_ns, controller.ready_ns, controller.queue.since_ns)
+
+    def _next_start_ns(self) -> int:
+        return min(map(self._start_ns, self.controllers), default=_NEVER)
+
+    def _next_recovered(self) -> tuple[int, Controller] | None:
+        """Which controller is back from bus-off first, if nobody sends before, and when."""
+        back = [
+            (max(c.recover_from_ns, self._recessive_from_ns) + self.bits_ns(left * SEQUENCE), k)
+            for k, c in enumerate(self.controllers)
+            if c.recover_from_ns is not None and (left := SEQUENCES_TO_RECOVER - c.sequences)
+        ]
+        return None if not back else (min(back)[0], self.controllers[min(back)[1]])
+
+    def _begin(self, start_ns: int) -> _Attempt:
+        """Arbitrate, and find out how the frame that wins will end."""
+        self._count_sequences(start_ns)
+        offers = [(c, c.queue.head) for c in self.controllers if self._start_ns(c) <= start_ns]
+        least = min(request.key for _, request in offers)
+        requests = [(c, request) for c, request in offers if request.key == least]
+        losing: list[Controller] = []
+        error = None
+        if len(requests) > 1:
+            requests, losing, error = _collision(requests)
+        frame = requests[0][1].frame
+        senders = [c for c, _ in requests]
+        receivers = [c for c in self.controllers if c.present and c not in senders and c not in losing]
+        bits = self._length(frame)
+        length = bits.nominal + bits.data - PAUSE
+        foreign = [c for c in receivers if c.bit_rate != senders[0].bit_rate]
+        missing: list[Controller] = []
+        errors = [error]
+        if foreign:
+            flagging = [c for c in foreign if c.flags]
+            missing += [c for c in foreign if not c.flags]
+            errors.append(Disturbance(WRONG_RATE_BITS, Seen.BY_RECEIVERS, flagging) if flagging else None)
+        errors.append(disturbance.sender_noise(self._noise, senders, frame, length))
+        own, silent = disturbance.missed_by([c for c in receivers if c not in foreign], length)
+        errors.append(own)
+        missing += silent
+        if all(c.listen_only or c in missing for c in receivers):
+            errors.append(Disturbance(length - 1 - RECESSIVE_END, Seen.ACKNOWLEDGE))
+        return self._planned(frame, requests, receivers, start_ns, bits, disturbance.earliest(errors), missing, losing)
+
+    def _planned(
+        self,
+        frame: WireFrame,
+        requests: list[tuple[Controller, Request]],
+        receivers: list[Controller],
+        start_ns: int,
+        bits: FrameBits,
+        error: Disturbance | None,
+        missing: list[Controller],
+        losing: list[Controller],
+    ) -> _Attempt:
+        who = frame, requests, receivers, start_ns
+        if error is None:
+            free_ns = start_ns + bits.duration_ns(self.bit_rate, self.data_bit_rate)
+            end_ns = free_ns - self.bits_ns(PAUSE)
+            recessive_ns = end_ns - self.bits_ns(RECESSIVE_END)
+            return _Attempt(*who, end_ns, free_ns, recessive_ns, None, tuple(missing), tuple(losing))
+        seen_ns = start_ns + self._time_ns(bits, error.bit + 1)
+        senders = [c for c, _ in requests]
+        answering = [c for c in (*senders, *receivers, *losing) if c.flags]
+        first = [c for c in (error.first or senders) if c.flags]
+        # Flags of those who see it by the first flags only follow these: the longest superposition there is.
+        flags = FLAG + FLAG * (len(answering) > len(first) and error.seen is not Seen.LAST_BIT)
+        end_ns = seen_ns + self.bits_ns(flags)
+        recessive_ns = end_ns if answering else seen_ns
+        return _Attempt(
+            *who, end_ns, end_ns + self.bits_ns(DELIMITER + PAUSE), recessive_ns, error, tuple(missing), tuple(losing)
+        )
+
+    def _time_ns(self, bits: FrameBits, count: int) -> int:
+        """Time of the first ``count`` bits of a frame."""
+        if not bits.data:
+            return self.bits_ns(count)
+        head = bits.nominal - FD_TAIL
+        fast = min(max(0, count - head), bits.data)
+        return FrameBits(count - fast, fast).duration_ns(self.bit_rate, self.data_bit_rate)
+
+    def _count_sequences(self, start_ns: int) -> None:
+        """Count the sequences of recessive bits that end now, for controllers that recover from bus-off."""
+        for c in self.controllers:
+            if c.recover_from_ns is not None:
+                quiet_ns = start_ns - max(c.recover_from_ns, self._recessive_from_ns)
+                c.sequences += max(0, quiet_ns) * self.bit_rate // (SEQUENCE * 1_000_000_000)
+
+    def _end(self, attempt: _Attempt) -> None:
+        self._attempt = None
+        self._free_ns = attempt.free_ns
+        self._recessive_from_ns = attempt.recessive_from_ns
+        self.busy_ns += attempt.free_ns - attempt.start_ns
+        if attempt.error is None:
+            self._deliver(attempt)
+        else:
+            self._fail(attempt, attempt.error)
+        for controller in (*[c for c, _ in attempt.requests], *attempt.losing):
+            if controller.state is LinkState.ERROR_PASSIVE:
+                controller.ready_ns = attempt.free_ns + self.bits_ns(SUSPEND)
+
+    def _deliver(self, attempt: _Attempt) -> None:
+        reception = Reception(attempt.frame, attempt.end_ns)
+        for controller in attempt.receivers:
+            if controller in attempt.missing:
+                controller.counters.receive_error()
+                controller.follow(attempt.end_ns)
+            else:
+                controller.take(reception)
+        for controller in attempt.losing:
+            controller.counters.transmit_error()
+            controller.follow(attempt.end_ns)
+        for controller, request in attempt.requests:
+            controller.finish(request, attempt.end_ns)
+            self.sent += 1
+            if self._on_sent is not None:
+                times = request.queued_ns, attempt.start_ns, attempt.end_ns, attempt.free_ns
+                self._on_sent(Sent(controller.name, attempt.frame, *times))
+
+    def _fail(self, attempt: _Attempt, error: Disturbance) -> None:
+        self.errors += 1
+        end_ns = attempt.end_ns
+        senders = [c for c, _ in attempt.requests]
+        if error.seen is Seen.LAST_BIT:
+            reception = Reception(attempt.frame, end_ns)
+            for controller in attempt.receivers:
+                if controller not in attempt.missing:
+                    controller.take(reception)
+        else:
+            others = any(c.flags for c in (*senders, *attempt.receivers) if c not in error.first)
+            for controller in attempt.receivers:
+                controller.counters.receive_error(first=controller in error.first and others)
+        for controller in (*senders, *attempt.losing):
+            if error.senders_receive:
+                controller.counters.receive_error()
+            elif error.counts and not (error.seen is Seen.ACKNOWLEDGE and _exempt(controller, attempt.receivers)):
+                controller.counters.transmit_error()
+            if error.seen is Seen.ACKNOWLEDGE:
+                controller.unacknowledged(end_ns)
+        for controller in (*senders, *attempt.losing, *attempt.receivers):
+            controller.follow(end_ns)
+
+
+def _exempt(sender: Controller, receivers: list[Controller]) -> bool:
+    """An error-passive sender that sees no dominant bit while it flags a missing acknowledge does not count it."""
+    return sender.state is LinkState.ERROR_PASSIVE and not any(c.flags for c in receivers)
+
+
+def _collision(
+    requests: list[tuple[Controller, Request]],
+) -> tuple[list[tuple[Controller, Request]], list[Controller], Disturbance | None]:
+    """Several controllers send the same identifier: equal frames are one frame, others meet a bit error.
+
+    Returns
+    -------
+    Who sends on; error-passive controllers that drop out unseen; the error that all see, None where there is none.
+    """
+    best = requests[0]
+    for other in requests[1:]:
+        difference = disturbance.first_difference(best[1].frame, other[1].frame)
+        if difference is not None and not difference[1]:
+            best = other
+    differing = [
+        (difference[0], c)
+        for c, request in requests
+        if (difference := disturbance.first_difference(best[1].frame, request.frame)) is not None
+    ]
+    active = [bit for bit, c in differing if c.flags]
+    if active:
+        return requests, [], Disturbance(min(active), Seen.BY_SENDER)
+    dropped = [c for _, c in differing]
+    return [(c, request) for c, request in requests if c not in dropped], dropped, None
