@@ -1,5 +1,6 @@
 """One node as one process: joins its buses, runs at a fixed rate until told to stop."""
 
+import contextlib
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -65,13 +66,15 @@ def serve(
         end_with_parent()
     stop = StopSignal()
     bus = resolve(bus)
-    node = make_node()
-    with Port.open(bus, role.senders if senders is None else senders) as port:
-        say(f"{role.name}: on {bus}, every {NODE_PERIOD_NS / 1e6:g} ms")
-        for grant in request_realtime() if realtime else [request_timer_slack()]:
-            if realtime or not grant.granted:
-                say(f"{role.name}: {grant.what}: {GRANTED if grant.granted else NOT_GRANTED}, {grant.detail}")
-        say_ready(ready_fd)
+    with contextlib.ExitStack() as stack:
+        with stop.at_once():
+            node = make_node()
+            port = stack.enter_context(Port.open(bus, role.senders if senders is None else senders))
+            say(f"{role.name}: on {bus}, every {NODE_PERIOD_NS / 1e6:g} ms")
+            for grant in request_realtime() if realtime else [request_timer_slack()]:
+                if realtime or not grant.granted:
+                    say(f"{role.name}: {grant.what}: {GRANTED if grant.granted else NOT_GRANTED}, {grant.detail}")
+            say_ready(ready_fd)
         health = Transmitter()
         loop = Loop(WallClock(), NODE_PERIOD_NS, role.phase_ns)
         for tick in run_node(node, port, loop):

@@ -1,6 +1,7 @@
 """``brakebench record``: append everything on a bus to a candump file."""
 
 import argparse
+import contextlib
 import sys
 from pathlib import Path
 
@@ -28,10 +29,14 @@ def run(args: argparse.Namespace) -> int:
     if args.ready_fd is not None:
         end_with_parent()
     stop = StopSignal()
-    with open_bus(args.bus, BusName.VEHICLE) as vehicle, open_bus(bench_channel(args.bus), BusName.BENCH) as bench:
+    with contextlib.ExitStack() as stack:
+        with stop.at_once():
+            vehicle = stack.enter_context(open_bus(args.bus, BusName.VEHICLE))
+            bench = stack.enter_context(open_bus(bench_channel(args.bus), BusName.BENCH))
         recorder = Recorder(args.out, [vehicle, bench])
         try:
-            say_ready(args.ready_fd)
+            with stop.at_once():
+                say_ready(args.ready_fd)
             for _ in Loop(WallClock(), FLUSH_PERIOD_NS).ticks():
                 recorder.flush()
                 if stop.asked:

@@ -70,12 +70,26 @@ class StopSignal:
     def __init__(self) -> None:
         self.asked = False
         self.interrupted = False
+        self._at_once = False
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._take)
 
     def _take(self, number: int, _frame: object) -> None:
         self.asked = True
         self.interrupted = self.interrupted or number == signal.SIGINT
+        if self._at_once:
+            raise SystemExit(0)
+
+    @contextlib.contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Let a signal end the process by `SystemExit` meanwhile: where it waits for what may never come."""
+        self._at_once = True
+        try:
+            if self.asked:
+                raise SystemExit(0)
+            yield
+        finally:
+            self._at_once = False
 
 
 class Child:
