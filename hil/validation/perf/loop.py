@@ -17,6 +17,7 @@ from typing import Any
 import can
 
 import ecu.node
+from dbc.batch import Batch
 from dbc.exchange import Receiver, Transmitter
 from dbc.frame import BusName, Frame, Received
 from hil.bench.stimulus import StimulusNode
@@ -37,6 +38,7 @@ _PARTS: tuple[tuple[str, Any, str], ...] = (
     ("vehicle model", PlantNode, "_advance"),
     ("control law", ecu.node, "step"),
     ("send: encode, protect", Transmitter, "frames"),
+    ("send: encode, protect", Batch, "frames"),
     ("receive: check, decode", Receiver, "accept"),
 )
 
