@@ -57,6 +57,7 @@ class Field:
     minimum, maximum : range in the DBC's unit that the raw value can hold too.
     sna : raw value that means signal not available, or None.
     enum : type of the value where the signal is a choice.
+    start, length, little_endian, factor, offset : as in the DBC.
     """
 
     name: str
@@ -66,6 +67,11 @@ class Field:
     maximum: float
     sna: int | None
     enum: type[IntEnum] | None
+    start: int
+    length: int
+    little_endian: bool
+    factor: float
+    offset: float
 
 
 def payload_signals(message: DbcMessage) -> list[DbcSignal]:
@@ -96,7 +102,20 @@ def field_of(signal: DbcSignal, enum: type[IntEnum] | None = None) -> Field:
     suffix, si = SI_UNITS[unit]
     low, high = sorted(raw * signal.scale + signal.offset for raw in _raw_range(signal))
     name = signal.name.lower() + (f"_{suffix}" if suffix else "")
-    return Field(name, signal.name, si, max(signal.minimum, low), min(signal.maximum, high), sna_of(signal), enum)
+    return Field(
+        name=name,
+        signal=signal.name,
+        si_per_unit=si,
+        minimum=max(signal.minimum, low),
+        maximum=min(signal.maximum, high),
+        sna=sna_of(signal),
+        enum=enum,
+        start=signal.start,
+        length=signal.length,
+        little_endian=signal.byte_order == "little_endian",
+        factor=float(signal.scale),
+        offset=float(signal.offset),
+    )
 
 
 def _position(signal: DbcSignal, length_bytes: int) -> int:

@@ -5,10 +5,9 @@ from dataclasses import replace
 
 from dbc.bench_messages import FaultCommand, ManoeuvreState, PhysicalFault, StimulusDriver, StimulusRoad
 from dbc.contract import Message, spec_of
-from dbc.exchange import Receiver, Transmitter
+from dbc.exchange import Receiver
 from dbc.frame import Frame, Received
-from dbc.messages import BatteryStatus
-from plant import driver, reports
+from plant import driver
 from plant.demands import DEMANDS, Demands
 from plant.external_nodes import ExternalNodes
 from plant.injection.bank import NO_TERMS
@@ -19,6 +18,7 @@ from plant.layout import Vector
 from plant.manoeuvre import Manoeuvre, value_at
 from plant.model import NEUTRAL, STEP_S, Scene, advance, healthy, initial_state, pack
 from plant.parameters.plant import PlantParameters
+from plant.reports import Reports
 from plant.road import road_table
 from plant.sensors import Sensors
 from plant.vectors import INPUT, OUTPUT, STATE, S, U, X, Y
@@ -70,7 +70,6 @@ class PlantNode:
             raise ValueError(f"period_ns: expected a positive multiple of {STEP_NS} ns, got {period_ns}")
         self._parameters = parameters
         self._manoeuvre = manoeuvre
-        self._play = play
         self._p = pack(parameters)
         self._x = initial_state(
             parameters,
@@ -85,7 +84,8 @@ class PlantNode:
         self._own_road = road_table(manoeuvre.road)
         self._scene = Scene(self._external_nodes.cut(), self._switch, self._own_road, theta, terms, plugins)
         first_speed = manoeuvre.initial_speed_mps / parameters.wheel.rolling_radius_m
-        self._sensors = Sensors(parameters.sensor, parameters.motor.torque_constant_nm_a, seed, self._x, first_speed)
+        self._sensors = Sensors(self._p, seed, self._x, first_speed)
+        self._reports = Reports(play, self._p)
         self.manoeuvre_start_ns: int | None = None
         self._last_ns: int | None = None
         self._notice_ends_ns = 0
@@ -94,7 +94,6 @@ class PlantNode:
         self._receiver = Receiver((*DEMANDS, StimulusDriver, StimulusRoad))
         self._faults = Receiver((FaultCommand,))
         self._fault_id = spec_of(FaultCommand).can_id
-        self._transmitter = Transmitter()
         self._demands = Demands(parameters.ehb)
         self._pedal = 0.0
         self._steering_rad = 0.0
@@ -115,7 +114,9 @@ class PlantNode:
         pressure_pa, motor_nm = self._demands.update(self._receiver, now_ns, self._pedal)
         self._follow_manoeuvre(now_ns, elapsed_ns)
         self._drive(now_ns, pressure_pa, motor_nm)
-        return self._transmitter.frames(now_ns, self._tell(now_ns))
+        sensed = self._sensors.sample(self._x, self._y, self._pedal, self._steering_rad)
+        brakes = [demand.state for demand in self._demands.pressure]
+        return self._reports.frames(now_ns, self._x, self._y, self._switch, sensed, brakes, self.state, self._receiver)
 
     @property
     def model_state(self) -> Vector:
@@ -141,7 +142,7 @@ class PlantNode:
             begun_s = ((self._last_ns or 0) - self.manoeuvre_start_ns) * 1e-9
             shifted = self._layout.shifted(theta, float(self._x[X.time_s]) - begun_s)
         self._scene = replace(self._scene, theta=shifted)
-        self._sensors.chain = Chain(shifted, self._layout)
+        self._sensors.distort(Chain(shifted, self._layout))
 
     def _advance(self, elapsed_ns: int) -> None:
         steps = elapsed_ns // STEP_NS
@@ -236,22 +237,3 @@ class PlantNode:
                     road[:, column] = value
         if road is not self._scene.road:
             self._scene = replace(self._scene, road=road)
-
-    def _tell(self, now_ns: int) -> list[Message]:
-        """Frames of the played nodes, and the truth."""
-        x, y, sensors, play = self._x, self._y, self._sensors, self._play
-        out: list[Message] = []
-        sensors.tick(float(x[X.time_s]))
-        if "DRIVER" in play:
-            out += reports.driver_messages(sensors, self._pedal, self._steering_rad)
-        if "SENSORS" in play:
-            out += reports.sensor_messages(sensors, x, y)
-        if "EHB" in play:
-            out += reports.ehb_messages(sensors, y, *[demand.state for demand in self._demands.pressure])
-        if "IWM" in play:
-            out += reports.motor_messages(sensors, y, self._switch[S.motor_alive : S.motor_alive + 4].tolist())
-        if "BATTERY" in play and self._transmitter.due(BatteryStatus, now_ns):
-            out.append(reports.battery_message(x, y))
-        out += reports.truth_messages(x, y, self.state)
-        out.append(reports.reception_message(self._receiver))
-        return out
