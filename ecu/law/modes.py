@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from dbc.messages import BrakeMode, Fault
 from ecu.law.base_brake import PedalReading
-from ecu.law.types import Brake, Inputs, Source
+from ecu.law.types import PLAUSIBLE, Brake, Inputs, Plausibility, Source
 from ecu.parameters.control import SupervisionParameters
 
 _SOURCE_FAULT = (
@@ -38,13 +38,12 @@ class ModeMemory(NamedTuple):
     mode: BrakeMode
     valid_counts: tuple[int, ...]
     since_upgrade_s: float
-    disagreement_s: float
     own_map_s: float
 
 
 def initial_modes() -> ModeMemory:
     """INIT, nothing received yet."""
-    return ModeMemory(BrakeMode.INIT, (0,) * len(Source), math.inf, 0.0, 0.0)
+    return ModeMemory(BrakeMode.INIT, (0,) * len(Source), math.inf, 0.0)
 
 
 def lost_sources(inputs: Inputs, p: SupervisionParameters) -> tuple[bool, ...]:
@@ -119,13 +118,34 @@ def _allowed(inputs: Inputs, lost: tuple[bool, ...], bad: int, faults: Fault, p:
     return BrakeMode.DEGRADED
 
 
+def _implausible(plausibility: Plausibility) -> Fault:
+    """Faults of what does not agree with the rest."""
+    faults = Fault.NONE
+    for wheels, front, rear in (
+        (plausibility.wheel_speed, Fault.WHEEL_SPEED_FRONT, Fault.WHEEL_SPEED_REAR),
+        (plausibility.pressure, Fault.EHB_PRESSURE_FRONT, Fault.EHB_PRESSURE_REAR),
+        (plausibility.motor_torque, Fault.MOTOR_FRONT, Fault.MOTOR_REAR),
+    ):
+        if wheels[0] or wheels[1]:
+            faults |= front
+        if wheels[2] or wheels[3]:
+            faults |= rear
+    for channel, fault in zip(plausibility.pedal, (Fault.PEDAL_1, Fault.PEDAL_2), strict=True):
+        if channel:
+            faults |= fault
+    if plausibility.pedal_disagree:
+        faults |= Fault.PEDAL_DISAGREE
+    if plausibility.acceleration:
+        faults |= Fault.BODY_MOTION
+    return faults
+
+
 def supervise(
     memory: ModeMemory,
     inputs: Inputs,
     lost: tuple[bool, ...],
     pedal: PedalReading,
-    implausible: tuple[bool, bool, bool, bool],
-    stuck: bool,
+    plausibility: Plausibility,
     p: SupervisionParameters,
     dt_s: float,
 ) -> tuple[ModeMemory, Fault]:
@@ -135,26 +155,19 @@ def supervise(
     ----------
     lost : sources that have timed out, from `lost_sources`.
     pedal : what the two channels say.
-    implausible : wheels that do not turn as the car moves.  stuck : the acceleration sensor shows what is not.
+    plausibility : what does not agree with the rest.
     """
     faults = _missing(inputs)
     if True in lost:
         for source, fault in _SOURCE_FAULT:
             if lost[source]:
                 faults |= fault
-    if implausible[0] or implausible[1]:
-        faults |= Fault.WHEEL_SPEED_FRONT
-    if implausible[2] or implausible[3]:
-        faults |= Fault.WHEEL_SPEED_REAR
-    if stuck:
-        faults |= Fault.BODY_MOTION
+    if plausibility != PLAUSIBLE:
+        faults |= _implausible(plausibility)
     if pedal.channel_1_lost:
         faults |= Fault.PEDAL_1
     if pedal.channel_2_lost:
         faults |= Fault.PEDAL_2
-    disagreement_s = memory.disagreement_s + dt_s if pedal.channels_disagree else 0.0
-    if disagreement_s > p.pedal_disagreement_s:
-        faults |= Fault.PEDAL_DISAGREE
     own_map = memory.mode != BrakeMode.INIT and memory.mode != BrakeMode.SAFE_STOP and Brake.OWN_MAP in inputs.brake
     own_map_s = min(memory.own_map_s + dt_s, 2.0 * p.own_map_tolerated_s) if own_map else 0.0
     if own_map_s > p.own_map_tolerated_s:
@@ -180,4 +193,4 @@ def supervise(
     elif allowed < mode and min(valid_counts) >= p.frames_to_upgrade and since_upgrade_s >= p.upgrade_interval_s:
         mode = BrakeMode(mode - 1)
         since_upgrade_s = 0.0
-    return ModeMemory(mode, valid_counts, since_upgrade_s, disagreement_s, own_map_s), faults
+    return ModeMemory(mode, valid_counts, since_upgrade_s, own_map_s), faults

@@ -64,6 +64,20 @@ class Inputs(NamedTuple):
     health: tuple[Health, ...]
 
 
+class Plausibility(NamedTuple):
+    """What does not agree with the rest, debounced: each wheel, each pedal channel, the acceleration sensor."""
+
+    wheel_speed: tuple[bool, bool, bool, bool]
+    pressure: tuple[bool, bool, bool, bool]
+    motor_torque: tuple[bool, bool, bool, bool]  # demanded against reported torque
+    pedal: tuple[bool, bool]
+    pedal_disagree: bool
+    acceleration: bool
+
+
+PLAUSIBLE = Plausibility((False,) * 4, (False,) * 4, (False,) * 4, (False, False), False, False)
+
+
 class Outputs(NamedTuple):
     """Demands and reports of one tick; NaN is sent as not available."""
 
