@@ -8,7 +8,7 @@ from typing import Protocol
 
 from dbc.frame import BusName, LinkEvent, LinkState, Received
 from hil.bus.error_frame import link_events
-from hil.errors import BrakebenchError
+from hil.errors import BrakebenchError, Verdict
 from hil.rt.clock import WallClock, wall_time_ns
 
 FLUSH_PERIOD_NS = 20_000_000
@@ -57,7 +57,7 @@ def recorded_events(error_class: int, data: bytes, bus: BusName, time_ns: int) -
 class RecorderError(BrakebenchError):
     """The recording cannot go on."""
 
-    exit_code = 3
+    exit_code = Verdict.INCOMPLETE.exit_code
 
 
 class Source(Protocol):

@@ -115,7 +115,7 @@ class StimulusNode:
             self._receiver.accept(now_ns, [item for item in inbox if item[1] == self._motion_id])  # few of many
             self.motion = self._receiver.latest(TruthMotion)
             if self.motion is not None:
-                if self._start_ns is None and self.motion.manoeuvre is not ManoeuvreState.HOLDING:
+                if self._start_ns is None and self.motion.manoeuvre not in (None, ManoeuvreState.HOLDING):
                     self._start_ns = now_ns
                 if self._start_ns is not None:
                     self.time_s = (now_ns - self._start_ns) * 1e-9

@@ -6,10 +6,11 @@ import sys
 from pathlib import Path
 
 from dbc.frame import BusName
-from hil.bench.recorder import FLUSH_PERIOD_NS, Recorder
+from hil.bench.recorder import FLUSH_PERIOD_NS, Recorder, RecorderError
 from hil.bus.channel import bench_channel
 from hil.bus.open import open_bus
 from hil.cli.options import add_bus, add_ready_fd
+from hil.errors import BrakebenchError
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop
 from hil.rt.process import StopSignal, end_with_parent, say_ready
@@ -33,7 +34,10 @@ def run(args: argparse.Namespace) -> int:
         with stop.at_once():
             vehicle = stack.enter_context(open_bus(args.bus, BusName.VEHICLE))
             bench = stack.enter_context(open_bus(bench_channel(args.bus), BusName.BENCH))
-        recorder = Recorder(args.out, [vehicle, bench])
+        try:
+            recorder = Recorder(args.out, [vehicle, bench])
+        except RecorderError as error:  # nothing has begun: wrong use
+            raise BrakebenchError(str(error)) from error
         try:
             with stop.at_once():
                 say_ready(args.ready_fd)
