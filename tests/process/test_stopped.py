@@ -1,5 +1,6 @@
 """A node that is stopped, overruns, or dies: what the other side does, counted in its own frames of the recording."""
 
+import itertools
 import os
 import signal
 import time
@@ -85,7 +86,7 @@ def in_silences(signals, spoken, watched):
     said_s = np.sort(signals.decoded.series(f"{spoken}.ALIVE_COUNTER")[0]) - signals.start_s
     t_s, values = signals.get(watched)
     edges = np.searchsorted(t_s, np.append(said_s, np.inf), "right")
-    return [values[a:b] for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [values[a:b] for a, b in itertools.pairwise(edges)]
 
 
 def no_burst(signals, sender):
