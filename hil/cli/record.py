@@ -15,6 +15,8 @@ from hil.rt.clock import WallClock
 from hil.rt.loop import Loop
 from hil.rt.process import StopSignal, end_with_parent, say_ready
 
+TOLD_S = 1.0  # more than a clock that is kept right drifts in a recording
+
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
@@ -48,5 +50,7 @@ def run(args: argparse.Namespace) -> int:
         finally:
             recorder.close()
     lost = f", {recorder.lost} lost on the way" if recorder.lost else ""
+    if abs(set_s := recorder.clock_set_ns() * 1e-9) > TOLD_S:
+        print(f"the time of day was set by {set_s:+.1f} s meanwhile; stamps go on from the start's", file=sys.stderr)
     print(f"{recorder.frames} frames recorded to {args.out}{lost}", file=sys.stderr)
     return 0
