@@ -110,7 +110,7 @@ def finish(bench_run: BenchRun, seed: int, provenance: Mapping[str, object], fai
     """
     scenario = bench_run.scenario
     signals = Signals(bench_run.log)
-    result = measure(signals)
+    result = measure(signals, bench_run.bit_rate)
     met = list(expected(scenario, result, signals))
     verdict, reason = _judge(bench_run, met, failure)
     report = build_report(

@@ -99,6 +99,7 @@ class TimedBus:
         self._length = length
         self._on_sent = on_sent
         self._noise = BitErrors(bit_error_rate, f"{seed} wire")
+        self._pause_ns, self._recessive_end_ns = self.bits_ns(PAUSE), self.bits_ns(RECESSIVE_END)
         self._free_ns = 0
         self._recessive_from_ns = 0
         self._attempt: _Attempt | None = None
@@ -150,67 +151,95 @@ class TimedBus:
                 if self._attempt.end_ns > now_ns:
                     break
                 self._end(self._attempt)
-            start_ns = self._next_start_ns()
-            recovered = self._next_recovered()
-            if recovered is not None and recovered[0] <= min(start_ns, now_ns):
-                recovered[1].recovered(recovered[0])
-                continue
+            start_ns, offering, recovering = self._next_start()
+            if recovering:
+                back_ns, controller = self._next_recovered()
+                if back_ns <= min(start_ns, now_ns):
+                    controller.recovered(back_ns)
+                    continue
             if start_ns >= now_ns:
                 break
-            self._attempt = self._begin(start_ns)
+            if recovering:
+                self._count_sequences(start_ns)
+            self._attempt = self._begin(start_ns, offering)
         self.now_ns = now_ns
 
     def bits_ns(self, bits: int) -> int:
         """Time of nominal bits, ns."""
         return bits * 1_000_000_000 // self.bit_rate
 
-    def _start_ns(self, controller: Controller) -> int:
-        """When a controller can offer its head to arbitration."""
-        if not len(controller.queue) or not controller.present:
-            return _NEVER
-        return max(self._free_ns, controller.ready_ns, controller.queue.since_ns)
+    def _next_start(self) -> tuple[int, list[Controller], bool]:
+        """When the next frame can start, who then offers one to arbitration, and whether anyone recovers from off."""
+        start_ns, offering, recovering = _NEVER, [], False
+        for controller in self.controllers:
+            if controller.queue.waiting:
+                if controller.unplugged:
+                    continue
+                at_ns = max(self._free_ns, controller.ready_ns, controller.queue.since_ns)
+                if at_ns < start_ns:
+                    start_ns, offering = at_ns, [controller]
+                elif at_ns == start_ns:
+                    offering.append(controller)
+            elif controller.recover_from_ns is not None:
+                recovering = True
+        return start_ns, offering, recovering
 
-    def _next_start_ns(self) -> int:
-        return min(map(self._start_ns, self.controllers), default=_NEVER)
-
-    def _next_recovered(self) -> tuple[int, Controller] | None:
+    def _next_recovered(self) -> tuple[int, Controller]:
         """Which controller is back from bus-off first, if nobody sends before, and when."""
-        back = [
-            (max(c.recover_from_ns, self._recessive_from_ns) + self.bits_ns(left * SEQUENCE), k)
-            for k, c in enumerate(self.controllers)
-            if c.recover_from_ns is not None and (left := SEQUENCES_TO_RECOVER - c.sequences)
-        ]
-        return None if not back else (min(back)[0], self.controllers[min(back)[1]])
+        back = []
+        for k, c in enumerate(self.controllers):
+            if c.recover_from_ns is not None:
+                left = (SEQUENCES_TO_RECOVER - c.sequences) * SEQUENCE
+                back.append((max(c.recover_from_ns, self._recessive_from_ns) + self.bits_ns(left), k))
+        back_ns, k = min(back)
+        return back_ns, self.controllers[k]
 
-    def _begin(self, start_ns: int) -> _Attempt:
+    def _begin(self, start_ns: int, offering: list[Controller]) -> _Attempt:
         """Arbitrate, and find out how the frame that wins will end."""
-        self._count_sequences(start_ns)
-        offers = [(c, c.queue.head) for c in self.controllers if self._start_ns(c) <= start_ns]
-        least = min(request.key for _, request in offers)
-        requests = [(c, request) for c, request in offers if request.key == least]
+        requests = [(c, c.queue.head) for c in offering]
+        if len(requests) > 1:
+            least = min(request.key for _, request in requests)
+            requests = [(c, request) for c, request in requests if request.key == least]
         losing: list[Controller] = []
         error = None
         if len(requests) > 1:
             requests, losing, error = _collision(requests)
-        frame = requests[0][1].frame
-        senders = [c for c, _ in requests]
-        receivers = [c for c in self.controllers if c.present and c not in senders and c not in losing]
+        frame, senders = requests[0][1].frame, [c for c, _ in requests]
+        receivers: list[Controller] = []
+        acknowledged, undisturbed = False, error is None and not self._noise.rate
+        for c in self.controllers:
+            if c.present and c not in senders and c not in losing:
+                receivers.append(c)
+                acknowledged = acknowledged or not c.listen_only
+                undisturbed = undisturbed and c.bit_rate == senders[0].bit_rate and not c.noise.rate
+            elif c.noise.rate:
+                undisturbed = False
         bits = self._length(frame)
+        missing: list[Controller] = []
+        if not undisturbed or not acknowledged:
+            error, missing = self._disturbed(frame, senders, receivers, bits, error)
+        return self._planned(frame, requests, receivers, start_ns, bits, error, missing, losing)
+
+    def _disturbed(
+        self,
+        frame: WireFrame,
+        senders: list[Controller],
+        receivers: list[Controller],
+        bits: FrameBits,
+        error: Disturbance | None,
+    ) -> tuple[Disturbance | None, list[Controller]]:
+        """Find what breaks the frame off first, and the receivers that misread it without a flag that all could see."""
         length = bits.nominal + bits.data - PAUSE
         foreign = [c for c in receivers if c.bit_rate != senders[0].bit_rate]
-        missing: list[Controller] = []
-        errors = [error]
-        if foreign:
-            flagging = [c for c in foreign if c.flags]
-            missing += [c for c in foreign if not c.flags]
-            errors.append(Disturbance(WRONG_RATE_BITS, Seen.BY_RECEIVERS, flagging) if flagging else None)
-        errors.append(disturbance.sender_noise(self._noise, senders, frame, length))
+        flagging = [c for c in foreign if c.flags]
         own, silent = disturbance.missed_by([c for c in receivers if c not in foreign], length)
-        errors.append(own)
-        missing += silent
+        missing = [c for c in foreign if not c.flags] + silent
+        errors = [error, own, disturbance.sender_noise(self._noise, senders, frame, length)]
+        if flagging:
+            errors.append(Disturbance(WRONG_RATE_BITS, Seen.BY_RECEIVERS, flagging))
         if all(c.listen_only or c in missing for c in receivers):
             errors.append(Disturbance(length - 1 - RECESSIVE_END, Seen.ACKNOWLEDGE))
-        return self._planned(frame, requests, receivers, start_ns, bits, disturbance.earliest(errors), missing, losing)
+        return disturbance.earliest(errors), missing
 
     def _planned(
         self,
@@ -226,8 +255,8 @@ class TimedBus:
         who = frame, requests, receivers, start_ns
         if error is None:
             free_ns = start_ns + bits.duration_ns(self.bit_rate, self.data_bit_rate)
-            end_ns = free_ns - self.bits_ns(PAUSE)
-            recessive_ns = end_ns - self.bits_ns(RECESSIVE_END)
+            end_ns = free_ns - self._pause_ns
+            recessive_ns = end_ns - self._recessive_end_ns
             return _Attempt(*who, end_ns, free_ns, recessive_ns, None, tuple(missing), tuple(losing))
         seen_ns = start_ns + self._time_ns(bits, error.bit + 1)
         senders = [c for c, _ in requests]
