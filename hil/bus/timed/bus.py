@@ -1,12 +1,12 @@
 """A CAN bus in virtual time: arbitration, acknowledge, errors, bus-off; integer nanoseconds, the same each time."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from dbc.frame import BusName, LinkState
 from dbc.frame_length import FD_TAIL, FrameBits
 from hil.bus.timed import disturbance
+from hil.bus.timed.attempt import Attempt, collision, fail
 from hil.bus.timed.controller import SEQUENCES_TO_RECOVER, Controller, Reception
 from hil.bus.timed.disturbance import WRONG_RATE_BITS, Disturbance, Seen
 from hil.bus.timed.frame_length import PAUSE, Length, exact_bits
@@ -37,22 +37,6 @@ class Sent(NamedTuple):
     start_ns: int
     end_ns: int
     free_ns: int
-
-
-@dataclass(slots=True)
-class _Attempt:
-    """A frame on the wire, and how it will end."""
-
-    frame: WireFrame
-    requests: list[tuple[Controller, Request]]
-    receivers: list[Controller]
-    start_ns: int
-    end_ns: int
-    free_ns: int
-    recessive_from_ns: int
-    error: Disturbance | None = None
-    missing: tuple[Controller, ...] = ()  # receivers that read it wrong and flagged nothing that others could see
-    losing: tuple[Controller, ...] = ()  # error-passive senders of the same identifier with other data
 
 
 class TimedBus:
@@ -102,7 +86,7 @@ class TimedBus:
         self._pause_ns, self._recessive_end_ns = self.bits_ns(PAUSE), self.bits_ns(RECESSIVE_END)
         self._free_ns = 0
         self._recessive_from_ns = 0
-        self._attempt: _Attempt | None = None
+        self._attempt: Attempt | None = None
 
     def join(
         self,
@@ -194,7 +178,7 @@ class TimedBus:
         back_ns, k = min(back)
         return back_ns, self.controllers[k]
 
-    def _begin(self, start_ns: int, offering: list[Controller]) -> _Attempt:
+    def _begin(self, start_ns: int, offering: list[Controller]) -> Attempt:
         """Arbitrate, and find out how the frame that wins will end."""
         requests = [(c, c.queue.head) for c in offering]
         if len(requests) > 1:
@@ -203,7 +187,7 @@ class TimedBus:
         losing: list[Controller] = []
         error = None
         if len(requests) > 1:
-            requests, losing, error = _collision(requests)
+            requests, losing, error = collision(requests)
         frame, senders = requests[0][1].frame, [c for c, _ in requests]
         receivers: list[Controller] = []
         acknowledged, undisturbed = False, error is None and not self._noise.rate
@@ -251,13 +235,13 @@ class TimedBus:
         error: Disturbance | None,
         missing: list[Controller],
         losing: list[Controller],
-    ) -> _Attempt:
+    ) -> Attempt:
         who = frame, requests, receivers, start_ns
         if error is None:
             free_ns = start_ns + bits.duration_ns(self.bit_rate, self.data_bit_rate)
             end_ns = free_ns - self._pause_ns
             recessive_ns = end_ns - self._recessive_end_ns
-            return _Attempt(*who, end_ns, free_ns, recessive_ns, None, tuple(missing), tuple(losing))
+            return Attempt(*who, end_ns, free_ns, recessive_ns, None, tuple(missing), tuple(losing))
         seen_ns = start_ns + self._time_ns(bits, error.bit + 1)
         senders = [c for c, _ in requests]
         answering = [c for c in (*senders, *receivers, *losing) if c.flags]
@@ -266,7 +250,7 @@ class TimedBus:
         flags = FLAG + FLAG * (len(answering) > len(first) and error.seen is not Seen.LAST_BIT)
         end_ns = seen_ns + self.bits_ns(flags)
         recessive_ns = end_ns if answering else seen_ns
-        return _Attempt(
+        return Attempt(
             *who, end_ns, end_ns + self.bits_ns(DELIMITER + PAUSE), recessive_ns, error, tuple(missing), tuple(losing)
         )
 
@@ -285,7 +269,7 @@ class TimedBus:
                 quiet_ns = start_ns - max(c.recover_from_ns, self._recessive_from_ns)
                 c.sequences += max(0, quiet_ns) * self.bit_rate // (SEQUENCE * 1_000_000_000)
 
-    def _end(self, attempt: _Attempt) -> None:
+    def _end(self, attempt: Attempt) -> None:
         self._attempt = None
         self._free_ns = attempt.free_ns
         self._recessive_from_ns = attempt.recessive_from_ns
@@ -293,12 +277,13 @@ class TimedBus:
         if attempt.error is None:
             self._deliver(attempt)
         else:
-            self._fail(attempt, attempt.error)
+            self.errors += 1
+            fail(attempt, attempt.error)
         for controller in (*[c for c, _ in attempt.requests], *attempt.losing):
             if controller.state is LinkState.ERROR_PASSIVE:
                 controller.ready_ns = attempt.free_ns + self.bits_ns(SUSPEND)
 
-    def _deliver(self, attempt: _Attempt) -> None:
+    def _deliver(self, attempt: Attempt) -> None:
         reception = Reception(attempt.frame, attempt.end_ns)
         for controller in attempt.receivers:
             if controller in attempt.missing:
@@ -315,57 +300,3 @@ class TimedBus:
             if self._on_sent is not None:
                 times = request.queued_ns, attempt.start_ns, attempt.end_ns, attempt.free_ns
                 self._on_sent(Sent(controller.name, attempt.frame, *times))
-
-    def _fail(self, attempt: _Attempt, error: Disturbance) -> None:
-        self.errors += 1
-        end_ns = attempt.end_ns
-        senders = [c for c, _ in attempt.requests]
-        if error.seen is Seen.LAST_BIT:
-            reception = Reception(attempt.frame, end_ns)
-            for controller in attempt.receivers:
-                if controller not in attempt.missing:
-                    controller.take(reception)
-        else:
-            others = any(c.flags for c in (*senders, *attempt.receivers) if c not in error.first)
-            for controller in attempt.receivers:
-                controller.counters.receive_error(first=controller in error.first and others)
-        for controller in (*senders, *attempt.losing):
-            if error.senders_receive:
-                controller.counters.receive_error()
-            elif error.counts and not (error.seen is Seen.ACKNOWLEDGE and _exempt(controller, attempt.receivers)):
-                controller.counters.transmit_error()
-            if error.seen is Seen.ACKNOWLEDGE:
-                controller.unacknowledged(end_ns)
-        for controller in (*senders, *attempt.losing, *attempt.receivers):
-            controller.follow(end_ns)
-
-
-def _exempt(sender: Controller, receivers: list[Controller]) -> bool:
-    """An error-passive sender that sees no dominant bit while it flags a missing acknowledge does not count it."""
-    return sender.state is LinkState.ERROR_PASSIVE and not any(c.flags for c in receivers)
-
-
-def _collision(
-    requests: list[tuple[Controller, Request]],
-) -> tuple[list[tuple[Controller, Request]], list[Controller], Disturbance | None]:
-    """Several controllers send the same identifier: equal frames are one frame, others meet a bit error.
-
-    Returns
-    -------
-    Who sends on; error-passive controllers that drop out unseen; the error that all see, None where there is none.
-    """
-    best = requests[0]
-    for other in requests[1:]:
-        difference = disturbance.first_difference(best[1].frame, other[1].frame)
-        if difference is not None and not difference[1]:
-            best = other
-    differing = [
-        (difference[0], c)
-        for c, request in requests
-        if (difference := disturbance.first_difference(best[1].frame, request.frame)) is not None
-    ]
-    active = [bit for bit, c in differing if c.flags]
-    if active:
-        return requests, [], Disturbance(min(active), Seen.BY_SENDER)
-    dropped = [c for _, c in differing]
-    return [(c, request) for c, request in requests if c not in dropped], dropped, None
