@@ -110,6 +110,7 @@ class BenchRun(ABC):
     state, reason : where the run is, and why it is broken.
     error : what broke it, with its cause.
     spec, note : what carries it, and why that.
+    bit_rate : of the vehicle bus, bit/s, where it is known not to be the database's.
     real_time : whether time passes by itself; else only in `tick`.
     log : the recording.
     processes, alive_at_end : recorder and nodes where they are processes; nodes that lived until asked to stop.
@@ -117,6 +118,7 @@ class BenchRun(ABC):
 
     spec = ""
     note = ""
+    bit_rate: int | None = None
     real_time = True
 
     def __init__(self, scenario: Scenario, out: Path, seed: int, say: Say, stop: StopSignal | None) -> None:

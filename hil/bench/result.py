@@ -162,8 +162,8 @@ class RunResult:
         return asdict(self)
 
 
-def measure(signals: Signals) -> RunResult:
-    """Measure a recorded run."""
+def measure(signals: Signals, bit_rate: int | None = None) -> RunResult:
+    """Measure a recorded run; ``bit_rate`` of the vehicle bus where it is not the one that its database states."""
     braking = _braking_window(signals)
     distance = time = mean = demanded = energy = None
     if braking is not None:
@@ -187,7 +187,7 @@ def measure(signals: Signals) -> RunResult:
         frames_corrupt=sum(_last(signals, f"{node}_RECEPTION.FRAMES_CORRUPT") for node in nodes),
         overruns=sum(_overruns(signals, node) for node in nodes),
         lateness_ms=max((_lateness(signals, node) for node in nodes), key=lambda lateness: lateness.p99),
-        bus_load=_bus_load(signals),
+        bus_load=_bus_load(signals, bit_rate or contract(BusName.VEHICLE).bit_rate),
         link_states=dict(Counter(event.state.value for event in link_events(signals))),
     )
 
@@ -237,7 +237,7 @@ def _vehicle_frames(signals: Signals) -> NDArray[np.intp]:
     return np.flatnonzero(ours & ((frames.flags & FrameFlag.ERROR) == 0))
 
 
-def _bus_load(signals: Signals) -> float:
+def _bus_load(signals: Signals, bit_rate: int) -> float:
     """Share of the bit rate; a stuffed 11-bit frame takes 47 + 8 n + floor((34 + 8 n - 1) / 4) bits (Tindell 1994)."""
     frames, rows = signals.decoded.recording.frames, _vehicle_frames(signals)
     rows = rows[signals.decoded.time_s[rows] >= signals.start_s]
@@ -247,7 +247,7 @@ def _bus_load(signals: Signals) -> float:
     bits = int((47 + payload_bits + (33 + payload_bits) // 4).sum())
     t_s = signals.decoded.time_s[rows]
     span_s = float(t_s.max() - t_s.min())  # 0 where a run ended in its first tick
-    return bits / (contract(BusName.VEHICLE).bit_rate * span_s) if span_s > 0.0 else 0.0
+    return bits / (bit_rate * span_s) if span_s > 0.0 else 0.0
 
 
 def link_events(signals: Signals) -> list[LinkEvent]:
