@@ -33,6 +33,7 @@ _SI = {f"{spec.name}.{field.signal}": field.si_per_unit for spec in _SPECS.value
     for signal in (CRC_SIGNAL, COUNTER_SIGNAL)
 }
 _WRONG_LENGTH = "wrong length"
+_NEVER_NS = 1 << 62  # a message without a cycle has no gaps
 _WHY = {FrameUse.CORRUPT: "corrupt", FrameUse.REPEATED: "repeated", FrameUse.OUT_OF_SEQUENCE: "out of sequence"}
 
 
@@ -105,9 +106,11 @@ class Signals:
 
 
 def _use_of(spec: MessageSpec, recording: Recording, rows: NDArray[np.int64]) -> NDArray[np.uint8]:
-    data, length = recording.frames.data[rows], recording.frames.length[rows]
+    frames = recording.frames
+    data, length = frames.data[rows], frames.length[rows]
     if spec.data_id is not None:
-        return use_of_frames(data, length, spec.data_id, spec.length)
+        gap_ns = 3 * spec.cycle_ns or _NEVER_NS  # a shorter gap leaves the sequence as it is
+        return use_of_frames(data, length, frames.time_ns[rows], spec.data_id, spec.length, gap_ns)
     return np.where(length == spec.length, FrameUse.USED, FrameUse.CORRUPT).astype(np.uint8)
 
 
