@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from dbc.bench_messages import FaultCommand, ManoeuvreState, StimulusDriver, StimulusRoad
-from dbc.contract import Message, spec_of
+from dbc.commands import CommandReader
+from dbc.contract import Message
 from dbc.exchange import Receiver, Transmitter
 from dbc.frame import Frame, Received
 from dbc.messages import BatteryStatus
@@ -93,8 +94,7 @@ class PlantNode:
         self.switch_effects(theta)
         self._receiver = Receiver((*DEMANDS, StimulusDriver, StimulusRoad))
         self._broken = PhysicalFaults(self._switch, parameters.battery.notice_s)
-        self._faults = Receiver((FaultCommand,))
-        self._fault_id = spec_of(FaultCommand).can_id
+        self._commands = CommandReader((FaultCommand,))
         self._transmitter = Transmitter()
         self._demands = Demands(parameters.ehb)
         self._pedal = 0.0
@@ -148,14 +148,8 @@ class PlantNode:
         advance(self._x, self._u, self._p, self._y, steps, self._scene)
 
     def _take_faults(self, now_ns: int, inbox: Sequence[Received]) -> None:
-        """Fault commands one by one: two may come in one tick."""
-        for item in inbox:
-            if item[1] != self._fault_id:  # of few frames
-                continue
-            self._faults.accept(now_ns, [item])
-            command = self._faults.latest(FaultCommand)
-            if command is not None and self._faults.receptions[FaultCommand].fresh:
-                self._broken.take(now_ns, command, self._x)
+        for command in self._commands.read(inbox):
+            self._broken.take(now_ns, FaultCommand(*command), self._x)
 
     def _follow_manoeuvre(self, now_ns: int, elapsed_ns: int) -> None:
         manoeuvre = self._manoeuvre

@@ -23,6 +23,7 @@ COMMANDS = (
     "ecu",
     "plant",
     "record",
+    "inject",
     "replay",
     "decode",
     "convert",

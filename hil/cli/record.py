@@ -9,6 +9,7 @@ from hil.bench.recorder import FLUSH_PERIOD_NS, Recorder
 from hil.bus.channel import bench_channel
 from hil.bus.open import open_bus
 from hil.cli.options import add_bus, add_ready_fd
+from hil.faults.line import FaultyListener
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop
 from hil.rt.process import StopSignal, end_with_parent, say_ready
@@ -29,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
         end_with_parent()
     stop = StopSignal()
     with open_bus(args.bus, BusName.VEHICLE) as vehicle, open_bus(bench_channel(args.bus), BusName.BENCH) as bench:
-        recorder = Recorder(args.out, [vehicle, bench])
+        recorder = Recorder(args.out, [vehicle, FaultyListener(bench, ("RECORDER",))])
         try:
             say_ready(args.ready_fd)
             for _ in Loop(WallClock(), FLUSH_PERIOD_NS).ticks():

@@ -227,7 +227,17 @@ def _kind(
     usual: tuple[str, ...] = _WHERE,
 ) -> FaultKind:  # fmt: skip
     return FaultKind(
-        number, name, "protection", text, row, Side.SENDER, Takes.MESSAGES, usual, reaction, (SHARE, *parameters)
+        number,
+        name,
+        "protection",
+        text,
+        row,
+        Side.SENDER,
+        Takes.MESSAGES,
+        usual,
+        reaction,
+        (SHARE, *parameters),
+        usual_values=(("for_s", 0.5),),
     )
 
 
