@@ -136,7 +136,7 @@ class StimulusNode:
             first = events_of(injection)[0]
             end = _switched(FaultEvent(at_s, first.fault, first.wheels, active=False))
         else:
-            end = _Planned(at_s, tuple(stop_messages(injection)), injection.target.nodes == {"ECU"})
+            end = _Planned(at_s, tuple(stop_messages(injection)), "ECU" in injection.target.nodes)
         with self._lock:
             kept = [one for one in self._waiting if one.at_s < at_s or not _same_fault(one, end)]
             self._waiting = sorted([*kept, end], key=lambda one: one.at_s)
@@ -148,7 +148,7 @@ class StimulusNode:
             injection = replace(injection, seed=(257 * self._seed + self._seeded) % MOST_SEEDS)
             self._seeded += 1
         messages = tuple(start_messages(injection))
-        return [_Planned(injection.at_s - injection.lead_s, messages, injection.target.nodes == {"ECU"})]
+        return [_Planned(injection.at_s - injection.lead_s, messages, "ECU" in injection.target.nodes)]
 
     def also_send(self, frames: Iterable[Frame]) -> None:
         """Send frames of any sender, as they are, with the next step."""

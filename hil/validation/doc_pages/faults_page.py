@@ -69,7 +69,7 @@ brakebench inject motor_dead --on fl,fr --clear
 A target is a message (`BRAKE_PEDAL`), a signal (`BRAKE_PEDAL.PEDAL_TRAVEL_1`), all messages of a node (`SENSORS`,
 `EHB`, `IWM`, `DRIVER`, `BATTERY`, `ECU`; `PLANT`: of the whole car), `ALL`, a process (`ECU`, `PLANT`), or wheels
 (`fl`, `fl,rr`, `front`, `rear`, `all`). Values are SI. A fault of the car's frames begins in the tick at its time, one
-of the controller's in the first tick of the controller at or behind it.
+of the controller's, or of both, up to a cycle later.
 
 ## Valid frames for scripts
 
