@@ -11,6 +11,7 @@ from hil.bus.channel import bench_channel
 from hil.bus.open import open_bus
 from hil.cli.options import add_bus, add_ready_fd
 from hil.errors import BrakebenchError
+from hil.faults.line import FaultyListener
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop
 from hil.rt.process import StopSignal, end_with_parent, say_ready
@@ -37,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
             vehicle = stack.enter_context(open_bus(args.bus, BusName.VEHICLE))
             bench = stack.enter_context(open_bus(bench_channel(args.bus), BusName.BENCH))
         try:
-            recorder = Recorder(args.out, [vehicle, bench])
+            recorder = Recorder(args.out, [vehicle, FaultyListener(bench, ("RECORDER",))])
         except RecorderError as error:  # nothing has begun: wrong use
             raise BrakebenchError(str(error)) from error
         try:

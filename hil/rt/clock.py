@@ -39,6 +39,11 @@ def clocks_ns(monotonic: Callable[[], int] = monotonic_ns, wall: Callable[[], in
     return best_ns[1:]
 
 
+def step_wall_clock(seconds: float) -> None:
+    """Step the machine's time of day (needs the right to, and ends every other program's notion of it)."""
+    time.clock_settime(time.CLOCK_REALTIME, time.time() + seconds)
+
+
 class Clock(Protocol):
     """What a loop needs to know of time."""
 
