@@ -3,17 +3,32 @@
 from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
+import numpy as np
+
+from dbc.compiled import PAYLOAD
 from dbc.contract import Message, MessageSpec, spec_of
 from dbc.e2e import COUNTER_MODULUS, Checker, Status
-from dbc.frame import BusName, Frame, LinkEvent, Received
+from dbc.frame import BusName, Frame, LinkEvent, LinkState, Received
+from dbc.intake import (
+    BAD_IN_ROW,
+    COUNTER,
+    FRESH,
+    IN_SEQUENCE,
+    LAST_VALID_NS,
+    NO_COUNTER,
+    RECEIVED,
+    VALID_IN_ROW,
+    Intake,
+    Vector,
+)
 
 M = TypeVar("M", bound=Message)
 LAST_COUNTER = COUNTER_MODULUS - 1
 # on the way of every frame: without the Python-made __new__ of a NamedTuple and the slow look-up of an enum's member
 _new = tuple.__new__
-_VEHICLE, _OK, _OK_SOME_LOST, _NO_NEW_DATA = (
-    BusName.VEHICLE, Status.OK, Status.OK_SOME_LOST, Status.NO_NEW_DATA,
-)  # fmt: skip
+_VEHICLE, _OK, _OK_SOME_LOST = BusName.VEHICLE, Status.OK, Status.OK_SOME_LOST
+_WHOLE = frozenset({PAYLOAD})
+_UNUSUAL = 255  # in the place of a message's index: the frame is to be judged alone
 
 
 class Reception:
@@ -21,40 +36,69 @@ class Reception:
 
     Attributes
     ----------
-    message : the last usable message, None before the first.
-    fresh : whether the last call of `Receiver.accept` brought a usable one.
-    valid_in_row : usable frames since the last unusable one.
-    bad_in_row : unusable frames since the last usable one.
-    last_valid_ns : tick of the last usable frame, None before the first.
+    spec, index : the message, and its place among those of the receiver.
     """
 
-    def __init__(self, spec: MessageSpec) -> None:
-        self.spec = spec
+    def __init__(self, intake: Intake, index: int) -> None:
+        self.spec: MessageSpec = intake.specs[index]
+        spec = self.spec
         self.checker = None if spec.data_id is None else Checker(spec.data_id, spec.length)
-        self._check = self._check_length if self.checker is None else self.checker.check
-        self._decode = spec.decode
-        self.message: Message | None = None
-        self.status = Status.NO_NEW_DATA
-        self.fresh = False
-        self.valid_in_row = 0
-        self.bad_in_row = 0
-        self.last_valid_ns: int | None = None
+        self._intake, self.index = intake, index
+        self._memory = intake.memory[index]
+        self._decoded = b""
+        self._message: Message | None = None
+
+    @property
+    def message(self) -> Message | None:
+        """The last usable message, None before the first."""
+        if not self._memory[RECEIVED]:
+            return None
+        payload = self._intake.payload(self.index)
+        if payload != self._decoded or self._message is None:
+            self._decoded, self._message = payload, self.spec.decode(payload[: self.spec.length])
+        return self._message
+
+    @property
+    def fresh(self) -> bool:
+        """Whether the last call of `Receiver.accept` brought a usable one."""
+        return bool(self._memory[FRESH])
+
+    @property
+    def valid_in_row(self) -> int:
+        """Usable frames since the last unusable one."""
+        return self._memory[VALID_IN_ROW]
+
+    @property
+    def bad_in_row(self) -> int:
+        """Unusable frames since the last usable one."""
+        return self._memory[BAD_IN_ROW]
+
+    @property
+    def last_valid_ns(self) -> int | None:
+        """Tick of the last usable frame, None before the first."""
+        return self._memory[LAST_VALID_NS] if self._memory[RECEIVED] else None
+
+    @property
+    def counter(self) -> int | None:
+        """Last alive counter consumed, None before the first."""
+        counter = self._memory[COUNTER]
+        return None if counter == NO_COUNTER else counter
 
     def accept(self, now_ns: int, data: bytes) -> None:
-        """Check one payload and keep its message when it is usable."""
-        status = self.status = self._check(data)
-        if status is _OK or status is _OK_SOME_LOST:
-            self.message = self._decode(data)
-            self.fresh = True
-            self.valid_in_row += 1
-            self.bad_in_row = 0
-            self.last_valid_ns = now_ns
+        """Check one payload that is not the usual next one, and keep it when it is usable."""
+        memory, checker = self._memory, self.checker
+        if checker is None:
+            status = Status.OK if len(data) == self.spec.length else Status.WRONG_CRC
         else:
-            self.valid_in_row = 0
-            self.bad_in_row += 1
-
-    def _check_length(self, data: bytes) -> Status:
-        return Status.OK if len(data) == self.spec.length else Status.WRONG_CRC
+            checker.counter = self.counter
+            status = checker.check(data)
+            memory[COUNTER] = NO_COUNTER if checker.counter is None else checker.counter
+            memory[IN_SEQUENCE] = checker.in_sequence
+        if status is _OK or status is _OK_SOME_LOST:
+            self._intake.keep(now_ns, self.index, data)
+        else:
+            memory[VALID_IN_ROW] = 0
+            memory[BAD_IN_ROW] += 1
 
 
 class Receiver:
@@ -63,33 +107,69 @@ class Receiver:
     Parameters
     ----------
     types : the typed messages the node reads; all other frames are passed over.
+
+    Attributes
+    ----------
+    receptions : state of each message.
+    values : last usable values of all fields, SI units, message after message in the order of ``types``; NaN where not
+        available or not yet received.
+    link_events : those of the last tick.
+    lost, corrupt : frames missing by their counters, and with wrong check value or length, over all messages.
     """
 
     def __init__(self, types: Iterable[type[Message]]) -> None:
-        self.receptions = {t: Reception(spec_of(t)) for t in types}
+        kinds = tuple(types)
+        self._intake = Intake([spec_of(kind) for kind in kinds])
+        self.receptions = {kind: Reception(self._intake, index) for index, kind in enumerate(kinds)}
         self._all = list(self.receptions.values())
-        self._checkers = [reception.checker for reception in self._all if reception.checker is not None]
         # by bus and identifier, in two steps: hashing the name of a bus for each frame is slow
         self._vehicle, self._bench = (
-            {r.spec.can_id: r for r in self._all if r.spec.bus is bus} for bus in (BusName.VEHICLE, BusName.BENCH)
+            {r.spec.can_id: index for index, r in enumerate(self._all) if r.spec.bus is bus}
+            for bus in (BusName.VEHICLE, BusName.BENCH)
         )
+        self._of_interest = {*self._vehicle, *self._bench, *LinkState}  # the second element of what comes
+        self.values: Vector = self._intake.values
         self.link_events: list[LinkEvent] = []
+        self.lost = self.corrupt = 0
 
     def accept(self, now_ns: int, inbox: Sequence[Received]) -> None:
         """Take the inbox of the tick ``now_ns``; ``link_events`` then holds the tick's link events."""
-        for reception in self._all:
-            reception.fresh = False
-            reception.status = _NO_NEW_DATA
         self.link_events = []
-        vehicle, bench = self._vehicle, self._bench
-        for item in inbox:
+        of_interest, vehicle, bench = self._of_interest, self._vehicle, self._bench
+        indices: list[int] = []
+        payloads: list[bytes] = []
+        for item in [item for item in inbox if item[1] in of_interest]:
             if isinstance(item, LinkEvent):
                 self.link_events.append(item)
                 continue
             bus, can_id, data, _, extended = item
-            known = (vehicle if bus is _VEHICLE else bench).get(can_id)
-            if known is not None and not extended:
-                known.accept(now_ns, data)
+            index = (vehicle if bus is _VEHICLE else bench).get(can_id)
+            if index is not None and not extended:
+                indices.append(index)
+                payloads.append(data)
+        self._take(now_ns, indices, payloads)
+
+    def _take(self, now_ns: int, indices: list[int], payloads: list[bytes]) -> None:
+        which, whole = bytes(indices), b"".join(payloads)
+        if not _WHOLE.issuperset(map(len, payloads)):
+            which = bytes(
+                [index if len(data) == PAYLOAD else _UNUSUAL for index, data in zip(indices, payloads, strict=True)]
+            )
+            whole = b"".join([data[:PAYLOAD].ljust(PAYLOAD, b"\0") for data in payloads])
+        frames = np.frombuffer(which, np.uint8), np.frombuffer(whole, np.uint8)
+        unusual = self._intake.take(now_ns, 0, *frames)
+        if unusual == len(payloads):
+            return
+        while unusual < len(payloads):
+            self._all[indices[unusual]].accept(now_ns, payloads[unusual])
+            unusual = self._intake.take(now_ns, unusual + 1, *frames)
+        checkers = [reception.checker for reception in self._all if reception.checker is not None]
+        self.lost = sum([checker.lost for checker in checkers])
+        self.corrupt = sum([checker.corrupt for checker in checkers])
+
+    def of(self, message_type: type[Message]) -> Vector:
+        """Where the values of a message lie in `values`; shape (fields,)."""
+        return self._intake.of(self.receptions[message_type].index)
 
     def latest(self, message_type: type[M]) -> M | None:
         """Last usable message of a type, however old."""
@@ -100,20 +180,14 @@ class Receiver:
         last = self.receptions[message_type].last_valid_ns
         return None if last is None else now_ns - last
 
+    @property
+    def counters(self) -> list[int]:
+        """Last alive counter consumed of each message; `dbc.intake.NO_COUNTER` before the first."""
+        return self._intake.counters
+
     def counter(self, message_type: type[Message]) -> int | None:
         """Last alive counter consumed of a message."""
-        checker = self.receptions[message_type].checker
-        return None if checker is None else checker.counter
-
-    @property
-    def lost(self) -> int:
-        """Frames missing by their counters, over all messages."""
-        return sum([checker.lost for checker in self._checkers])
-
-    @property
-    def corrupt(self) -> int:
-        """Frames with wrong check value or length, over all messages."""
-        return sum([checker.corrupt for checker in self._checkers])
+        return self.receptions[message_type].counter
 
 
 class Transmitter:
