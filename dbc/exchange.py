@@ -37,6 +37,7 @@ class Reception:
     Attributes
     ----------
     spec, index : the message, and its place among those of the receiver.
+    memory : what is remembered, by the places of `dbc.intake`.
     """
 
     def __init__(self, intake: Intake, index: int) -> None:
@@ -44,14 +45,14 @@ class Reception:
         spec = self.spec
         self.checker = None if spec.data_id is None else Checker(spec.data_id, spec.length)
         self._intake, self.index = intake, index
-        self._memory = intake.memory[index]
+        self.memory = intake.memory[index]
         self._decoded = b""
         self._message: Message | None = None
 
     @property
     def message(self) -> Message | None:
         """The last usable message, None before the first."""
-        if not self._memory[RECEIVED]:
+        if not self.memory[RECEIVED]:
             return None
         payload = self._intake.payload(self.index)
         if payload != self._decoded or self._message is None:
@@ -61,32 +62,32 @@ class Reception:
     @property
     def fresh(self) -> bool:
         """Whether the last call of `Receiver.accept` brought a usable one."""
-        return bool(self._memory[FRESH])
+        return bool(self.memory[FRESH])
 
     @property
     def valid_in_row(self) -> int:
         """Usable frames since the last unusable one."""
-        return self._memory[VALID_IN_ROW]
+        return self.memory[VALID_IN_ROW]
 
     @property
     def bad_in_row(self) -> int:
         """Unusable frames since the last usable one."""
-        return self._memory[BAD_IN_ROW]
+        return self.memory[BAD_IN_ROW]
 
     @property
     def last_valid_ns(self) -> int | None:
         """Tick of the last usable frame, None before the first."""
-        return self._memory[LAST_VALID_NS] if self._memory[RECEIVED] else None
+        return self.memory[LAST_VALID_NS] if self.memory[RECEIVED] else None
 
     @property
     def counter(self) -> int | None:
         """Last alive counter consumed, None before the first."""
-        counter = self._memory[COUNTER]
+        counter = self.memory[COUNTER]
         return None if counter == NO_COUNTER else counter
 
     def accept(self, now_ns: int, data: bytes) -> None:
         """Check one payload that is not the usual next one, and keep it when it is usable."""
-        memory, checker = self._memory, self.checker
+        memory, checker = self.memory, self.checker
         if checker is None:
             status = Status.OK if len(data) == self.spec.length else Status.WRONG_CRC
         else:
