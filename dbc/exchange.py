@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dbc.compiled import PAYLOAD
 from dbc.contract import Message, MessageSpec, spec_of
@@ -14,6 +15,7 @@ from dbc.intake import (
     COUNTER,
     FRESH,
     IN_SEQUENCE,
+    JUDGED_ALONE,
     LAST_VALID_NS,
     NO_COUNTER,
     RECEIVED,
@@ -28,7 +30,6 @@ LAST_COUNTER = COUNTER_MODULUS - 1
 _new = tuple.__new__
 _VEHICLE, _OK, _OK_SOME_LOST = BusName.VEHICLE, Status.OK, Status.OK_SOME_LOST
 _WHOLE = frozenset({PAYLOAD})
-_UNUSUAL = 255  # in the place of a message's index: the frame is to be judged alone
 
 
 class Reception:
@@ -151,19 +152,17 @@ class Receiver:
         self._take(now_ns, indices, payloads)
 
     def _take(self, now_ns: int, indices: list[int], payloads: list[bytes]) -> None:
-        which, whole = bytes(indices), b"".join(payloads)
-        if not _WHOLE.issuperset(map(len, payloads)):
-            which = bytes(
-                [index if len(data) == PAYLOAD else _UNUSUAL for index, data in zip(indices, payloads, strict=True)]
-            )
-            whole = b"".join([data[:PAYLOAD].ljust(PAYLOAD, b"\0") for data in payloads])
-        frames = np.frombuffer(which, np.uint8), np.frombuffer(whole, np.uint8)
-        unusual = self._intake.take(now_ns, 0, *frames)
+        """Take the usual frames together, up to each that is to be judged alone."""
+        if _WHOLE.issuperset(map(len, payloads)):
+            frames = np.frombuffer(bytes(indices) + b"".join(payloads), np.uint8)
+        else:
+            frames = _with_odd_lengths(indices, payloads)
+        unusual = self._intake.take(now_ns, 0, frames)
         if unusual == len(payloads):
             return
         while unusual < len(payloads):
             self._all[indices[unusual]].accept(now_ns, payloads[unusual])
-            unusual = self._intake.take(now_ns, unusual + 1, *frames)
+            unusual = self._intake.take(now_ns, unusual + 1, frames)
         checkers = [reception.checker for reception in self._all if reception.checker is not None]
         self.lost = sum([checker.lost for checker in checkers])
         self.corrupt = sum([checker.corrupt for checker in checkers])
@@ -189,6 +188,12 @@ class Receiver:
     def counter(self, message_type: type[Message]) -> int | None:
         """Last alive counter consumed of a message."""
         return self.receptions[message_type].counter
+
+
+def _with_odd_lengths(indices: list[int], payloads: list[bytes]) -> NDArray[np.uint8]:
+    whole = [len(data) == PAYLOAD for data in payloads]
+    which = [index if right else JUDGED_ALONE for index, right in zip(indices, whole, strict=True)]
+    return np.frombuffer(bytes(which) + b"".join([data[:PAYLOAD].ljust(PAYLOAD, b"\0") for data in payloads]), np.uint8)
 
 
 class Transmitter:

@@ -20,10 +20,11 @@ from dbc.contract import MessageSpec
 Vector = NDArray[np.float64]
 Octets = NDArray[np.uint8]
 _COUNTERS = e2e.COUNTER_MODULUS
-_MOST_MESSAGES = 255  # of one receiver: an index is one byte
-_MEMORY = ("counter", "in_sequence", "fresh", "valid_in_row", "bad_in_row", "last_valid_ns", "received")
-COUNTER, IN_SEQUENCE, FRESH, VALID_IN_ROW, BAD_IN_ROW, LAST_VALID_NS, RECEIVED = range(len(_MEMORY))
-"""Places of what is remembered of a message."""
+JUDGED_ALONE = 255
+"""Index in the place of a message's."""
+_MEMORY = ("counter", "in_sequence", "fresh", "valid_in_row", "bad_in_row", "last_valid_ns", "received", "word")
+COUNTER, IN_SEQUENCE, FRESH, VALID_IN_ROW, BAD_IN_ROW, LAST_VALID_NS, RECEIVED, WORD = range(len(_MEMORY))
+"""Places of what is remembered of a message; the word is its last usable payload as a little-endian number."""
 NO_COUNTER = e2e.COUNTER_MODULUS
 """Counter before the first frame; never on the wire."""
 _FIXED = ("protected", "crc_start", "first", "last")  # the last two: of its values
@@ -35,12 +36,11 @@ _FIELD = np.dtype(
 
 
 @compiled
-def _keep(now_ns: int, m: int, payload: Octets, messages: Any, fields: Any, values: Vector, payloads: Octets) -> None:
+def _keep(now_ns: int, m: int, payload: Octets, messages: Any, fields: Any, values: Vector) -> None:
     """Decode a usable payload of message ``m`` and remember it."""
     message = messages[m]
     word = np.int64(0)
     for i in range(PAYLOAD):
-        payloads[m, i] = payload[i]
         word |= np.int64(payload[i]) << 8 * i
     for k in range(message["first"], message["last"]):
         field = fields[k]
@@ -55,13 +55,16 @@ def _keep(now_ns: int, m: int, payload: Octets, messages: Any, fields: Any, valu
     message["bad_in_row"] = 0
     message["last_valid_ns"] = now_ns
     message["received"] = 1
+    message["word"] = word
 
 
 @compiled
-def _take(
-    now_ns: int, begin: int, which: Octets, data: Octets, messages: Any, fields: Any, values: Vector, payloads: Octets
-) -> int:
+def _take(now_ns: int, begin: int, frames: Octets, messages: Any, fields: Any, values: Vector) -> int:
     """Take frames from ``begin`` on, up to the first that is not usual.
+
+    Parameters
+    ----------
+    frames : index of the message of each frame, then all payloads.
 
     Returns
     -------
@@ -70,10 +73,12 @@ def _take(
     if begin == 0:
         for m in range(len(messages)):
             messages[m]["fresh"] = 0
-    for f in range(begin, len(which)):
-        if which[f] >= len(messages):
+    number = len(frames) // (1 + PAYLOAD)
+    for f in range(begin, number):
+        m, first = frames[f], number + PAYLOAD * f
+        if m >= len(messages):
             return f
-        message, payload = messages[which[f]], data[PAYLOAD * f : PAYLOAD * f + PAYLOAD]
+        message, payload = messages[m], frames[first : first + PAYLOAD]
         if message["protected"] != 0:
             counter = payload[1] & 0x0F
             follows = message["counter"] + 1 if message["counter"] + 1 < _COUNTERS else 0
@@ -85,8 +90,8 @@ def _take(
             if crc != payload[0]:
                 return f
             message["counter"] = counter
-        _keep(now_ns, which[f], payload, messages, fields, values, payloads)
-    return len(which)
+        _keep(now_ns, m, payload, messages, fields, values)
+    return number
 
 
 class Intake:
@@ -105,8 +110,8 @@ class Intake:
 
     def __init__(self, specs: Iterable[MessageSpec]) -> None:
         self.specs = list(specs)
-        if len(self.specs) > _MOST_MESSAGES:
-            raise CodecError(f"a receiver of {len(self.specs)} messages: expected at most {_MOST_MESSAGES}")
+        if len(self.specs) > JUDGED_ALONE:
+            raise CodecError(f"a receiver of {len(self.specs)} messages: expected at most {JUDGED_ALONE}")
         ends = list(accumulate((len(spec.fields) for spec in self.specs), initial=0))
         self._slices = [slice(a, b) for a, b in pairwise(ends)]
         self.values: Vector = np.full(ends[-1], np.nan)
@@ -116,8 +121,7 @@ class Intake:
         columns = self._messages.view(np.int64).reshape(len(rows), -1 if rows else 1)[:, len(_FIXED) :]
         self.memory = [memoryview(row) for row in columns]
         self._counters = self._messages["counter"]
-        self._payloads = np.zeros((len(rows), PAYLOAD), np.uint8)
-        self._state = self._messages, self._fields, self.values, self._payloads
+        self._state = self._messages, self._fields, self.values
 
     @property
     def counters(self) -> list[int]:
@@ -131,16 +135,17 @@ class Intake:
 
     def payload(self, index: int) -> bytes:
         """Last usable payload of a message."""
-        return bytes(self._payloads[index])
+        return self.memory[index][WORD].to_bytes(PAYLOAD, "little", signed=True)
 
-    def take(self, now_ns: int, begin: int, which: Octets, data: Octets) -> int:
+    def take(self, now_ns: int, begin: int, frames: Octets) -> int:
         """Take frames from ``begin`` on while they are usual; index of the first that is not, or their number.
 
         Parameters
         ----------
-        which : message of each frame by its index; anything above is not usual.  data : their payloads, 8 bytes each.
+        frames : index of the message of each, `JUDGED_ALONE` for one that is not usual; then their payloads, 8 bytes
+            each.
         """
-        unusual: int = _take(now_ns, begin, which, data, *self._state)
+        unusual: int = _take(now_ns, begin, frames, *self._state)
         return unusual
 
     def keep(self, now_ns: int, index: int, payload: bytes) -> None:
