@@ -97,7 +97,7 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
             wheel_speed=known.implausible, acceleration=known.stuck, pedal_disagree=disagree
         )
     mode_memory, active, faults = modes.supervise(
-        memory.modes, inputs, timed_out, streams, pedal, plausibility, p.supervision, dt_s
+        memory.modes, inputs, timed_out, lost, streams, pedal, plausibility, p.supervision, dt_s
     )
     mode = mode_memory.mode
     troubles = memory.troubles
@@ -106,7 +106,9 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
 
     if math.isfinite(pedal.travel):
         deceleration = base_brake.reference_deceleration(pedal.travel, p.pedal)
-        if streams[Source.PEDAL].suspect:  # it may be another's: the driver's may be the larger
+        if (
+            streams is not ALL_CLEAN and streams[Source.PEDAL].suspect
+        ):  # it may be another's: the driver's may be the larger
             deceleration = max(deceleration, *memory.recent_mps2)
         without_pedal_s = 0.0
     else:
