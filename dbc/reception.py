@@ -102,7 +102,7 @@ class Reception:
             fits = gap <= 2 * cycle_ns
             ahead_ns = min(ahead_ns, 0)
         elif status is _WRONG_SEQUENCE:
-            fits = step * cycle_ns <= since_ns + cycle_ns
+            fits = ahead_ns <= cycle_ns
         else:
             fits = step == 1 or 2 * ahead_ns <= cycle_ns
         if fits:

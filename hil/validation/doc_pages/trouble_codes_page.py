@@ -14,8 +14,8 @@ What the brake controller can find wrong. Generated from `ecu/law/trouble_codes.
 `python -m hil.validation.doc_pages.trouble_codes_page`; a test holds it current.
 
 - **Reaction** is the best mode while the code is active; the worst one of the active codes counts. A downgrade is never
-  delayed. An upgrade goes one mode at a time, {upgrade_interval_s} apart, after {frames_to_upgrade} valid frames in a
-  row from every source.
+  delayed. An upgrade goes one mode at a time, {upgrade_interval_s} apart, after {frames_to_upgrade} valid frames in
+  a row from every source.
 - **Memory**: each code once, with the times of its first and last occurrence since the controller's start, how often it
   became active (up to 255), whether it is active, and a freeze frame of its first occurrence: mode, speed, demanded
   deceleration, both pedal channels, pressures, motor currents. `EcuNode.trouble_codes` gives it. In INIT nothing is
@@ -33,13 +33,14 @@ A frame is used when its check value, its length, its counter and its time are r
   (a sender that restarted), or until the new counter has lived alone for 1000 cycles.
 - The same counter with other bytes, and more frames than cycles, tell of a second sender in its first tick.
 - From the first foreign pedal frame on the demand does not fall: the largest of the last ticks is held. When a second
-  sender or a replay is found ({foreign_frames_to_downgrade} frames, 30 ms), nobody knows whose frames are the driver's,
-  and none is used: SAFE_STOP, the demand is held for {demand_hold_s}, then the brake follows its own pedal map. It
-  reads the pedal by itself, so the driver brakes and releases. Of every other source nothing is used either.
+  sender or a replay is found ({foreign_frames_to_downgrade} frames, 30 ms), nobody knows whose frames are the
+  driver's, and none is used: SAFE_STOP, the demand is held for {demand_hold_s}, then the brake follows its own pedal
+  map. It reads the pedal by itself, so the driver brakes and releases. Another source's frames are not used either.
 
 Not seen, by the nature of a counter 0..14 without a key:
 
-- a replay whose age is a multiple of 15 frames, or one frame more or less (three of 15 ages);
+- a replay whose age is a multiple of 15 frames, or one frame more or less (three of 15 ages; up to five more where the
+  sender has been late before, by as many cycles);
 - one that starts after 15 cycles of silence: the silence itself has its code and its reaction, but the stream is then
   taken for a sender that restarted; a stream delayed by a pause, which goes on with the next counter, likewise;
 - a sender that silences the real one and counts on in step. This is no fault but an attack; end-to-end protection is
