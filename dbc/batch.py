@@ -114,6 +114,11 @@ class Batch:
         """Where the values of a message lie in `values`, to be written to; shape (fields,)."""
         return self.values[self._slices[message_type]]
 
+    def due(self, message_type: type[Message], now_ns: int) -> bool:
+        """Whether `frames` would send a message at ``now_ns``."""
+        message = self._messages[list(self._slices).index(message_type)]
+        return bool(message["cycle_ns"] == 0 or message["slot"] != now_ns // message["cycle_ns"])
+
     def frames(self, now_ns: int) -> list[Frame]:
         """Frames of the messages that are due, protected with their next counters."""
         odd = _write(now_ns, self.values, self._fields, self._messages, *self._views)

@@ -8,99 +8,17 @@ from numpy.typing import NDArray
 
 from dbc.compiled import PAYLOAD
 from dbc.contract import Message, MessageSpec, spec_of
-from dbc.e2e import COUNTER_MODULUS, Checker, Status
+from dbc.e2e import COUNTER_MODULUS
 from dbc.frame import BusName, Frame, LinkEvent, LinkState, Received
-from dbc.intake import (
-    BAD_IN_ROW,
-    COUNTER,
-    FRESH,
-    IN_SEQUENCE,
-    JUDGED_ALONE,
-    LAST_VALID_NS,
-    NO_COUNTER,
-    RECEIVED,
-    VALID_IN_ROW,
-    Intake,
-    Vector,
-)
+from dbc.intake import JUDGED_ALONE, Intake, Vector
+from dbc.reception import Reception
 
 M = TypeVar("M", bound=Message)
 LAST_COUNTER = COUNTER_MODULUS - 1
 # on the way of every frame: without the Python-made __new__ of a NamedTuple and the slow look-up of an enum's member
 _new = tuple.__new__
-_VEHICLE, _OK, _OK_SOME_LOST = BusName.VEHICLE, Status.OK, Status.OK_SOME_LOST
+_VEHICLE = BusName.VEHICLE
 _WHOLE = frozenset({PAYLOAD})
-
-
-class Reception:
-    """State of one received message.
-
-    Attributes
-    ----------
-    spec, index : the message, and its place among those of the receiver.
-    memory : what is remembered, by the places of `dbc.intake`.
-    """
-
-    def __init__(self, intake: Intake, index: int) -> None:
-        self.spec: MessageSpec = intake.specs[index]
-        spec = self.spec
-        self.checker = None if spec.data_id is None else Checker(spec.data_id, spec.length)
-        self._intake, self.index = intake, index
-        self.memory = intake.memory[index]
-        self._decoded = b""
-        self._message: Message | None = None
-
-    @property
-    def message(self) -> Message | None:
-        """The last usable message, None before the first."""
-        if not self.memory[RECEIVED]:
-            return None
-        payload = self._intake.payload(self.index)
-        if payload != self._decoded or self._message is None:
-            self._decoded, self._message = payload, self.spec.decode(payload[: self.spec.length])
-        return self._message
-
-    @property
-    def fresh(self) -> bool:
-        """Whether the last call of `Receiver.accept` brought a usable one."""
-        return bool(self.memory[FRESH])
-
-    @property
-    def valid_in_row(self) -> int:
-        """Usable frames since the last unusable one."""
-        return self.memory[VALID_IN_ROW]
-
-    @property
-    def bad_in_row(self) -> int:
-        """Unusable frames since the last usable one."""
-        return self.memory[BAD_IN_ROW]
-
-    @property
-    def last_valid_ns(self) -> int | None:
-        """Tick of the last usable frame, None before the first."""
-        return self.memory[LAST_VALID_NS] if self.memory[RECEIVED] else None
-
-    @property
-    def counter(self) -> int | None:
-        """Last alive counter consumed, None before the first."""
-        counter = self.memory[COUNTER]
-        return None if counter == NO_COUNTER else counter
-
-    def accept(self, now_ns: int, data: bytes) -> None:
-        """Check one payload that is not the usual next one, and keep it when it is usable."""
-        memory, checker = self.memory, self.checker
-        if checker is None:
-            status = Status.OK if len(data) == self.spec.length else Status.WRONG_CRC
-        else:
-            checker.counter = self.counter
-            status = checker.check(data)
-            memory[COUNTER] = NO_COUNTER if checker.counter is None else checker.counter
-            memory[IN_SEQUENCE] = checker.in_sequence
-        if status is _OK or status is _OK_SOME_LOST:
-            self._intake.keep(now_ns, self.index, data)
-        else:
-            memory[VALID_IN_ROW] = 0
-            memory[BAD_IN_ROW] += 1
 
 
 class Receiver:

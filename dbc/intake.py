@@ -1,7 +1,7 @@
 """Frames of a tick, checked and decoded in one compiled call as long as each is the next of its sequence.
 
-What is usual is done here: a whole payload with the right check value and the counter that follows the last one. For
-anything else the call stops at the frame, and `dbc.exchange.Reception` judges it alone. Values are those of
+What is usual is done here: a whole payload with the right check value and the counter that follows the last one, a
+cycle after it. For anything else the call stops at the frame, and `dbc.reception` judges it alone. Values are those of
 `dbc.codec`, field for field; NaN where a signal is not available or out of range.
 """
 
@@ -22,12 +22,18 @@ Octets = NDArray[np.uint8]
 _COUNTERS = e2e.COUNTER_MODULUS
 JUDGED_ALONE = 255
 """Index in the place of a message's."""
-_MEMORY = ("counter", "in_sequence", "fresh", "valid_in_row", "bad_in_row", "last_valid_ns", "received", "word")
-COUNTER, IN_SEQUENCE, FRESH, VALID_IN_ROW, BAD_IN_ROW, LAST_VALID_NS, RECEIVED, WORD = range(len(_MEMORY))
-"""Places of what is remembered of a message; the word is its last usable payload as a little-endian number."""
+_MEMORY = (
+    "counter", "in_sequence", "usual_ns", "known_ns", "known", "fresh", "valid_in_row", "bad_in_row", "last_valid_ns",
+    "received", "word",
+)  # fmt: skip
+(
+    COUNTER, IN_SEQUENCE, USUAL_NS, KNOWN_NS, KNOWN, FRESH, VALID_IN_ROW, BAD_IN_ROW, LAST_VALID_NS, RECEIVED, WORD,
+) = range(len(_MEMORY))  # fmt: skip
+"""Places of what is remembered of a message; the word is its last usable payload as a little-endian number, known that
+of the last frame of its stream, usual the time from one to the next."""
 NO_COUNTER = e2e.COUNTER_MODULUS
 """Counter before the first frame; never on the wire."""
-_FIXED = ("protected", "crc_start", "first", "last")  # the last two: of its values
+_FIXED = ("protected", "timed", "crc_start", "first", "last")  # the last two: of its values
 _MESSAGE = np.dtype([(name, "i8") for name in (*_FIXED, *_MEMORY)])
 _FIELD = np.dtype(
     [("factor", "f8"), ("offset", "f8"), ("si_per_unit", "f8")]
@@ -55,7 +61,8 @@ def _keep(now_ns: int, m: int, payload: Octets, messages: Any, fields: Any, valu
     message["bad_in_row"] = 0
     message["last_valid_ns"] = now_ns
     message["received"] = 1
-    message["word"] = word
+    message["word"] = message["known"] = word
+    message["known_ns"] = now_ns
 
 
 @compiled
@@ -83,6 +90,8 @@ def _take(now_ns: int, begin: int, frames: Octets, messages: Any, fields: Any, v
             counter = payload[1] & 0x0F
             follows = message["counter"] + 1 if message["counter"] + 1 < _COUNTERS else 0
             if message["in_sequence"] == 0 or counter != follows:
+                return f
+            if message["timed"] != 0 and now_ns - message["known_ns"] != message["usual_ns"]:
                 return f
             crc = message["crc_start"]
             for i in range(1, PAYLOAD):
@@ -133,10 +142,6 @@ class Intake:
         """Where the values of a message lie in `values`."""
         return self.values[self._slices[index]]
 
-    def payload(self, index: int) -> bytes:
-        """Last usable payload of a message."""
-        return self.memory[index][WORD].to_bytes(PAYLOAD, "little", signed=True)
-
     def take(self, now_ns: int, begin: int, frames: Octets) -> int:
         """Take frames from ``begin`` on while they are usual; index of the first that is not, or their number.
 
@@ -154,7 +159,9 @@ class Intake:
 
 
 def _message(spec: MessageSpec, where: slice) -> tuple[int, ...]:
-    protection = (0, 0) if spec.data_id is None else (1, e2e.start_value(spec.data_id))
+    protection = (0, 0, 0)
+    if spec.data_id is not None:
+        protection = (1, int(spec.cycle_ns > 0), e2e.start_value(spec.data_id))
     return *protection, where.start, where.stop, NO_COUNTER, *[0] * (len(_MEMORY) - 1)
 
 

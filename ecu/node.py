@@ -5,7 +5,7 @@ from typing import Any
 
 from dbc.batch import Batch
 from dbc.bench_messages import EcuReception, StimulusEcu
-from dbc.exchange import Receiver, Reception
+from dbc.exchange import Receiver
 from dbc.frame import BusName, Frame, LinkState, Received
 from dbc.intake import BAD_IN_ROW, FRESH
 from dbc.messages import (
@@ -15,6 +15,7 @@ from dbc.messages import (
     BrakeEstimateRear,
     BrakePedal,
     BrakeStatus,
+    BrakeTroubleCode,
     EhbDemandFront,
     EhbDemandRear,
     EhbPressureFront,
@@ -26,11 +27,14 @@ from dbc.messages import (
     MotorStatusFront,
     MotorStatusRear,
     Steering,
+    TroubleStatus,
     WheelSpeedFront,
     WheelSpeedRear,
 )
+from dbc.reception import Reception
 from ecu.law.step import initial_memory, step
-from ecu.law.types import Brake, Health, Inputs, Outputs
+from ecu.law.trouble_codes import Trouble
+from ecu.law.types import WELL, Brake, Health, Inputs, Outputs
 from ecu.parameters.ecu import EcuParameters
 
 SOURCES: tuple[type[tuple[Any, ...]], ...] = (  # in the order of law.types.Source
@@ -46,7 +50,8 @@ SOURCES: tuple[type[tuple[Any, ...]], ...] = (  # in the order of law.types.Sour
     BatteryStatus,
 )
 _FAILED = float(MotorState.FAILED)
-_WELL = Health(0.0, True, 0)
+_NO_TROUBLE = BrakeTroubleCode(0, TroubleStatus.NONE, 0, 0, 0)
+_MOST_CODES = 255
 _LINK_DOWN = {LinkState.BUS_OFF: True, LinkState.DISCONNECTED: True, LinkState.RESTARTED: False}
 _LINK_DOWN[LinkState.ERROR_ACTIVE] = False
 _BRAKE: dict[float, Brake] = {
@@ -57,12 +62,16 @@ _BRAKE: dict[float, Brake] = {
 
 
 def _health(reception: Reception, now_ns: int) -> Health:
-    memory = reception.memory
-    if memory[FRESH] and not memory[BAD_IN_ROW]:  # mostly
-        return _WELL
-    last_ns = reception.last_valid_ns
+    r = reception
+    if r.odd_ns != now_ns:
+        if r.memory[FRESH] and not r.memory[BAD_IN_ROW]:  # mostly
+            return WELL
+        odd = (0, 0, 0)
+    else:
+        odd = (r.bad, r.foreign, r.doubled)
+    last_ns = r.last_valid_ns
     age_s = math.inf if last_ns is None else (now_ns - last_ns) * 1e-9
-    return Health(age_s, reception.fresh, reception.bad_in_row)
+    return Health(age_s, r.fresh, r.bad_in_row, *odd)
 
 
 class EcuNode:
@@ -88,11 +97,18 @@ class EcuNode:
         self._batch = Batch(
             (
                 EhbDemandFront, EhbDemandRear, MotorDemandFront, MotorDemandRear, BrakeStatus, BrakeEstimateFront,
-                BrakeEstimateRear, EcuReception,
+                BrakeEstimateRear,
+                BrakeTroubleCode, EcuReception,
             )
         )  # fmt: skip
         self._last_ns: int | None = None
         self._link_down = False
+        self._next_code = 0
+
+    @property
+    def trouble_codes(self) -> tuple[Trouble, ...]:
+        """Every trouble code found since the start, active or not, in order of appearance."""
+        return self.memory.troubles.troubles
 
     def step(self, now_ns: int, inbox: list[Received]) -> list[Frame]:
         """Advance to ``now_ns`` and return the frames to send."""
@@ -137,6 +153,17 @@ class EcuNode:
             ),
         )
 
+    def _trouble(self, now_ns: int) -> BrakeTroubleCode:
+        """The trouble code that is told next: one after the other, without end."""
+        troubles = self.memory.troubles.troubles
+        if not troubles:
+            return _NO_TROUBLE
+        index = self._next_code % len(troubles)
+        self._next_code = index + self._batch.due(BrakeTroubleCode, now_ns)
+        code, active, occurrences, *_ = troubles[index]
+        status = TroubleStatus.ACTIVE if active else TroubleStatus.STORED
+        return BrakeTroubleCode(code.number, status, occurrences, min(len(troubles), _MOST_CODES), index)
+
     def _tell(self, now_ns: int, o: Outputs) -> list[Frame]:
         """The law's outputs as frames, with the report of what was consumed."""
         p, m, t, mu, c = o.pressure_demand_pa, o.motor_demand_nm, o.wheel_torque_nm, o.pad_friction, o.confidence
@@ -147,6 +174,7 @@ class EcuNode:
             *(o.mode, o.faults, o.blending_factor, o.demanded_deceleration_mps2),
             *(t[0], mu[0], c[0], t[1], mu[1], c[1]),
             *(t[2], mu[2], c[2], t[3], mu[3], c[3]),
+            *self._trouble(now_ns),
             *receiver.counters[: len(SOURCES)],
             *(receiver.lost, receiver.corrupt),
         ]

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 from dbc.bench_messages import FaultCommand, ManoeuvreState, PhysicalFault, StimulusDriver, StimulusRoad
 from dbc.contract import Message, spec_of
-from dbc.exchange import Receiver, Reception
+from dbc.exchange import Receiver
 from dbc.frame import Frame, Received
+from dbc.reception import Reception
 from plant import driver
 from plant.demands import DEMANDS, Demands
 from plant.external_nodes import ExternalNodes

@@ -10,8 +10,9 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from dbc.messages import BrakeMode
-from ecu.law import base_brake, blend, compensation, estimator, friction, modes
-from ecu.law.types import UNKNOWN, ZERO, Brake, Four, Inputs, Outputs, Source
+from ecu.law import base_brake, blend, compensation, estimator, friction, modes, trouble_codes
+from ecu.law.communication import ALL_CLEAN, Streams, judge_streams
+from ecu.law.types import PLAUSIBLE, UNKNOWN, ZERO, Brake, Four, Inputs, Outputs, Source
 from ecu.parameters.ecu import EcuParameters
 
 SAMPLE_S = 0.01  # the sensors' cycle: the observer steps once for each, however fast the task
@@ -21,13 +22,19 @@ CONFIDENCE_STEPS = 7
 class Memory(NamedTuple):
     """State of the law between two steps.
 
-    ``deceleration_mps2``: last valid demand; ``without_pedal_s``: time since there was one; ``handed_over``: the brake
-    has been asked to follow its own pedal map. ``charge``: what the shares of motors and friction count on;
-    ``observer``: state of the chosen observer; ``friction``: pad friction in use.
+    ``time_s``: since the start; ``streams``, ``troubles``: what is held against the received frames, what was found.
+    ``deceleration_mps2``: last valid demand, ``recent_mps2``: those of the last ticks; ``without_pedal_s``: time since
+    there was one; ``handed_over``: the brake has been asked to follow its own pedal map. ``charge``: what the shares of
+    motors and friction count on; ``observer``: state of the chosen observer; ``friction``: pad friction in use.
     """
 
+    time_s: float
+    streams: Streams
     modes: modes.ModeMemory
+    troubles: trouble_codes.TroubleMemory
+    disagreement_s: float
     deceleration_mps2: float
+    recent_mps2: tuple[float, float, float]
     without_pedal_s: float
     handed_over: bool
     blending_factor: float
@@ -42,8 +49,13 @@ def initial_memory(parameters: EcuParameters) -> Memory:
     """State before the first step."""
     mu = parameters.friction_brake.pad_friction
     return Memory(
+        time_s=0.0,
+        streams=ALL_CLEAN,
         modes=modes.initial_modes(),
+        troubles=trouble_codes.NO_TROUBLE,
+        disagreement_s=0.0,
         deceleration_mps2=0.0,
+        recent_mps2=(0.0, 0.0, 0.0),
         without_pedal_s=0.0,
         handed_over=False,
         blending_factor=parameters.blend.blending_factor,
@@ -71,16 +83,33 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     dt_s : time since the last step.
     """
     p = parameters
-    lost = modes.lost_sources(inputs, p.supervision)
+    time_s = memory.time_s + dt_s
+    timed_out = modes.timed_out_sources(inputs, p.supervision)
+    streams = judge_streams(memory.streams, inputs.health, timed_out, p.supervision, dt_s)
+    lost = modes.lost_sources(timed_out, streams)
     pedal = base_brake.read_pedal(inputs, lost[Source.PEDAL], p.supervision.pedal_disagreement)
     known = memory.estimates
-    mode_memory, faults = modes.supervise(
-        memory.modes, inputs, lost, pedal, known.implausible, known.stuck, p.supervision, dt_s
+    disagreement_s = memory.disagreement_s + dt_s if pedal.channels_disagree else 0.0
+    disagree = disagreement_s > p.supervision.pedal_disagreement_s
+    plausibility = PLAUSIBLE
+    if disagree or known.stuck or known.implausible != estimator.PLAUSIBLE:
+        plausibility = PLAUSIBLE._replace(
+            wheel_speed=known.implausible, acceleration=known.stuck, pedal_disagree=disagree
+        )
+    mode_memory, active, faults = modes.supervise(
+        memory.modes, inputs, timed_out, lost, streams, pedal, plausibility, p.supervision, dt_s
     )
     mode = mode_memory.mode
+    troubles = memory.troubles
+    if active != troubles.active and (mode != BrakeMode.INIT or time_s > p.supervision.start_tolerated_s):
+        troubles = trouble_codes.remember(troubles, active, time_s, _freeze_frame(memory, inputs, p))
 
     if math.isfinite(pedal.travel):
         deceleration = base_brake.reference_deceleration(pedal.travel, p.pedal)
+        if (
+            streams is not ALL_CLEAN and streams[Source.PEDAL].suspect
+        ):  # it may be another's: the driver's may be the larger
+            deceleration = max(deceleration, *memory.recent_mps2)
         without_pedal_s = 0.0
     else:
         deceleration = memory.deceleration_mps2
@@ -134,10 +163,25 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
             round(CONFIDENCE_STEPS * c3),
         ),
     )
+    recent = (deceleration, memory.recent_mps2[0], memory.recent_mps2[1])
     memory = Memory(
-        mode_memory, deceleration, without_pedal_s, handed_over, factor, charge, observer, since_sample_s, known, mu
-    )
+        time_s, streams, mode_memory, troubles, disagreement_s, deceleration, recent, without_pedal_s, handed_over,
+        factor, charge, observer, since_sample_s, known, mu,
+    )  # fmt: skip
     return memory, outputs
+
+
+def _freeze_frame(memory: Memory, inputs: Inputs, p: EcuParameters) -> trouble_codes.FreezeFrame:
+    """The car as it is now, with the mode and the demand of the tick before."""
+    speeds = [w for w in inputs.wheel_speed_rad_s if math.isfinite(w)]
+    return trouble_codes.FreezeFrame(
+        memory.modes.mode,
+        max(speeds) * p.vehicle.rolling_radius_m if speeds else math.nan,
+        memory.deceleration_mps2,
+        (inputs.pedal_1, inputs.pedal_2),
+        inputs.pressure_pa,
+        inputs.motor_current_a,
+    )
 
 
 def _usable_wheel_speeds(
