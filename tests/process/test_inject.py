@@ -89,7 +89,7 @@ def test_a_disk_that_is_full_ends_the_recording_not_the_loop(bench, brakebench, 
     result = result_of(process, expected=3)
     assert "INCOMPLETE" in result["reason"]
     assert Signals(log).decoded.rejected == 0
-    t_s, mode = Signals(log).get("BRAKE_STATUS.MODE")
+    _, mode = Signals(log).get("BRAKE_STATUS.MODE")
     assert mode[-1] == BrakeMode.NORMAL
 
 
