@@ -47,6 +47,7 @@ In a test ([testing.md](testing.md)), as a call, as a context that ends it, and 
 import pytest
 from hil.faults.catalogue import names
 
+
 @pytest.mark.parametrize("name", names("signal"))
 def test_no_sensor_releases_the_brake(bench, name):
     bench.drive("72 km/h")

@@ -11,6 +11,7 @@ from dbc.frame import BusName
 from dbc.messages import BrakeMode, Fault
 from hil.errors import BrakebenchError
 from hil.faults.catalogue import FAMILIES, FAULTS, ROWS, fault_named, injection, names
+from hil.faults.clock import jump
 from hil.faults.fault import Side
 from hil.faults.targets import NodeCode, target_names
 from hil.faults.wire import Commands, start_messages, stop_messages
@@ -114,3 +115,9 @@ def test_all_targets_can_be_armed():
         for name in target_names(kind.takes):
             if kind.refuses is None:
                 kind.on(name)
+
+
+def test_the_clock_is_left_alone_outside_the_laboratory(monkeypatch):
+    monkeypatch.delenv("VCAN_LAB", raising=False)
+    with pytest.raises(BrakebenchError, match="only inside the vcan laboratory"):
+        jump(3600.0)

@@ -49,7 +49,14 @@ def clean(scenario):
     return frames_of(scenario)
 
 
-@pytest.mark.parametrize("kind", VIRTUAL, ids=lambda kind: kind.name)
+QUICK = ("silent", "replayed", "bits_flipped", "bus_off", "signal_value", "process_stopped")
+EACH = [
+    pytest.param(kind, id=kind.name, marks=() if kind.name in QUICK or kind.side is Side.PLANT else pytest.mark.slow)
+    for kind in VIRTUAL
+]
+
+
+@pytest.mark.parametrize("kind", EACH)
 def test_each_fault_acts_from_its_time_on(scenario, clean, kind):
     values = dict(kind.usual_values) | {"for_s": 0.15}
     values |= {"share": 1.0} if "share" in values else {}
