@@ -227,7 +227,9 @@ class BenchRun(ABC):
         if self.state is BenchState.STARTED:
             if motion is None or motion.manoeuvre not in _UNDER_WAY:
                 if now_ns > self.hold_timeout_ns:
-                    raise BenchError("the manoeuvre did not start: the plant never saw valid demands of an ECU")
+                    others = self.watch.others
+                    why = f"; somebody else sends {', '.join(others)}" if others else ""
+                    raise BenchError(f"the manoeuvre did not start: the plant never saw valid demands of an ECU{why}")
                 return
             self.watch.begin()
         self.state = BenchState.FINISHED if self.stimulus_node.finished else BenchState.DRIVING

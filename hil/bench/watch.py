@@ -105,7 +105,8 @@ class Watch:
         for node, last_ns in self._last_ns.items():
             if self._newest_ns - last_ns > _NODE_TIMEOUT_NS and node not in self._silent:
                 self._silent.add(node)
-                self._tell(f"the {node} is silent since {self._s(last_ns)}")
+                if self._start_ns is not None:
+                    self._tell(f"the {node} is silent since {self._s(last_ns)}")
 
     def _follow(self, node: str, at_ns: int) -> None:
         """Take a node's sign of life."""
@@ -121,11 +122,16 @@ class Watch:
         self._others[track] = self._others.get(track, 0) + 1
 
     def _tell(self, text: str) -> None:
-        if self._start_ns is not None and not self._all_excused:
+        if not self._all_excused:
             self._say(f"watch: {text}")
 
     def _s(self, time_ns: int) -> str:
         return f"{(time_ns - (self._start_ns or 0)) * 1e-9:.3f} s"
+
+    @property
+    def others(self) -> list[str]:
+        """Messages that somebody else sends too, as far as their cycle times tell."""
+        return [_named(track.spec) for track in self._others]
 
     def findings(self) -> list[Finding]:
         """What was found since the manoeuvre began, the worst first; nothing where it did not begin."""

@@ -123,13 +123,13 @@ def test_a_second_plant_is_refused_at_the_start_and_told_while_running(start, br
     refused = brakebench("run", short, "--without", "ecu", "--bus", channel, "--out", "refused", check=2)
     assert f"bus {channel}: somebody already sends 0xA0 BRAKE_PEDAL" in refused.stderr
     assert not (tmp_path / "refused").exists()
-    for process in (plant, record):
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=RUN_LIMIT_S)
+    record.send_signal(signal.SIGINT)
+    record.communicate(timeout=RUN_LIMIT_S)
+    plant.send_signal(signal.SIGSTOP)  # says nothing while the bench listens
     bench = start("run", short, "--bus", channel, "--json", "--out", "out")
     log = tmp_path / "out" / "recording.log"
-    wait_until(lambda: _written(log), "frames")
-    start("plant", short, "--bus", channel)
+    wait_until(lambda: _written(log) and _manoeuvre_time_s(log) > 0.1, "the manoeuvre")
+    plant.send_signal(signal.SIGCONT)
     out, err = bench.communicate(timeout=RUN_LIMIT_S)
     assert bench.returncode == 4, (out, err)
     assert any("somebody else sends it too" in found["text"] for found in json.loads(out)["findings"])

@@ -256,7 +256,7 @@ def test_a_run_tells_the_states_of_its_link_and_that_bus_off_spoilt_it(
         lines = (adapter.NO_ACK, adapter.NO_ACK, adapter.ERROR_WARNING, adapter.ERROR_PASSIVE, adapter.BUS_OFF)
         for line in lines:
             slcan.device.send_line(line)
-        result = result_of(bench.process, expected=3)
+        result = result_of(bench.process, expected=5)
     seen = witness.stop()
 
     assert result["verdict"] == "incomplete"

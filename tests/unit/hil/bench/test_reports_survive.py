@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from documented import DOCS
 
 from dbc.contract import contract, spec_of
 from dbc.e2e import protect
@@ -155,6 +156,9 @@ def test_random_frames_over_all_ids_leave_verdict_and_report(tmp_path, seed):
         return
     outcome = finish(bench, seed, {})
     assert outcome.facts["missing"] == []
-    assert json.loads(outcome.json_text())["verdict"] == outcome.verdict.value
+    result = json.loads(outcome.json_text())
+    assert result["verdict"] == outcome.verdict.value
+    documented = DOCS.joinpath("json.md").read_text().split("## `brakebench run --json`")[1].split("\n## ")[0]
+    assert [key for key in result if f"`{key}`" not in documented] == []
     for name in ("log", "signals", "figure", "page"):
         assert Path(outcome.facts[name]).stat().st_size > 0

@@ -145,6 +145,16 @@ def test_a_second_sender_is_named(heard, message):
     assert len(said) == 1
 
 
+def test_a_second_sender_is_told_before_the_manoeuvre_too(heard):
+    """It may keep the manoeuvre from beginning at all."""
+    ticks, start = heard
+    watch = Watch()
+    for i, inbox in enumerate(ticks[:start]):
+        watch.hear(i * 10 * MS + 1, [*inbox, *(frame for frame in inbox if is_a(frame, BrakePedal))])
+    assert watch.others == ["BRAKE_PEDAL (0xA0 on the vehicle bus)"]
+    assert watch.findings() == []
+
+
 def test_a_second_sender_that_sends_now_and_then_is_told_by_its_counters(heard):
     def now_and_then(t_ms, frame):
         if not is_a(frame, BrakePedal) or t_ms % 200:
