@@ -1,5 +1,6 @@
 """Two pedal channels, one of which may say anything."""
 
+import itertools
 import math
 
 import pytest
@@ -16,7 +17,12 @@ def follow(parameters, inputs, pairs, lost=False):
     memory, readings = pedal.INITIAL, []
     for one, two in pairs:
         memory, reading = pedal.read_pedal(
-            memory, inputs._replace(pedal_1=one, pedal_2=two), lost, parameters.supervision, parameters.plausibility, DT_S
+            memory,
+            inputs._replace(pedal_1=one, pedal_2=two),
+            lost,
+            parameters.supervision,
+            parameters.plausibility,
+            DT_S,
         )
         readings.append(reading)
     return readings
@@ -61,7 +67,7 @@ def test_what_only_one_channel_asks_for_rises_no_faster_than_a_quick_foot(parame
     readings = follow(parameters, good_inputs, [(0.3, 0.3), (0.4, 0.3), (0.5, 0.3), (0.6, 0.3), (0.7, 0.3), (0.7, 0.3)])
     rise = parameters.plausibility.pedal_rise_1_s * DT_S
     travels = [r.travel for r in readings]
-    assert max(b - a for a, b in zip(travels, travels[1:], strict=False)) <= rise + 1e-12
+    assert max(b - a for a, b in itertools.pairwise(travels)) <= rise + 1e-12
     assert travels[-1] == pytest.approx(0.3 + 5 * rise)
 
 
