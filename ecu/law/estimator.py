@@ -23,8 +23,8 @@ class Estimates(NamedTuple):
     """Speed over ground, wheel torques (negative braking), pad friction with confidence 0..1, mass over nominal.
 
     ``implausible`` wheels have not turned as the car moves for longer than a wheel slides; ``stuck``: the acceleration
-    sensor repeats itself while the wheels tell of another acceleration. ``expected_mps2``: what the wheels' torques
-    should give, NaN where that is not known.
+    sensor repeats itself while the wheels tell of another acceleration. ``expected_mps2``: what it should show by
+    the wheels' torques, NaN where that is not known; ``grade_mps2``: what it shows of its offset and of the grade.
     """
 
     speed_mps: float
@@ -35,6 +35,7 @@ class Estimates(NamedTuple):
     implausible: tuple[bool, bool, bool, bool] = PLAUSIBLE
     stuck: bool = False
     expected_mps2: float = math.nan
+    grade_mps2: float = 0.0
 
 
 def _four(values: Vector, start: int) -> Four:
@@ -172,12 +173,12 @@ def estimate(state: Vector, z: Vector, parameters: EcuParameters, dt_s: float) -
     nominal = parameters.friction_brake.pad_friction
     if parameters.compensation.method == "joint":
         state = joint_step(state, z, joint_parameters(parameters), dt_s)
-        started, speed, torque, mu, confidence, mass, implausible, stuck, expected = read_estimates(
+        started, speed, torque, mu, confidence, mass, implausible, stuck, expected, level = read_estimates(
             state, joint_parameters(parameters), parameters.compensation.confidence_full
         )
         if not started:
             return state, Estimates(0.0, UNKNOWN, (nominal, nominal, nominal, nominal), ZERO, 1.0)
-        return state, Estimates(speed, torque, mu, confidence, mass, implausible, stuck, expected)
+        return state, Estimates(speed, torque, mu, confidence, mass, implausible, stuck, expected, level)
     state = paper.paper_step(state, z, paper_parameters(parameters), dt_s)
     return state, Estimates(
         float(state[paper.SPEED]),

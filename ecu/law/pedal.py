@@ -62,8 +62,10 @@ def read_pedal(
         if levels == _NO_LEVELS:
             return PedalMemory(travel, (one, two), 0, levels), PedalReading(travel, False, False, False)
         suspect, levels = 0, _rest(levels, s, p, dt_s)
+        named = _named(levels, s.pedal_disagreement_s)
+        travel = two if named == 1 else one if named == 2 else travel
     else:
-        suspect = _suspect(memory, one, two, p.pedal_jump)
+        suspect = _suspect(memory, one, two, p.pedal_jump) or _named(levels, s.pedal_disagreement_s)
         travel = _believed(memory.travel, one, two, suspect, p.pedal_rise_1_s * dt_s)
         limit, forget, heal = s.pedal_disagreement_s, p.forget, p.heal_s
         levels = (
@@ -72,7 +74,8 @@ def read_pedal(
             up_down(levels[2], dt_s, dt_s, limit, forget, heal),
         )
     limit = s.pedal_disagreement_s
-    wrong = (levels[0] > limit and levels[0] >= levels[1], levels[1] > limit and levels[1] > levels[0])
+    named = _named(levels, limit)
+    wrong = (named == 1, named == 2)
     memory = PedalMemory(travel, (one, two), suspect, levels)
     return memory, PedalReading(travel, False, False, levels[2] > limit, wrong)
 
@@ -90,6 +93,11 @@ def _rest(
         up_down(b, 0.0, dt_s, limit, forget, heal),
         up_down(c, 0.0, dt_s, limit, forget, heal),
     )
+
+
+def _named(levels: tuple[float, float, float], limit: float) -> int:
+    """Channel that has been found wrong for long enough, 1 or 2; 0: none. Never both."""
+    return 0 if max(levels[0], levels[1]) <= limit else 1 if levels[0] >= levels[1] else 2
 
 
 def _suspect(memory: PedalMemory, one: float, two: float, jump: float) -> int:

@@ -127,7 +127,7 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
             asked_pa = _asked_of_followers(asked_pa, inputs.brake)
         z = estimator.measured(inputs, lost, deceleration, asked_pa, memory.asked_nm, p.motor.torque_per_current_nm_a)
         watch, bits, wheel_speed = judge.judge(
-            watch, z, judge.judge_parameters(p), known.speed_mps, known.expected_mps2, since_sample_s
+            watch, z, judge.judge_parameters(p), known.speed_mps, known.expected_mps2, known.grade_mps2, since_sample_s
         )
         observer, known = estimator.estimate(observer, z, p, since_sample_s)
         since_sample_s = 0.0

@@ -6,7 +6,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.law.compiled import entry, helper
-from ecu.law.joint.layout import COVARIANCE, FORCE_LAG, FRICTION, MASS, ODD_S, SPEED, STARTED, STUCK, TORQUE, N
+from ecu.law.gravity import GRAVITY_MPS2
+from ecu.law.joint.layout import (
+    BIAS,
+    COVARIANCE,
+    FORCE_LAG,
+    FRICTION,
+    GRADE,
+    MASS,
+    ODD_S,
+    SPEED,
+    STARTED,
+    STUCK,
+    TORQUE,
+    N,
+)
 from ecu.law.joint.motion import expected_acceleration
 from ecu.law.types import Four
 
@@ -25,9 +39,10 @@ def confidence_of(s: Vector, i: int, full: float) -> float:
 @entry
 def read_estimates(
     s: Vector, p: Vector, full: float
-) -> tuple[bool, float, Four, Four, Four, float, tuple[bool, bool, bool, bool], bool, float]:
+) -> tuple[bool, float, Four, Four, Four, float, tuple[bool, bool, bool, bool], bool, float, float]:
     """Whether it has started, speed, wheel torques, pad friction and its confidence, mass, wheels that do not turn as
-    the car moves, whether the accelerometer is stuck, acceleration that the torques should give, m/s2.
+    the car moves, whether the accelerometer is stuck, what the accelerometer should show by the torques,
+    and what it shows of offset and grade, m/s2.
 
     Parameters
     ----------
@@ -49,5 +64,6 @@ def read_estimates(
             s[ODD_S + 3] > IMPLAUSIBLE_S,
         ),
         s[STUCK] != 0.0,
-        expected_acceleration(s, p, s[FORCE_LAG], 0.0),
+        expected_acceleration(s, p, s[FORCE_LAG], 0.0) + s[BIAS],
+        s[BIAS] + GRAVITY_MPS2 * s[GRADE],
     )

@@ -42,6 +42,7 @@ Vector = NDArray[np.float64]
 
 REPEAT_S = 0.2
 CONTRADICTION_MPS2 = 0.5
+NO_VALUE = 1e9
 
 
 @helper
@@ -71,7 +72,7 @@ def watch_accelerometer(s: Vector, z: Vector, p: Vector, dt: float) -> bool:
         if not isnan(z[WHEEL + i]):
             number += 1
     if isnan(z[AX]) or number == 0:
-        s[REPEATED_S], s[STUCK] = 0.0, 0.0
+        s[LAST_AX], s[REPEATED_S], s[STUCK] = NO_VALUE, 0.0, 0.0
         return not isnan(z[AX])
     speed = median_wheel(z) * p[P_RADIUS]
     if z[AX] != s[LAST_AX]:

@@ -35,11 +35,12 @@ from ecu.law.plausibility.layout import (
 
 Vector = NDArray[np.float64]
 
+SLOWEST_MPS = 3.0  # below, teeth are sparse, and a brake that holds gives no force
 UNLIKE = 0.5  # share of the tolerance within which the two witnesses must agree to overrule the sensor
 
 
 @helper
-def judge_acceleration(s: Vector, z: Vector, p: Vector, expected: float, begun: bool, dt: float) -> int:
+def judge_acceleration(s: Vector, z: Vector, p: Vector, expected: float, grade: float, begun: bool, dt: float) -> int:
     """Take an acceleration that cannot be right out of ``z``; returns the fault's bit.
 
     Wrong is what jumps as no car does, and what neither the wheels nor the force balance (``expected``, m/s2, NaN
@@ -52,11 +53,11 @@ def judge_acceleration(s: Vector, z: Vector, p: Vector, expected: float, begun: 
     for i in range(4):
         if not isnan(z[WHEEL + i]):
             number += 1
-    if isnan(ax) or number < 2 or isnan(expected):
+    speed = median_wheel(z) * p[RADIUS] if number >= 2 else 0.0
+    if isnan(ax) or isnan(expected) or speed < SLOWEST_MPS:
         s[BODY] = np.nan
         s[LAST_AX], s[BEFORE_AX] = ax, np.nan
         return _count(s, z, p, 0.0, dt)
-    speed = median_wheel(z) * p[RADIUS]
     if not begun or isnan(s[BODY]):
         s[BODY], s[WHEELS], s[FORCES] = ax, ax, ax
         s[LAST_SPEED] = speed
@@ -64,7 +65,7 @@ def judge_acceleration(s: Vector, z: Vector, p: Vector, expected: float, begun: 
             s[LAST_AX] = ax
         s[BEFORE_AX] = s[LAST_AX]
     s[BODY] += share * (ax - s[BODY])
-    s[WHEELS] += share * ((speed - s[LAST_SPEED]) / dt - s[WHEELS])
+    s[WHEELS] += share * ((speed - s[LAST_SPEED]) / dt + grade - s[WHEELS])
     s[FORCES] += share * (expected - s[FORCES])
     jump, bend = ax - s[LAST_AX], ax - 2.0 * s[LAST_AX] + s[BEFORE_AX]
     s[LAST_SPEED], s[BEFORE_AX], s[LAST_AX] = speed, s[LAST_AX], ax
@@ -75,6 +76,8 @@ def judge_acceleration(s: Vector, z: Vector, p: Vector, expected: float, begun: 
         and abs(s[WHEELS] - s[FORCES]) < UNLIKE * most
         and abs(s[BODY] + s[WHEELS]) > most  # else the car rolls backward, which toothed wheels do not show
     )
+    if s[ACCELERATION_LEVEL] > p[ACCELERATION_S] and abs(s[BODY] - s[WHEELS]) > most:
+        alone = True  # a fault heals where the wheels agree, whatever the brakes do
     evidence = dt if alone or abs(jump) > p[JUMP] or abs(bend) > p[ROUGH] else 0.0
     bit = _count(s, z, p, evidence, dt)
     if alone or abs(jump) > p[JUMP]:

@@ -55,7 +55,9 @@ def drop_unlimited(z: Vector) -> None:
 
 
 @entry
-def judge(s: Vector, z: Vector, p: Vector, speed: float, expected: float, dt: float) -> tuple[Vector, int, float]:
+def judge(
+    s: Vector, z: Vector, p: Vector, speed: float, expected: float, grade: float, dt: float
+) -> tuple[Vector, int, float]:
     """Judge one sample.
 
     Parameters
@@ -64,7 +66,8 @@ def judge(s: Vector, z: Vector, p: Vector, speed: float, expected: float, dt: fl
     z : inputs of the observers (`joint.layout`); what is not believed is changed in place, to NaN or to what is likely,
         and ``HOLD`` is set where nothing may be learned from the sample.
     p : from `judge_parameters`.  speed : the observer's, m/s.
-    expected : acceleration that the force balance expects, m/s2; NaN where there is none.
+    expected : acceleration that the force balance expects of the sensor, m/s2; NaN where there is none.
+    grade : what the sensor shows of its offset and of the grade, m/s2.
     dt : time since the last sample, s.
 
     Returns
@@ -83,7 +86,7 @@ def judge(s: Vector, z: Vector, p: Vector, speed: float, expected: float, dt: fl
     bits, top = judge_wheels(s, z, p, 0.0 if isnan(speed) else speed, begun, dt)
     bits |= judge_pressures(s, z, p, dt)
     bits |= judge_motors(s, z, p, dt)
-    bits |= judge_acceleration(s, z, p, expected, begun, dt)
+    bits |= judge_acceleration(s, z, p, expected, grade, begun, dt)
     s[BEGUN] = 1.0
     return s, bits, top
 
