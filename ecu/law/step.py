@@ -6,11 +6,11 @@ brake, and without any pedal the last demand stands until the brake is asked to 
 """
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 from dbc.messages import BrakeMode
-from ecu.law import base_brake, blend, compensation, estimator, friction, modes, trouble_codes
+from ecu.law import base_brake, blend, estimator, modes, trouble_codes
+from ecu.law.actuation import actuate
 from ecu.law.communication import ALL_CLEAN, Streams, judge_streams
 from ecu.law.types import PLAUSIBLE, UNKNOWN, ZERO, Brake, Four, Inputs, Outputs, Source
 from ecu.parameters.ecu import EcuParameters
@@ -67,12 +67,6 @@ def initial_memory(parameters: EcuParameters) -> Memory:
     )
 
 
-@lru_cache(maxsize=16)
-def brake_gains(parameters: EcuParameters) -> Four:
-    """`friction.gains`, kept beside the parameter set."""
-    return friction.gains(parameters.friction_brake)
-
-
 def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float) -> tuple[Memory, Outputs]:
     """Advance the control law by one tick.
 
@@ -124,27 +118,12 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
         z = estimator.measured(inputs, lost, deceleration, p.motor.torque_per_current_nm_a)
         observer, known = estimator.estimate(observer, z, p, since_sample_s)
         since_sample_s = 0.0
-    nominal = p.friction_brake.pad_friction
-    mu = compensation.friction_in_use(
-        memory.friction, known.pad_friction, known.confidence, nominal, p.compensation, dt_s
-    )
-    factor_now = compensation.motor_factor(factor, mu, nominal, p.compensation)
-    mass = p.vehicle.mass_kg * known.mass_factor
-
     speeds = _usable_wheel_speeds(inputs, lost, known.implausible)
-    wheel_speed = max(speeds) if speeds else 0.0
-    speed = max(wheel_speed * p.vehicle.rolling_radius_m, 0.0)
-    resistance = base_brake.driving_resistance(speed, mass, p.vehicle)
-    resistance *= min(deceleration / p.pedal.resistance_full_mps2, 1.0)
-    torque = base_brake.brake_torque(deceleration, resistance, mass, p.vehicle)
-    demand = base_brake.distribute(torque, p.friction_brake.front_share)
-    wanted = blend.wanted_torque(demand, factor_now, _usable_torque(inputs, lost, mode), p.motor)
-    power = sum(wanted) * max(wheel_speed, 0.0) * p.motor.charge_efficiency
-    charge = blend.ramp_charge_limit(memory.charge, inputs.charge_power_w, power, p.blend, dt_s)
-    shares = blend.blend(demand, wanted, power, charge, speed, deceleration, p.blend)
-
-    pressure = friction.pressure_demands(shares.friction_nm, mu, brake_gains(p), p.friction_brake)
-    m0, m1, m2, m3 = shares.motor_nm
+    mu, charge, torque, motor_nm, pressure = actuate(
+        memory.friction, memory.charge, known.pad_friction, known.confidence, known.mass_factor, deceleration, factor,
+        max(speeds) if speeds else 0.0, _usable_torque(inputs, lost, mode), ZERO, inputs.charge_power_w, dt_s, p,
+    )  # fmt: skip
+    m0, m1, m2, m3 = motor_nm
     c0, c1, c2, c3 = known.confidence
     silent = mode == BrakeMode.INIT or handed_over
     outputs = Outputs(
@@ -152,7 +131,7 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
         motor_demand_nm=UNKNOWN if mode == BrakeMode.INIT else (-m0, -m1, -m2, -m3),
         mode=mode,
         faults=faults,
-        blending_factor=sum(shares.motor_nm) / torque if torque > 0.0 else 0.0,
+        blending_factor=sum(motor_nm) / torque if torque > 0.0 else 0.0,
         demanded_deceleration_mps2=math.nan if silent else deceleration,
         wheel_torque_nm=known.wheel_torque_nm,
         pad_friction=known.pad_friction,
