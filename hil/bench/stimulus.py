@@ -20,6 +20,7 @@ from hil.faults.physical import FaultEvent
 from plant.manoeuvre import Trace, value_at
 
 BENCH_PHASE_NS = 2_500_000  # after the plant, before the controller: each hears the stimulus at its next tick
+_MANOEUVRE, _FINISHED = TruthMotion._fields.index("manoeuvre"), float(ManoeuvreState.FINISHED)
 _OPENING_FRAMES = 3  # fault commands without a fault: the receiver's sequence stands before one counts
 
 
@@ -52,13 +53,11 @@ class StimulusNode:
 
     Attributes
     ----------
-    motion : the plant's last word about its motion.
     inbox : what came with the last step.
     time_s : manoeuvre time, None before its start. What is sent now acts at ``next_s``, the plant's next tick.
     """
 
     def __init__(self, blending: Trace = (), faults: Sequence[FaultEvent] = (), period_ns: int = 10_000_000) -> None:
-        self.motion: TruthMotion | None = None
         self.inbox: Sequence[Received] = ()
         self.time_s: float | None = None
         self._traces: dict[Channel, Trace] = {Channel.BLENDING: blending} if blending else {}
@@ -69,7 +68,13 @@ class StimulusNode:
         self._extra: list[Frame] = []
         self._lock = Lock()
         self._receiver = Receiver((TruthMotion,))
+        self._truth = self._receiver.values
         self._transmitter = Transmitter()
+
+    @property
+    def motion(self) -> TruthMotion | None:
+        """The plant's last word about its motion."""
+        return self._receiver.latest(TruthMotion)
 
     @property
     def next_s(self) -> float:
@@ -79,7 +84,7 @@ class StimulusNode:
     @property
     def finished(self) -> bool:
         """Whether the manoeuvre is over."""
-        return self.motion is not None and self.motion.manoeuvre is ManoeuvreState.FINISHED
+        return bool(self._truth[_MANOEUVRE] == _FINISHED)
 
     def move(self, channel: Channel, value: float, within_s: float = 0.0) -> None:
         """Bring a channel to a value from now on, linearly within a time."""
@@ -114,12 +119,12 @@ class StimulusNode:
         with self._lock:
             self.inbox = inbox
             self._receiver.accept(now_ns, inbox)
-            self.motion = self._receiver.latest(TruthMotion)
-            if self.motion is not None:
-                if self._start_ns is None and self.motion.manoeuvre is not ManoeuvreState.HOLDING:
+            if self._start_ns is None:
+                motion = self.motion
+                if motion is not None and motion.manoeuvre is not ManoeuvreState.HOLDING:
                     self._start_ns = now_ns
-                if self._start_ns is not None:
-                    self.time_s = (now_ns - self._start_ns) * 1e-9
+            if self._start_ns is not None:
+                self.time_s = (now_ns - self._start_ns) * 1e-9
             extra, self._extra = self._extra, []
             return self._transmitter.frames(now_ns, self._outgoing()) + extra
 
@@ -131,7 +136,7 @@ class StimulusNode:
             out.append(StimulusDriver(*map(self.value, _DRIVER)))
         if not self._traces.keys().isdisjoint(_ROAD):
             out.append(StimulusRoad(*map(self.value, _ROAD)))
-        if self.motion is not None and self._opening:
+        if self._opening and self.motion is not None:
             self._opening -= 1
             out.append(FaultCommand(PhysicalFault.NONE, 0, 0))
         elif self.time_s is not None:
