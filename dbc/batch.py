@@ -5,7 +5,6 @@ those of `dbc.codec`, message for message: the same arithmetic in the same order
 """
 
 from collections.abc import Iterable
-from functools import partial
 from itertools import accumulate, compress, pairwise, repeat
 from struct import Struct
 from typing import Any
@@ -23,7 +22,7 @@ Vector = NDArray[np.float64]
 Octets = NDArray[np.uint8]
 LIMIT = 1e300  # beyond is not a finite number to the codec
 _COUNTERS = e2e.COUNTER_MODULUS
-_frame = partial(tuple.__new__, Frame)  # without the Python-made __new__ of a NamedTuple
+_new = tuple.__new__  # without the Python-made __new__ of a NamedTuple
 
 
 _FIELD = np.dtype(
@@ -108,7 +107,8 @@ class Batch:
         self._due, self._payloads = bytearray(len(self._specs)), bytearray(PAYLOAD * len(self._specs))
         self._views = np.frombuffer(self._due, np.uint8), np.frombuffer(self._payloads, np.uint8)
         self._split = Struct("".join(f"{spec.length}s{PAYLOAD - spec.length}x" for spec in self._specs)).unpack
-        self._buses, self._ids = [spec.bus for spec in self._specs], [spec.can_id for spec in self._specs]
+        self._buses, self._ids = tuple(spec.bus for spec in self._specs), tuple(spec.can_id for spec in self._specs)
+        self._times, self._extended = (0,) * len(self._specs), (False,) * len(self._specs)
 
     def of(self, message_type: type[Message]) -> Vector:
         """Where the values of a message lie in `values`, to be written to; shape (fields,)."""
@@ -125,8 +125,8 @@ class Batch:
         if odd >= 0:
             raise CodecError(self._refusal(odd))
         payloads = self._split(self._payloads)
-        parts = zip(self._buses, self._ids, payloads, repeat(0), repeat(False), strict=False)
-        return list(map(_frame, compress(parts, self._due)))
+        parts = zip(self._buses, self._ids, payloads, self._times, self._extended, strict=False)
+        return list(map(_new, repeat(Frame), compress(parts, self._due)))
 
     def _refusal(self, index: int) -> str:
         spec = self._specs[self._fields[index]["message"]]

@@ -78,9 +78,13 @@ class Receiver:
         unusual = self._intake.take(now_ns, 0, frames)
         if unusual == len(payloads):
             return
+        judged = []
         while unusual < len(payloads):
-            self._all[indices[unusual]].accept(now_ns, payloads[unusual])
+            judged.append(self._all[indices[unusual]])
+            judged[-1].accept(now_ns, payloads[unusual])
             unusual = self._intake.take(now_ns, unusual + 1, frames)
+        for reception in judged:
+            reception.finish(now_ns)
         checkers = [reception.checker for reception in self._all if reception.checker is not None]
         self.lost = sum([checker.lost for checker in checkers])
         self.corrupt = sum([checker.corrupt for checker in checkers])
@@ -97,6 +101,11 @@ class Receiver:
         """Time since the tick of the last usable message; None before the first."""
         last = self.receptions[message_type].last_valid_ns
         return None if last is None else now_ns - last
+
+    @property
+    def well(self) -> list[int]:
+        """Of each message 1 where the last tick brought a usable frame and nothing odd."""
+        return self._intake.well
 
     @property
     def counters(self) -> list[int]:

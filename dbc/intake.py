@@ -24,13 +24,17 @@ JUDGED_ALONE = 255
 """Index in the place of a message's."""
 _MEMORY = (
     "counter", "in_sequence", "usual_ns", "known_ns", "known", "fresh", "valid_in_row", "bad_in_row", "last_valid_ns",
-    "received", "word",
+    "received", "word", "well",
 )  # fmt: skip
 (
     COUNTER, IN_SEQUENCE, USUAL_NS, KNOWN_NS, KNOWN, FRESH, VALID_IN_ROW, BAD_IN_ROW, LAST_VALID_NS, RECEIVED, WORD,
+    WELL,
 ) = range(len(_MEMORY))  # fmt: skip
-"""Places of what is remembered of a message; the word is its last usable payload as a little-endian number, known that
-of the last frame of its stream, usual the time from one to the next."""
+"""Places of what is remembered of a message.
+
+The word is its last usable payload as a little-endian number, known that of the last frame of its stream, usual the
+time from one to the next; well is 1 where the last tick brought a usable frame and nothing odd.
+"""
 NO_COUNTER = e2e.COUNTER_MODULUS
 """Counter before the first frame; never on the wire."""
 _FIXED = ("protected", "timed", "crc_start", "first", "last")  # the last two: of its values
@@ -56,7 +60,7 @@ def _keep(now_ns: int, m: int, payload: Octets, messages: Any, fields: Any, valu
             values[k] = np.nan
         else:
             values[k] = (raw * field["factor"] + field["offset"]) * field["si_per_unit"]
-    message["fresh"] = 1
+    message["fresh"] = message["well"] = 1
     message["valid_in_row"] += 1
     message["bad_in_row"] = 0
     message["last_valid_ns"] = now_ns
@@ -79,7 +83,7 @@ def _take(now_ns: int, begin: int, frames: Octets, messages: Any, fields: Any, v
     """
     if begin == 0:
         for m in range(len(messages)):
-            messages[m]["fresh"] = 0
+            messages[m]["fresh"] = messages[m]["well"] = 0
     number = len(frames) // (1 + PAYLOAD)
     for f in range(begin, number):
         m, first = frames[f], number + PAYLOAD * f
@@ -129,8 +133,14 @@ class Intake:
         self._messages = np.array(rows, _MESSAGE)
         columns = self._messages.view(np.int64).reshape(len(rows), -1 if rows else 1)[:, len(_FIXED) :]
         self.memory = [memoryview(row) for row in columns]
-        self._counters = self._messages["counter"]
+        self._counters, self._well = self._messages["counter"], self._messages["well"]
         self._state = self._messages, self._fields, self.values
+
+    @property
+    def well(self) -> list[int]:
+        """Of each message 1 where the last tick brought a usable frame and nothing odd."""
+        well: list[int] = self._well.tolist()
+        return well
 
     @property
     def counters(self) -> list[int]:

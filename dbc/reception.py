@@ -19,6 +19,7 @@ from dbc.intake import (
     RECEIVED,
     USUAL_NS,
     VALID_IN_ROW,
+    WELL,
     WORD,
     Intake,
 )
@@ -124,6 +125,10 @@ class Reception:
         elif status is not _REPEATED or self._known_ns != now_ns or data != self._known:
             self.valid_in_row = 0
             self.bad_in_row += 1
+
+    def finish(self, now_ns: int) -> None:
+        """Say whether all is well, after the last frame of a tick in which `accept` was asked."""
+        self.memory[WELL] = self.fresh and not self.bad_in_row and self.odd_ns != now_ns
 
     @property
     def _known(self) -> bytes:

@@ -7,7 +7,6 @@ from dbc.batch import Batch
 from dbc.bench_messages import EcuReception, StimulusEcu
 from dbc.exchange import Receiver
 from dbc.frame import BusName, Frame, LinkState, Received
-from dbc.intake import BAD_IN_ROW, FRESH
 from dbc.messages import (
     BatteryStatus,
     BodyMotion,
@@ -62,13 +61,9 @@ _BRAKE: dict[float, Brake] = {
 
 
 def _health(reception: Reception, now_ns: int) -> Health:
+    """Supply of a source that is not well."""
     r = reception
-    if r.odd_ns != now_ns:
-        if r.memory[FRESH] and not r.memory[BAD_IN_ROW]:  # mostly
-            return WELL
-        odd = (0, 0, 0)
-    else:
-        odd = (r.bad, r.foreign, r.doubled)
+    odd = (r.bad, r.foreign, r.doubled) if r.odd_ns == now_ns else (0, 0, 0)
     last_ns = r.last_valid_ns
     age_s = math.inf if last_ns is None else (now_ns - last_ns) * 1e-9
     return Health(age_s, r.fresh, r.bad_in_row, *odd)
@@ -130,6 +125,7 @@ class EcuNode:
             current_rl, able_rl, state_rl, current_rr, able_rr, state_rr,
             steering, _, charge_power, blending_factor,
         ) = self._receiver.values.tolist()  # fmt: skip
+        health = zip(self._receiver.well, self._receptions, strict=False)  # the last reception is no source
         return tuple.__new__(
             Inputs,
             (
@@ -149,7 +145,7 @@ class EcuNode:
                 charge_power,
                 blending_factor,
                 self._link_down,
-                tuple([_health(reception, now_ns) for reception in self._receptions]),
+                tuple([WELL if well else _health(r, now_ns) for well, r in health]),
             ),
         )
 

@@ -36,9 +36,9 @@ class DemandStream:
             self._valid_in_row = 0
             self.followed = None
             return None
-        if reception.fresh:
+        if self.followed is None and reception.fresh:
             self._valid_in_row = min(self._valid_in_row + 1, reception.valid_in_row)
-        if self._valid_in_row >= SEQUENCE or self.followed is not None:
+        if self.followed is not None or self._valid_in_row >= SEQUENCE:
             self.followed = left, right
         return self.followed
 

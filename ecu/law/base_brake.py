@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from ecu.law.compiled import shared
 from ecu.law.gravity import GRAVITY_MPS2
 from ecu.law.types import Four
 from ecu.parameters.control import PedalParameters
@@ -27,12 +28,14 @@ def reference_deceleration(travel: float, p: PedalParameters) -> float:
     return GRAVITY_MPS2 * x * (p.map_linear + x * (p.map_quadratic + x * p.map_cubic))
 
 
+@shared
 def driving_resistance(speed_mps: float, mass_kg: float, p: VehicleParameters) -> float:
     """Air drag and rolling resistance, N (the force F_R of paper eq. 9); zero at standstill."""
     rolling = mass_kg * GRAVITY_MPS2 * p.rolling_resistance * min(speed_mps, 1.0)
     return 0.5 * p.air_density_kg_m3 * p.drag_area_m2 * speed_mps**2 + rolling
 
 
+@shared
 def brake_torque(deceleration_mps2: float, resistance_n: float, mass_kg: float, p: VehicleParameters) -> float:
     """Brake torque of all wheels together for a deceleration, Nm, positive (paper eq. 1).
 
@@ -44,6 +47,7 @@ def brake_torque(deceleration_mps2: float, resistance_n: float, mass_kg: float, 
     return max(force, 0.0) * p.force_arm_m
 
 
+@shared
 def distribute(torque_nm: float, front_share: float) -> Four:
     """Torque of each wheel from the torque of all: a fixed front share, left and right alike."""
     front = 0.5 * front_share * torque_nm

@@ -6,12 +6,12 @@ brake, and without any pedal the last demand stands until the brake is asked to 
 """
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 from dbc.messages import BrakeMode
-from ecu.law import base_brake, blend, compensation, estimator, friction, modes, trouble_codes
+from ecu.law import base_brake, blend, estimator, modes, trouble_codes
 from ecu.law import pedal as pedal_travel
+from ecu.law.actuation import actuate
 from ecu.law.communication import ALL_CLEAN, Streams, judge_streams
 from ecu.law.plausibility import judge
 from ecu.law.types import PLAUSIBLE, UNKNOWN, ZERO, Brake, Four, Inputs, Outputs, Source
@@ -83,12 +83,6 @@ def initial_memory(parameters: EcuParameters) -> Memory:
     )
 
 
-@lru_cache(maxsize=16)
-def brake_gains(parameters: EcuParameters) -> Four:
-    """`friction.gains`, kept beside the parameter set."""
-    return friction.gains(parameters.friction_brake)
-
-
 def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float) -> tuple[Memory, Outputs]:
     """Advance the control law by one tick.
 
@@ -145,33 +139,15 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
         memory.handed_over or without_pedal_s > p.supervision.demand_hold_s + 0.5 * dt_s
     )
 
-    nominal = p.friction_brake.pad_friction
-    mu = compensation.friction_in_use(
-        memory.friction, known.pad_friction, known.confidence, nominal, p.compensation, dt_s
-    )
-    factor_now = compensation.motor_factor(factor, mu, nominal, p.compensation)
-    mass = p.vehicle.mass_kg * known.mass_factor
-
     if slow != estimator.PLAUSIBLE:
         wheel_speed = _fastest_of(inputs, slow, wheel_speed)
-    speed = wheel_speed * p.vehicle.rolling_radius_m
-    resistance = base_brake.driving_resistance(speed, mass, p.vehicle)
-    resistance *= min(deceleration / p.pedal.resistance_full_mps2, 1.0)
-    torque = base_brake.brake_torque(deceleration, resistance, mass, p.vehicle)
-    demand = base_brake.distribute(torque, p.friction_brake.front_share)
-    usable = _usable_torque(inputs, lost, mode, plausibility.motor_torque)
-    wanted = blend.wanted_torque(demand, factor_now, usable, p.motor)
-    power = sum(wanted) * wheel_speed * p.motor.charge_efficiency
-    charge = blend.ramp_charge_limit(memory.charge, inputs.charge_power_w, power, p.blend, dt_s)
-    shares = blend.blend(demand, wanted, power, charge, speed, deceleration, p.blend)
-
-    by_friction = shares.friction_nm
-    if plausibility.motor_torque != _NONE and torque > 0.0:
-        o0, o1, o2, o3 = judge.opposing_torque(watch)
-        f0, f1, f2, f3 = by_friction
-        by_friction = (f0 + o0, f1 + o1, f2 + o2, f3 + o3)
-    pressure = friction.pressure_demands(by_friction, mu, brake_gains(p), p.friction_brake)
-    m0, m1, m2, m3 = shares.motor_nm
+    opposing_nm = ZERO if plausibility.motor_torque == _NONE else judge.opposing_torque(watch)
+    mu, charge, torque, motor_nm, pressure = actuate(
+        memory.friction, memory.charge, known.pad_friction, known.confidence, known.mass_factor, deceleration, factor,
+        wheel_speed, _usable_torque(inputs, lost, mode, plausibility.motor_torque), opposing_nm,
+        inputs.charge_power_w, dt_s, p,
+    )  # fmt: skip
+    m0, m1, m2, m3 = motor_nm
     c0, c1, c2, c3 = known.confidence
     silent = mode == BrakeMode.INIT or handed_over
     pressure_demand = UNKNOWN if silent else pressure
@@ -181,7 +157,7 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
         motor_demand_nm=motor_demand,
         mode=mode,
         faults=faults,
-        blending_factor=sum(shares.motor_nm) / torque if torque > 0.0 else 0.0,
+        blending_factor=sum(motor_nm) / torque if torque > 0.0 else 0.0,
         demanded_deceleration_mps2=math.nan if silent else deceleration,
         wheel_torque_nm=known.wheel_torque_nm,
         pad_friction=known.pad_friction,

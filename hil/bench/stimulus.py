@@ -25,6 +25,7 @@ from hil.faults.wire import SELECT_ID, start_messages, stop_messages
 from plant.manoeuvre import Trace, value_at
 
 BENCH_PHASE_NS = 2_500_000  # after the plant, before the controller: each hears the stimulus at its next tick
+_MANOEUVRE, _FINISHED = TruthMotion._fields.index("manoeuvre"), float(ManoeuvreState.FINISHED)
 _OPENING_FRAMES = 3  # fault commands without a fault: the receiver's sequence stands before one counts
 
 
@@ -67,7 +68,6 @@ class StimulusNode:
     Attributes
     ----------
     injects : whether it has sent a fault of frames or processes.
-    motion : the plant's last word about its motion.
     inbox, sent : what came with the last step, and what went.
     time_s : manoeuvre time, None before its start. What is sent now acts at ``next_s``, the plant's next tick.
     """
@@ -80,7 +80,6 @@ class StimulusNode:
         seed: int = 1,
     ) -> None:
         self.injects = False
-        self.motion: TruthMotion | None = None
         self.inbox: Sequence[Received] = ()
         self.sent: Sequence[Frame] = ()
         self.time_s: float | None = None
@@ -94,9 +93,15 @@ class StimulusNode:
         self._extra: list[Frame] = []
         self._lock = Lock()
         self._receiver = Receiver((TruthMotion,))
+        self._truth = self._receiver.values
         self._transmitter = Transmitter()
         for fault in faults:
             self.plan(fault)
+
+    @property
+    def motion(self) -> TruthMotion | None:
+        """The plant's last word about its motion."""
+        return self._receiver.latest(TruthMotion)
 
     @property
     def next_s(self) -> float:
@@ -106,7 +111,7 @@ class StimulusNode:
     @property
     def finished(self) -> bool:
         """Whether the manoeuvre is over."""
-        return self.motion is not None and self.motion.manoeuvre is ManoeuvreState.FINISHED
+        return bool(self._truth[_MANOEUVRE] == _FINISHED)
 
     def move(self, channel: Channel, value: float, within_s: float = 0.0) -> None:
         """Bring a channel to a value from now on, linearly within a time."""
@@ -163,12 +168,12 @@ class StimulusNode:
         with self._lock:
             self.inbox = inbox
             self._receiver.accept(now_ns, inbox)
-            self.motion = self._receiver.latest(TruthMotion)
-            if self.motion is not None:
-                if self._start_ns is None and self.motion.manoeuvre not in (None, ManoeuvreState.HOLDING):
+            if self._start_ns is None:
+                motion = self.motion
+                if motion is not None and motion.manoeuvre not in (None, ManoeuvreState.HOLDING):
                     self._start_ns = now_ns
-                if self._start_ns is not None:
-                    self.time_s = (now_ns - self._start_ns) * 1e-9
+            if self._start_ns is not None:
+                self.time_s = (now_ns - self._start_ns) * 1e-9
             extra, self._extra = self._extra, []
             frames = self._transmitter.frames(now_ns, self._outgoing()) + extra
             self.sent = frames
@@ -182,7 +187,7 @@ class StimulusNode:
             out.append(StimulusDriver(*map(self.value, _DRIVER)))
         if not self._traces.keys().isdisjoint(_ROAD):
             out.append(StimulusRoad(*map(self.value, _ROAD)))
-        opens = self.motion is not None and self._opening > 0
+        opens = self._opening > 0 and self.motion is not None
         if opens:
             self._opening -= 1
             out.append(FaultCommand(PhysicalFault.NONE, 0, 0))

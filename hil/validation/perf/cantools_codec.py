@@ -22,7 +22,7 @@ from dbc.compiled import PAYLOAD
 from dbc.contract import Message, MessageSpec, database_text, spec_of
 from dbc.exchange import Transmitter
 from dbc.frame import BusName, Frame
-from dbc.intake import BAD_IN_ROW, FRESH, LAST_VALID_NS, RECEIVED, VALID_IN_ROW, WORD, Intake
+from dbc.intake import BAD_IN_ROW, FRESH, LAST_VALID_NS, RECEIVED, VALID_IN_ROW, WELL, WORD, Intake
 from ecu import node
 from plant import reports
 
@@ -109,7 +109,7 @@ class _CantoolsIntake(Intake):
     def take(self, now_ns: int, begin: int, frames: NDArray[np.uint8]) -> int:
         if begin == 0:
             for memory in self.memory:
-                memory[FRESH] = 0
+                memory[FRESH] = memory[WELL] = 0
         return min(begin, len(frames) // (1 + PAYLOAD))
 
     def keep(self, now_ns: int, index: int, payload: bytes) -> None:

@@ -18,7 +18,7 @@ from dbc.contract import spec_of
 from dbc.e2e import check_value
 from dbc.exchange import Receiver
 from dbc.frame import BusName, Frame, LinkEvent, LinkState
-from dbc.intake import NO_COUNTER
+from dbc.intake import NO_COUNTER, WELL
 from dbc.messages import BRAKE_MESSAGES, BatteryStatus, BrakePedal, EhbPressureFront
 from hil.validation.perf.cantools_codec import cantools_spec
 
@@ -142,6 +142,7 @@ def test_any_stream_is_judged_as_one_by_one(seed, one_by_one):
             assert (got.message, got.odd_ns, got.bad, got.foreign) == (one.message, one.odd_ns, one.bad, one.foreign)
             assert same(receiver.of(kind).tolist(), as_numbers(got.message, got.spec))
             assert same(receiver.of(kind).tolist(), alone.of(kind).tolist())
+            assert got.memory[WELL] == (got.fresh and not got.bad_in_row and got.odd_ns != now_ns)
             usable += got.fresh
         assert (receiver.lost, receiver.corrupt) == (alone.lost, alone.corrupt)
         assert receiver.counters == [NO_COUNTER if (n := receiver.counter(kind)) is None else n for kind in READ]
