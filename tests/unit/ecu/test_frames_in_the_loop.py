@@ -1,6 +1,5 @@
 """Bad, foreign and old frames against the controller in the closed loop: modes, codes, and where the car stops."""
 
-import dataclasses
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from dbc.frame import BusName, Frame
 from dbc.messages import BrakeMode, BrakePedal, Fault, WheelSpeedFront
 from hil.bench.result import measure
 from hil.bench.virtual import own_nodes, simulate
-from hil.faults.frames import FrameFaults
+from hil.faults.catalogue import injection
 from hil.scenario.scenario import load_scenario
 
 BRAKING = 300  # tick in which it begins: 1.9 s into the stop at full pedal
@@ -33,12 +32,11 @@ class Heard:
 class Stop:
     """A stop with an altered inbox."""
 
-    def __init__(self, alter=lambda tick, inbox: inbox, **faults):
+    def __init__(self, alter=lambda tick, inbox: inbox, **shares):
         scenario = load_scenario("stop72_blend70")
-        if faults:
-            scenario = dataclasses.replace(scenario, frame_faults=(FrameFaults(**faults),))
+        faults = [injection(name, "ALL", share=share) for name, share in shares.items()]
         _, ecu = own_nodes(scenario, 1)
-        signals = simulate(scenario, ecu=Heard(ecu, alter))
+        signals = simulate(scenario, ecu=Heard(ecu, alter), faults=faults)
         self.codes = {trouble.code.name: trouble for trouble in ecu.trouble_codes}
         time_s, modes = signals.get("BRAKE_STATUS.MODE")
         self.modes = [BrakeMode(int(m)) for m in modes[time_s > 0.0]]
@@ -153,7 +151,7 @@ def test_one_frame_in_five_corrupt_changes_nothing(nominal):
 
 @pytest.mark.parametrize(
     "faults",
-    [{"late": 0.1}, *[pytest.param(one, marks=SLOW) for one in ({"drop": 0.01}, {"duplicate": 0.3}, {"stale": 0.02})]],
+    [{"late": 0.1}, *[pytest.param(one, marks=SLOW) for one in ({"lost": 0.01}, {"doubled": 0.3}, {"stale": 0.02})]],
 )
 def test_moderate_faults_of_frames_flip_nothing(nominal, faults):
     stop = Stop(**faults)
@@ -163,7 +161,7 @@ def test_moderate_faults_of_frames_flip_nothing(nominal, faults):
 
 @pytest.mark.slow
 def test_many_lost_frames_are_lost_frames_and_nothing_else(nominal):
-    stop = Stop(drop=0.2)
+    stop = Stop(lost=0.2)
     assert {name.rpartition("_")[2] for name in stop.codes} - {"none", "axles"} == {"lost"}
     assert not stop.faults & Fault.COMMUNICATION
     assert stop.distance_m < nominal.distance_m + 2.0

@@ -14,7 +14,7 @@ from ecu.law.types import Inputs
 from ecu.node import EcuNode
 from hil.bench.result import Signals, measure
 from hil.bench.virtual import simulate
-from hil.faults.frames import FrameFaults
+from hil.faults.catalogue import injection
 from hil.scenario.effects import read_effects
 from hil.scenario.scenario import Scenario, load_scenario, scenario_names
 from plant.effects.catalogue import BUILT_IN
@@ -73,11 +73,9 @@ class Stop(NamedTuple):
 def drive(name, change=None, from_s=MID_STOP_S, asked=None, dropped: Sequence[type] = ()) -> Stop:
     """Stop with a fault; frames of the types ``dropped`` are lost."""
     scenario = load_scenario(name)
-    if dropped:
-        lost = FrameFaults(drop=1.0, can_ids=frozenset(spec_of(t).can_id for t in dropped), from_s=from_s)
-        scenario = dataclasses.replace(scenario, frame_faults=(lost,))
+    lost = [injection("silent", spec_of(t).name, at_s=from_s) for t in dropped]
     node = LiedTo(scenario, change, from_s, asked)
-    signals = simulate(scenario, ecu=node)
+    signals = simulate(scenario, ecu=node, faults=lost)
     t, a = signals.get("TRUTH_MOTION.ACCELERATION")
     speed = signals.get("TRUTH_MOTION.SPEED")[1]
     td, demand = signals.get("BRAKE_STATUS.DEMANDED_DECELERATION")
