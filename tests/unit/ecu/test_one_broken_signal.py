@@ -52,10 +52,10 @@ class LiedTo(EcuNode):
         inputs = super()._inputs(now_ns)
         return self._change(inputs, self.time_s) if self._change and self.time_s >= self._from_s else inputs
 
-    def _outgoing(self, outputs):
+    def _tell(self, now_ns, outputs):
         if self._replaced and self.time_s >= self._from_s:
             outputs = self._replaced(outputs, self.time_s)
-        return super()._outgoing(outputs)
+        return super()._tell(now_ns, outputs)
 
 
 class Stop(NamedTuple):
@@ -146,7 +146,7 @@ def test_friction_takes_over_from_motors_that_do_not_give_what_they_are_asked_fo
     assert healthy(BLENDED).distance_m - 1.0 < stop.distance_m < most_m  # 126 m and more without supervision
     assert stop.lack_s <= 0.15
     assert stop.told & (Fault.MOTOR_FRONT | Fault.MOTOR_REAR)
-    assert not stop.told & ~(Fault.MOTOR_FRONT | Fault.MOTOR_REAR)
+    assert not stop.told & ~(Fault.MOTOR_FRONT | Fault.MOTOR_REAR | Fault.MOTOR_TORQUE)
 
 
 def test_friction_brakes_against_motors_that_drive():
@@ -159,7 +159,7 @@ def test_friction_brakes_against_motors_that_drive():
 def test_a_failing_current_is_found_though_it_comes_and_goes():
     gone = put("motor_current_a", 0, lambda now, t: 0.0 if t % 0.3 < 0.02 else now)
     stop = drive(BLENDED, gone)
-    assert stop.told == Fault.MOTOR_FRONT
+    assert stop.told == Fault.MOTOR_FRONT | Fault.MOTOR_TORQUE
     assert stop.ticks <= 60
 
 
@@ -217,7 +217,7 @@ def test_a_pedal_channel_that_spikes_in_one_frame_of_five_is_not_followed():
 CHANNELS = {
     "wheel": ("wheel_speed_rad_s", (0, 3), (20.0, 200.0), Fault.WHEEL_SPEED_FRONT | Fault.WHEEL_SPEED_REAR),
     "pressure": ("pressure_pa", (0, 3), (5e5, 50e5), Fault.EHB_PRESSURE_FRONT | Fault.EHB_PRESSURE_REAR),
-    "current": ("motor_current_a", (0, 3), (60.0, -300.0), Fault.MOTOR_FRONT | Fault.MOTOR_REAR),
+    "current": ("motor_current_a", (0, 3), (60.0, -300.0), Fault.MOTOR_FRONT | Fault.MOTOR_REAR | Fault.MOTOR_TORQUE),
     "acceleration": ("acceleration_x_mps2", (None,), (3.0, -5.0), Fault.BODY_MOTION),
     "pedal": ("pedal_2", (None,), (0.3, -0.3), Fault.PEDAL_2 | Fault.PEDAL_DISAGREE),
 }
