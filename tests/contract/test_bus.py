@@ -105,12 +105,16 @@ def test_a_frame_arrives_as_it_was_sent(join):
 @every_bus
 def test_order_is_kept(join):
     here, there = join(), join()
-    received = []
+    received, refused = [], 0
     for start in range(0, 3000, 30):
         here.send(frames(range(start, start + 30)))
-        received += there.receive()
-    received += receive_all(there, 3000 - len(received))
-    assert numbers(received) == list(range(3000))
+        received += there.receive(0.01)
+        if here.name.startswith("virtual"):  # its driver's threads may be run over, where the machine is slow
+            refused += lost(here.receive(), LinkState.TX_OVERFLOW)
+    received += receive_all(there, 3000 - len(received) - refused)
+    arrived = numbers(received)
+    assert arrived == sorted(arrived)
+    assert len(arrived) + refused == 3000
 
 
 @every_bus
@@ -208,13 +212,16 @@ def test_a_burst_arrives_or_is_reported_lost(join):
         here.send(frames(range(start, start + 50)))
     received = receive_all(there, 1)
     here.send(frames([20_000]))  # a gap shows with what follows it
-    # a driver in threads refuses what it has no room for; on a loopback the receiver learns of it too
-    refused = lost(here.receive(), LinkState.TX_OVERFLOW) if here.name.startswith("virtual") else 0
-    sent = 20_001 - refused
-    received += receive_all(there, sent - len([f for f in received if isinstance(f, Frame)]) - lost(received))
+    refused, give_up = 0, time.monotonic() + PATIENCE_S
+    while len(numbers(received)) + lost(received) + refused < 20_001 and time.monotonic() < give_up:
+        received += there.receive(0.2)
+        if here.name.startswith(
+            "virtual"
+        ):  # what a driver in threads does not take; on a loopback the receiver is told
+            refused += lost(here.receive(), LinkState.TX_OVERFLOW)
     arrived = numbers(received)
     assert arrived == sorted(arrived)
-    assert len(arrived) + lost(received) == sent
+    assert len(arrived) + lost(received) + refused == 20_001
 
 
 @every_bus
