@@ -36,7 +36,7 @@ def record(parameters: Any) -> NDArray[np.void]:
     """Plain numbers of a parameter set by name, as compiled functions take them; shape (1,)."""
     values = {f.name: getattr(parameters, f.name) for f in fields(parameters)}
     numbers = {name: float(value) for name, value in values.items() if isinstance(value, (bool, int, float))}
-    return np.array([tuple(numbers.values())], np.dtype([(name, "f8") for name in numbers]))
+    return np.array([tuple(numbers.values())], np.dtype((np.record, [(name, "f8") for name in numbers])))
 
 
 def entry(function: F) -> F:

@@ -204,9 +204,11 @@ class _Checkout:
 def beside(folder: str) -> list[Row]:
     """The whole loop beside that of another checkout of the project; the two take turns, each in its own process."""
     with contextlib.ExitStack() as stack:
-        ours, other = (_Checkout(path) for path in (Path(__file__).resolve().parents[3], Path(folder).resolve()))
-        stack.callback(ours.close)
-        stack.callback(other.close)
+        pair = []
+        for path in (Path(folder).resolve(), Path(__file__).resolve().parents[3]):
+            pair.append(_Checkout(path))
+            stack.callback(pair[-1].close)
+        other, ours = pair
         name, other_is = "closed loop, 10 ms", f"the checkout in {folder}"
         return [paired(name, ours.per_tick_us, other.per_tick_us, other_is, "us", pairs=BESIDE_PAIRS)]
 
