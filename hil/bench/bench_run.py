@@ -76,7 +76,7 @@ class BenchRun(ABC):
         self.out = out
         self.log = out / "recording.log"
         self.alive_at_end = 0
-        self.stimulus_node = StimulusNode(scenario.blending, scenario.faults)
+        self.stimulus_node = StimulusNode(scenario.blending, scenario.faults, seed=seed)
         self.hold_timeout_ns = HOLD_TIMEOUT_NS
         self._seed = seed
         self._say = say

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from dbc.bench_messages import EcuTiming, PlantTiming
 from dbc.exchange import Transmitter
 from dbc.frame import Node
-from hil.bench.port import Port
+from hil.bench.port import OwnedNode, Port
 from hil.bus.channel import resolve
+from hil.faults.line import FaultyNode
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop, run_node
 from hil.rt.process import StopSignal, end_with_parent, say_ready
@@ -65,8 +66,9 @@ def serve(
         end_with_parent()
     stop = StopSignal()
     bus = resolve(bus)
-    node = make_node()
-    with Port.open(bus, role.senders if senders is None else senders) as port:
+    plays = tuple(role.senders if senders is None else senders)
+    node = FaultyNode(OwnedNode(make_node(), plays), plays, real=True)
+    with Port.open(bus) as port:
         say(f"{role.name}: on {bus}, every {NODE_PERIOD_NS / 1e6:g} ms")
         for grant in request_realtime() if realtime else [request_timer_slack()]:
             if realtime or not grant.granted:

@@ -18,7 +18,6 @@ def run(args: argparse.Namespace) -> int:
     """Run the vehicle until it is told to stop; it drives the scenario once, when a controller is there."""
     from dbc.frame import Node
     from hil.bench.node_process import NODE_PERIOD_NS, PLANT, serve
-    from hil.faults.frames import on_faulty_line
     from hil.scenario.scenario import load_scenario
     from plant.model import compile_model
     from plant.node import PlantNode
@@ -27,8 +26,7 @@ def run(args: argparse.Namespace) -> int:
 
     def make() -> Node:
         compile_model()
-        node = PlantNode(scenario.plant, scenario.manoeuvre, args.seed, NODE_PERIOD_NS, **scenario.effects.for_node())
-        return on_faulty_line(node, scenario.frame_faults, args.seed)
+        return PlantNode(scenario.plant, scenario.manoeuvre, args.seed, NODE_PERIOD_NS, **scenario.effects.for_node())
 
     serve(
         PLANT, make, args.bus, ready_fd=args.ready_fd, realtime=args.realtime, say=lambda s: print(s, file=sys.stderr)
