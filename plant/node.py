@@ -3,13 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dbc.bench_messages import FaultCommand, ManoeuvreState, PhysicalFault, StimulusDriver, StimulusRoad
+from dbc.bench_messages import FaultCommand, ManoeuvreState, StimulusDriver, StimulusRoad
 from dbc.contract import Message, spec_of
 from dbc.exchange import Receiver
 from dbc.frame import Frame, Received
 from plant import driver
 from plant.demands import DEMANDS, Demands
 from plant.external_nodes import ExternalNodes
+from plant.faults import PhysicalFaults
 from plant.injection.bank import NO_TERMS
 from plant.injection.plugin import NO_PLUGINS
 from plant.injection.sensing_chain import Chain
@@ -21,7 +22,7 @@ from plant.parameters.plant import PlantParameters
 from plant.reports import Reports
 from plant.road import road_table
 from plant.sensors import Sensors
-from plant.vectors import INPUT, OUTPUT, STATE, S, U, X, Y
+from plant.vectors import INPUT, OUTPUT, STATE, U, X, Y
 
 SENDERS = frozenset({"EHB", "IWM", "BATTERY", "SENSORS", "DRIVER"})
 STIMULUS_TIMEOUT_NS = 100_000_000
@@ -88,10 +89,10 @@ class PlantNode:
         self._reports = Reports(play, self._p)
         self.manoeuvre_start_ns: int | None = None
         self._last_ns: int | None = None
-        self._notice_ends_ns = 0
         self._layout, self._of_manoeuvre = layout, theta
         self.switch_effects(theta)
         self._receiver = Receiver((*DEMANDS, StimulusDriver, StimulusRoad))
+        self._broken = PhysicalFaults(self._switch, parameters.battery.notice_s)
         self._faults = Receiver((FaultCommand,))
         self._fault_id = spec_of(FaultCommand).can_id
         self._demands = Demands(parameters.ehb)
@@ -109,13 +110,12 @@ class PlantNode:
         self._receiver.accept(now_ns, inbox)
         self._external_nodes.accept(now_ns, inbox)
         self._take_faults(now_ns, inbox)
-        if now_ns >= self._notice_ends_ns:
-            self._switch[S.battery_accepts] = self._switch[S.battery_announces]
+        self._broken.keep_time(now_ns)
         pressure_pa, motor_nm = self._demands.update(self._receiver, now_ns, self._pedal)
         self._follow_manoeuvre(now_ns, elapsed_ns)
         self._drive(now_ns, pressure_pa, motor_nm)
         sensed = self._sensors.sample(self._x, self._y, self._pedal, self._steering_rad)
-        brakes = [demand.state for demand in self._demands.pressure]
+        brakes = self._broken.told([demand.state for demand in self._demands.pressure])
         return self._reports.frames(now_ns, self._x, self._y, self._switch, sensed, brakes, self.state, self._receiver)
 
     @property
@@ -155,17 +155,8 @@ class PlantNode:
                 continue
             self._faults.accept(now_ns, [item])
             command = self._faults.latest(FaultCommand)
-            if command is None or not self._faults.receptions[FaultCommand].fresh:
-                continue
-            well = 0.0 if command.active else 1.0
-            if command.fault is PhysicalFault.MOTOR_DEAD:
-                for i in range(4):
-                    if (command.wheels or 0) >> i & 1:
-                        self._switch[S.motor_alive + i] = well
-            elif command.fault is PhysicalFault.BATTERY_REFUSES_CHARGE and self._switch[S.battery_announces] != well:
-                self._switch[S.battery_announces] = well
-                notice_s = self._parameters.battery.notice_s if command.active else 0.0
-                self._notice_ends_ns = now_ns + round(notice_s * 1e9)
+            if command is not None and self._faults.receptions[FaultCommand].fresh:
+                self._broken.take(now_ns, command, self._x)
 
     def _follow_manoeuvre(self, now_ns: int, elapsed_ns: int) -> None:
         manoeuvre = self._manoeuvre
@@ -214,6 +205,8 @@ class PlantNode:
         if start is not None:
             pressure = [value_at(t, time_s) if t else v for t, v in zip(direct.pressure_pa, pressure, strict=True)]
             motor = [value_at(t, time_s) if t else v for t, v in zip(direct.motor_nm, motor, strict=True)]
+        if self._broken.alters:
+            pressure, motor = self._broken.act(pressure, motor, self._x)
         u[U.pressure_demand_pa : U.pressure_demand_pa + 4] = pressure
         u[U.motor_demand_nm : U.motor_demand_nm + 4] = motor
         self._external_nodes.enter(now_ns, u)

@@ -13,7 +13,6 @@ from types import TracebackType
 from typing import Self
 
 from dbc.bench_messages import ManoeuvreState, TruthMotion
-from dbc.contract import contract
 from dbc.frame import BusName
 from hil.bench.recorder import RecorderError
 from hil.bench.stimulus import StimulusNode
@@ -127,10 +126,13 @@ class BenchRun(ABC):
         self.out = out
         self.log = out / RECORDING
         self.alive_at_end = 0
-        self.stimulus_node = StimulusNode(scenario.blending, scenario.faults)
+        self.stimulus_node = StimulusNode(scenario.blending, scenario.faults, seed=seed)
         self.watch = Watch(say)
-        for faults in scenario.frame_faults:
-            self.watch.excuse((BusName.VEHICLE, can_id) for can_id in faults.can_ids or contract(BusName.VEHICLE).by_id)
+        for fault in scenario.faults:
+            if fault.target.can_ids:
+                self.watch.excuse((BusName.VEHICLE, can_id) for can_id in fault.target.can_ids)
+            elif not fault.target.wheels:
+                self.watch.excuse()
         self.hold_timeout_ns = HOLD_TIMEOUT_NS
         self._seed = seed
         self._say = say

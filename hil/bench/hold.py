@@ -19,7 +19,7 @@ def parts_of_the_bench(scenario: Scenario) -> Iterator[str]:
     if scenario.blending:
         yield "the blending factor"
     if scenario.faults:
-        yield "faults (" + ", ".join(dict.fromkeys(event.fault.name.lower() for event in scenario.faults)) + ")"
+        yield "faults (" + ", ".join(dict.fromkeys(fault.kind.name for fault in scenario.faults)) + ")"
 
 
 class HoldsForBench:

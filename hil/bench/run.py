@@ -21,8 +21,8 @@ from hil.bench.real import RealBench
 from hil.bench.result import RunResult, Signals, measure
 from hil.bench.run_report import build_report
 from hil.bench.virtual import VirtualBench
-from hil.bus.timed.line import is_timed, open_line
 from hil.bench.watch import Finding
+from hil.bus.timed.line import is_timed, open_line
 from hil.errors import INTERRUPTED_EXIT_CODE, BrakebenchError, Verdict
 from hil.log.export.tables import export
 from hil.log.frames import FrameTable, Recording

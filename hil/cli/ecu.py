@@ -21,14 +21,13 @@ def run(args: argparse.Namespace) -> int:
     from hil.bench.hold import notice
     from hil.bench.node_process import ECU, NODE_PERIOD_NS, serve
     from hil.bus.channel import resolve
-    from hil.faults.frames import on_faulty_line
     from hil.scenario.scenario import load_scenario
 
     scenario = load_scenario(args.scenario)
 
     def make() -> Node:
         EcuNode(scenario.ecu, NODE_PERIOD_NS).step(0, [])  # compiles what the first tick would compile
-        return on_faulty_line(EcuNode(scenario.ecu, NODE_PERIOD_NS), scenario.frame_faults, args.seed)
+        return EcuNode(scenario.ecu, NODE_PERIOD_NS)
 
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)

@@ -20,7 +20,6 @@ def run(args: argparse.Namespace) -> int:
     from hil.bench.hold import awaiting_bench, notice
     from hil.bench.node_process import NODE_PERIOD_NS, PLANT, serve
     from hil.bus.channel import resolve
-    from hil.faults.frames import on_faulty_line
     from hil.scenario.scenario import load_scenario
     from plant.model import compile_model
     from plant.node import PlantNode
@@ -30,8 +29,7 @@ def run(args: argparse.Namespace) -> int:
     def make() -> Node:
         compile_model()
         node = PlantNode(scenario.plant, scenario.manoeuvre, args.seed, NODE_PERIOD_NS, **scenario.effects.for_node())
-        own = node if args.ready_fd is not None else awaiting_bench(node, scenario)
-        return on_faulty_line(own, scenario.frame_faults, args.seed)
+        return node if args.ready_fd is not None else awaiting_bench(node, scenario)
 
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)

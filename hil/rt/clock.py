@@ -16,6 +16,11 @@ process_cpu_time_ns = time.process_time_ns
 """Processor time of this process, all its threads, ns: the same, for work that is shared out over threads."""
 
 
+def step_wall_clock(seconds: float) -> None:
+    """Step the machine's time of day (needs the right to, and ends every other program's notion of it)."""
+    time.clock_settime(time.CLOCK_REALTIME, time.time() + seconds)
+
+
 class Clock(Protocol):
     """What a loop needs to know of time."""
 
