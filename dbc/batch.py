@@ -2,30 +2,26 @@
 
 The numbers of all of them are one vector, SI values in the order of the fields; NaN means not available. Bytes are
 those of `dbc.codec`, message for message: the same arithmetic in the same order, raw values rounded half to even.
-
-``NUMBA_DISABLE_JIT=1`` runs the same source uncompiled, with the same bytes.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
-from itertools import accumulate, compress, repeat
+from itertools import accumulate, compress, pairwise, repeat
 from struct import Struct
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from dbc import e2e
 from dbc.codec import CodecError, Field
+from dbc.compiled import CRC, PAYLOAD, compiled
 from dbc.contract import Message, MessageSpec, spec_of
 from dbc.frame import Frame
 
 Vector = NDArray[np.float64]
 Octets = NDArray[np.uint8]
-PAYLOAD = 8  # bytes set aside for each message
 LIMIT = 1e300  # beyond is not a finite number to the codec
-_CRC_TABLE = np.array(e2e.CRC_TABLE, dtype=np.int64)
 _COUNTERS = e2e.COUNTER_MODULUS
 _frame = partial(tuple.__new__, Frame)  # without the Python-made __new__ of a NamedTuple
 
@@ -43,11 +39,7 @@ _SENDING = np.dtype(
 """How the kernel sees a message, and what it remembers of it: slot of its cycle last sent in, next counter."""
 
 
-def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    return cast(Callable[..., Any], njit(cache=True, nogil=True, error_model="numpy")(function))
-
-
-@_compiled
+@compiled
 def _write(now_ns: int, values: Vector, fields: Any, messages: Any, due: Octets, payloads: Octets) -> int:
     """Write the payloads of all messages that are due, in ``due`` which these are; count up their counters.
 
@@ -87,7 +79,7 @@ def _write(now_ns: int, values: Vector, fields: Any, messages: Any, due: Octets,
             payloads[first + 1] |= message["counter"]
             crc = message["crc_start"]
             for i in range(1, length):
-                crc = _CRC_TABLE[crc ^ payloads[first + i]]
+                crc = CRC[crc ^ payloads[first + i]]
             payloads[first] = crc
         message["counter"] = message["counter"] + 1 if message["counter"] + 1 < _COUNTERS else 0
     return -1
@@ -109,7 +101,7 @@ class Batch:
     def __init__(self, types: Iterable[type[Message]]) -> None:
         self._specs = [spec_of(kind) for kind in types]
         ends = list(accumulate((len(spec.fields) for spec in self._specs), initial=0))
-        self._slices = {s.type: slice(a, b) for s, a, b in zip(self._specs, ends, ends[1:], strict=False)}
+        self._slices = {s.type: slice(*ends_of) for s, ends_of in zip(self._specs, pairwise(ends), strict=True)}
         self.values: Vector = np.full(ends[-1], np.nan)
         self._fields = np.array([_row(m, s, f) for m, s in enumerate(self._specs) for f in s.fields], _FIELD)
         self._messages = np.array([_sending(spec) for spec in self._specs], _SENDING)
@@ -121,6 +113,11 @@ class Batch:
     def of(self, message_type: type[Message]) -> Vector:
         """Where the values of a message lie in `values`, to be written to; shape (fields,)."""
         return self.values[self._slices[message_type]]
+
+    def due(self, message_type: type[Message], now_ns: int) -> bool:
+        """Whether `frames` would send a message at ``now_ns``."""
+        message = self._messages[list(self._slices).index(message_type)]
+        return bool(message["cycle_ns"] == 0 or message["slot"] != now_ns // message["cycle_ns"])
 
     def frames(self, now_ns: int) -> list[Frame]:
         """Frames of the messages that are due, protected with their next counters."""

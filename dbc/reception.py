@@ -4,8 +4,24 @@ The counter 0..14 alone takes any stream for fresh that counts on, however old i
 time of the contract tells more: which counter is due at a time, and how many frames may come.
 """
 
-from dbc.contract import Message, MessageSpec
+from dbc.compiled import PAYLOAD
+from dbc.contract import Message
 from dbc.e2e import COUNTER_MODULUS, Checker, Status
+from dbc.intake import (
+    BAD_IN_ROW,
+    COUNTER,
+    FRESH,
+    IN_SEQUENCE,
+    KNOWN,
+    KNOWN_NS,
+    LAST_VALID_NS,
+    NO_COUNTER,
+    RECEIVED,
+    USUAL_NS,
+    VALID_IN_ROW,
+    WORD,
+    Intake,
+)
 
 # found faster than the enum's attributes: the way of every frame
 _OK, _OK_SOME_LOST, _SYNC, _REPEATED = Status.OK, Status.OK_SOME_LOST, Status.SYNC, Status.REPEATED
@@ -15,60 +31,105 @@ SILENT_CYCLES = COUNTER_MODULUS  # without any frame for the counter's length, a
 ADOPTED_CYCLES = 1000  # 10 s at 10 ms, longer than a stop: a sender that restarted within the counter's length
 
 
+class _Number:
+    """A number of a reception that is in the memory which compiled code counts in, too."""
+
+    def __init__(self, place: int) -> None:
+        self._place = place
+
+    def __get__(self, reception: "Reception", _: type["Reception"]) -> int:
+        return reception.memory[self._place]
+
+    def __set__(self, reception: "Reception", value: int) -> None:
+        reception.memory[self._place] = value
+
+
 class Reception:
-    """State of one received message.
+    """State of one received message; judges the frames that `dbc.intake` does not find usual.
 
     A message with a cycle time is watched in time, too: see `_judge`.
 
     Attributes
     ----------
-    message : the last usable message, None before the first.
-    fresh : whether the last call of `Receiver.accept` brought a usable one.
+    spec, index : the message, and its place among those of the receiver.
+    memory : numbers that compiled code counts in, too, by the places of `dbc.intake`.
     valid_in_row : usable frames since the last unusable one.
     bad_in_row : unusable frames since the last usable one.
-    last_valid_ns : tick of the last usable frame, None before the first.
     odd_ns : tick of the three counts below, -1 before any.
     bad : frames in that tick with a wrong check value or length, or with the bytes of the frame before.
     foreign : valid frames in that tick that this stream cannot have brought.
     doubled : frames in that tick that came twice.
     """
 
-    def __init__(self, spec: MessageSpec) -> None:
-        self.spec = spec
+    valid_in_row, bad_in_row = _Number(VALID_IN_ROW), _Number(BAD_IN_ROW)
+    _usual_ns = _Number(USUAL_NS)  # -1 while frames are refused: each is then judged
+    _known_ns = _Number(KNOWN_NS)  # tick of the last frame that belongs to the stream
+
+    def __init__(self, intake: Intake, index: int) -> None:
+        self.spec, self.index, self.memory = intake.specs[index], index, intake.memory[index]
+        spec = self.spec
         self.checker = None if spec.data_id is None else Checker(spec.data_id, spec.length)
         self._check = self._check_length if self.checker is None else self.checker.check
-        self._decode = spec.decode
-        self.message: Message | None = None
-        self.status = Status.NO_NEW_DATA
-        self.fresh = False
-        self.valid_in_row = 0
-        self.bad_in_row = 0
-        self.last_valid_ns: int | None = None
+        self._intake = intake
+        self._decoded: tuple[int, Message | None] = (0, None)  # a word and what it says
         self.odd_ns = -1
         self.bad = self.foreign = self.doubled = 0
         self._cycle_ns = 0 if self.checker is None else spec.cycle_ns
-        self._usual_ns = self._cycle_ns  # -1 while frames are refused: each is then judged
-        self._known_ns = 0  # tick of the last frame that belongs to the stream, and its bytes
-        self._known = b""
+        self._usual_ns = self._cycle_ns
         self._ahead_ns = 0  # by its counter, of its earliest phase so far; at most 0, negative where late
         self._stray_ns = self._stray_since_ns = self._stray_counter = -1
 
+    @property
+    def message(self) -> Message | None:
+        """The last usable message, None before the first."""
+        if not self.memory[RECEIVED]:
+            return None
+        word = self.memory[WORD]
+        if word != self._decoded[0] or self._decoded[1] is None:
+            self._decoded = word, self.spec.decode(_bytes(word)[: self.spec.length])
+        return self._decoded[1]
+
+    @property
+    def fresh(self) -> bool:
+        """Whether the last call of `Receiver.accept` brought a usable message."""
+        return bool(self.memory[FRESH])
+
+    @property
+    def last_valid_ns(self) -> int | None:
+        """Tick of the last usable frame, None before the first."""
+        return self.memory[LAST_VALID_NS] if self.memory[RECEIVED] else None
+
+    @property
+    def counter(self) -> int | None:
+        """Last alive counter consumed, None before the first."""
+        counter = self.memory[COUNTER]
+        return None if counter == NO_COUNTER else counter
+
     def accept(self, now_ns: int, data: bytes) -> None:
         """Check one payload and keep its message when it is usable."""
+        if self.checker is not None:
+            self.checker.counter = self.counter
         status = self._check(data)
         if (status is not _OK or now_ns - self._known_ns != self._usual_ns) and self._cycle_ns:
             status = self._judge(now_ns, data, status)
-        self.status = status
+        if self.checker is not None:
+            counter = self.checker.counter
+            self.memory[COUNTER] = NO_COUNTER if counter is None else counter
+            self.memory[IN_SEQUENCE] = self.checker.in_sequence
         if status is _OK or status is _OK_SOME_LOST:
-            self.message = self._decode(data)
-            self.fresh = True
-            self.valid_in_row += 1
-            self.bad_in_row = 0
-            self.last_valid_ns = self._known_ns = now_ns
-            self._known = data
+            self._intake.keep(now_ns, self.index, data)
         elif status is not _REPEATED or self._known_ns != now_ns or data != self._known:
             self.valid_in_row = 0
             self.bad_in_row += 1
+
+    @property
+    def _known(self) -> bytes:
+        """Bytes of the last frame that belongs to the stream."""
+        return _bytes(self.memory[KNOWN])[: self.spec.length]
+
+    def _remember(self, now_ns: int, data: bytes) -> None:
+        self._known_ns = now_ns
+        self.memory[KNOWN] = int.from_bytes(data, "little", signed=len(data) == PAYLOAD)
 
     def _judge(self, now_ns: int, data: bytes, status: Status) -> Status:
         """Hold a frame against the time, where its check or its time is not the usual.
@@ -102,7 +163,7 @@ class Reception:
             fits = gap <= 2 * cycle_ns
             ahead_ns = min(ahead_ns, 0)
         elif status is _WRONG_SEQUENCE:
-            fits = step * cycle_ns <= since_ns + cycle_ns
+            fits = ahead_ns <= cycle_ns
         else:
             fits = step == 1 or 2 * ahead_ns <= cycle_ns
         if fits:
@@ -110,7 +171,7 @@ class Reception:
                 self._note(now_ns, foreign=1)  # more frames than cycles
             self._ahead_ns = min(ahead_ns, 0)
             self._usual_ns = cycle_ns
-            self._known_ns, self._known = now_ns, data
+            self._remember(now_ns, data)
             return status
         silent_ns = now_ns - max(self._known_ns, self._stray_ns)
         if silent_ns >= SILENT_CYCLES * cycle_ns or self._adopted(now_ns, counter):
@@ -126,7 +187,7 @@ class Reception:
         """Follow a stream from this frame on."""
         self._ahead_ns = 0
         self._usual_ns = self._cycle_ns
-        self._known_ns, self._known = now_ns, data
+        self._remember(now_ns, data)
         return status
 
     def _adopted(self, now_ns: int, counter: int) -> bool:
@@ -148,3 +209,7 @@ class Reception:
 
     def _check_length(self, data: bytes) -> Status:
         return Status.OK if len(data) == self.spec.length else Status.WRONG_CRC
+
+
+def _bytes(word: int) -> bytes:
+    return word.to_bytes(PAYLOAD, "little", signed=True)

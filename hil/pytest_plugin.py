@@ -84,9 +84,9 @@ class FaultAccess:
     @property
     def names(self) -> tuple[str, ...]:
         """Faults by name."""
-        from hil.faults.physical import FAULT_NAMES
+        from hil.faults.catalogue import names
 
-        return FAULT_NAMES
+        return names()
 
 
 class RecordingAccess:

@@ -41,7 +41,6 @@ from plant.layout import Layout, Vector
 from plant.sensors import SENSED, N
 from plant.vectors import OUTPUT, STATE, P, S, Y
 
-NO_COUNTER = 15  # none yet
 DERIVED = Layout(
     "Derived",
     {"current_a": 4, "motor_state": 4, "ehb_state": 2, "manoeuvre": 1, "demand_counter": 4, "lost": 1, "corrupt": 1},
@@ -158,9 +157,9 @@ class Reports:
         Parameters
         ----------
         x, y, switch, sensed : vectors ``STATE``, ``OUTPUT``, ``SWITCH``, ``SENSED``.
-        brakes : what each axle follows.  manoeuvre : where it is.  receiver : of the demands.
+        brakes : what each axle follows.  manoeuvre : where it is.  receiver : of the demands first.
         """
-        counters = [NO_COUNTER if (n := receiver.counter(kind)) is None else n for kind in DEMANDS]
+        counters = receiver.counters[: len(DEMANDS)]
         self._derived[_SET_BY_NODES] = [*brakes, manoeuvre, *counters, receiver.lost, receiver.corrupt]
         gather(x, y, switch, self._p, sensed, self._derived, self._sources, self._batch.values)
         return self._batch.frames(now_ns)

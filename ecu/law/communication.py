@@ -8,7 +8,7 @@ not believed is believed again after a time without any odd frame.
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ecu.law.types import WELL, Health, Source
+from ecu.law.types import OTHERS_WELL, Health, Source
 from ecu.parameters.control import SupervisionParameters
 
 
@@ -49,10 +49,9 @@ def judge_streams(
 ) -> Streams:
     """Advance what is held against each stream by one tick (order of `Source`); the same object where nothing is."""
     if streams is ALL_CLEAN:
-        for h in health:
-            if h is not WELL and (h.bad or h.foreign or h.doubled):
-                break
-        else:
+        last = health[-1]
+        well = not (last.bad or last.foreign or last.doubled)
+        if well and (health[:-1] == OTHERS_WELL or not any(h.bad or h.foreign or h.doubled for h in health)):
             return streams
     judged = tuple([_judge(stream, h, out, p, dt_s) for stream, h, out in zip(streams, health, timed_out, strict=True)])
     return ALL_CLEAN if judged == ALL_CLEAN else judged

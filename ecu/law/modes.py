@@ -13,13 +13,15 @@ from dbc.messages import BrakeMode, Fault
 from ecu.law.base_brake import PedalReading
 from ecu.law.communication import ALL_CLEAN, Streams
 from ecu.law.trouble_codes import BIT, bits, consequence
-from ecu.law.types import PLAUSIBLE, Brake, Inputs, Plausibility, Source
+from ecu.law.types import OTHERS_WELL, PLAUSIBLE, Brake, Inputs, Plausibility, Source
 from ecu.parameters.control import SupervisionParameters
 
 _LOST, _NOT_AVAILABLE = bits("{}_lost"), bits("{}_not_available")
 _CORRUPT, _SECOND_SENDER, _OUT_OF_TIME = bits("{}_corrupt"), bits("{}_second_sender"), bits("{}_out_of_time")
 _SPEED_IMPLAUSIBLE, _PRESSURE_IMPLAUSIBLE = bits("wheel_speed_{}_implausible"), bits("pressure_{}_implausible")
 _MOTOR_FAILED, _MOTOR_TORQUE = bits("motor_{}_failed"), bits("motor_{}_torque")
+_NONE_OUT = (False,) * len(Source)
+_BATTERY_OUT = (*_NONE_OUT[1:], True)
 _BRAKE_FAILED = (BIT["brake_front_failed"], BIT["brake_rear_failed"])
 
 
@@ -42,10 +44,11 @@ def initial_modes() -> ModeMemory:
 
 def timed_out_sources(inputs: Inputs, p: SupervisionParameters) -> tuple[bool, ...]:
     """Whether each source has timed out (never received counts as that)."""
-    limit_s = p.timeout_s
-    lost = [not h.age_s < limit_s for h in inputs.health]
-    lost[Source.BATTERY] = not inputs.health[Source.BATTERY].age_s < p.battery_timeout_s
-    return tuple(lost)
+    health, limit_s = inputs.health, p.timeout_s
+    battery = not health[-1].age_s < p.battery_timeout_s
+    if health[:-1] == OTHERS_WELL:
+        return _BATTERY_OUT if battery else _NONE_OUT
+    return (*[not h.age_s < limit_s for h in health[:-1]], battery)
 
 
 def lost_sources(timed_out: tuple[bool, ...], streams: Streams) -> tuple[bool, ...]:
@@ -151,6 +154,7 @@ def supervise(
     memory: ModeMemory,
     inputs: Inputs,
     timed_out: tuple[bool, ...],
+    lost: tuple[bool, ...],
     streams: Streams,
     pedal: PedalReading,
     plausibility: Plausibility,
@@ -161,19 +165,18 @@ def supervise(
 
     Parameters
     ----------
-    timed_out : sources that have timed out, from `timed_out_sources`.
+    timed_out, lost : sources that have timed out, and those not to be used, from `timed_out_sources`, `lost_sources`.
     streams : what is held against their frames, from `judge_streams`.
     pedal : what the two channels say.
     plausibility : what does not agree with the rest.
     """
     active = 0
-    lost = lost_sources(timed_out, streams)
     whole = _all_there(inputs)
     if not whole:
         active |= _missing(inputs, lost)
     if True in timed_out or streams is not ALL_CLEAN:
         active |= _of_streams(timed_out, streams)
-    if plausibility != PLAUSIBLE:
+    if plausibility is not PLAUSIBLE:
         active |= _implausible(plausibility)
     if active or not whole or pedal.channel_1_lost or pedal.channel_2_lost:
         active = _together(inputs, lost, pedal, plausibility, active)
@@ -186,11 +189,12 @@ def supervise(
     allowed, faults = consequence(active) if active else (BrakeMode.NORMAL, Fault.NONE)
 
     valid_counts, most = memory.valid_counts, p.frames_to_upgrade
-    bad = [h for h in inputs.health if h.bad_in_row]
+    health = inputs.health
+    bad = health[-1].bad_in_row or (health[:-1] != OTHERS_WELL and any(h.bad_in_row for h in health))
     if bad or True in lost or min(valid_counts) < most:
         valid_counts = tuple(
             0 if gone or h.bad_in_row else min(run + h.fresh, most)
-            for run, h, gone in zip(valid_counts, inputs.health, lost, strict=True)
+            for run, h, gone in zip(valid_counts, health, lost, strict=True)
         )
     since_upgrade_s = memory.since_upgrade_s + dt_s
     mode = memory.mode

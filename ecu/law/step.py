@@ -108,7 +108,7 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     )
     if math.isfinite(pedal.travel):
         deceleration = base_brake.reference_deceleration(pedal.travel, p.pedal)
-        if streams[Source.PEDAL].suspect:  # it may be another's: the driver's may be the larger
+        if streams is not ALL_CLEAN and streams[Source.PEDAL].suspect:  # perhaps another's: the driver's may be larger
             deceleration = max(deceleration, *memory.recent_mps2)
         without_pedal_s = 0.0
     else:
@@ -135,7 +135,7 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     if bits or stuck or slow != estimator.PLAUSIBLE or pedal.channels_disagree or True in pedal.implausible:
         plausibility = judge.plausibility_of(bits, slow, stuck, pedal.implausible, pedal.channels_disagree)
     mode_memory, active, faults = modes.supervise(
-        memory.modes, inputs, timed_out, streams, pedal, plausibility, p.supervision, dt_s
+        memory.modes, inputs, timed_out, lost, streams, pedal, plausibility, p.supervision, dt_s
     )
     mode = mode_memory.mode
     troubles = memory.troubles

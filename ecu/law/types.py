@@ -44,6 +44,8 @@ class Health(NamedTuple):
 
 
 WELL = Health(0.0, True, 0)
+OTHERS_WELL = (WELL,) * (len(Source) - 1)
+"""Health of all sources but the slow one, the battery, which is the last: compared at once, it is mostly this."""
 
 
 class Brake(IntEnum):

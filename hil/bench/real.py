@@ -126,7 +126,7 @@ class RealBench(BenchRun):
                     if isinstance(item, Frame) and not item.extended and (item.bus, item.can_id) in ours
                 )
         if heard:
-            specs = [contract(bus).by_id[can_id] for bus, can_id in sorted(heard)]
+            specs = [contract(bus).by_id[can_id] for bus in BusName for on, can_id in sorted(heard) if on is bus]
             listed = ", ".join(f"0x{spec.can_id:X} {spec.name}" for spec in specs[:_MOST_NAMED])
             more = f" and {len(specs) - _MOST_NAMED} more" if len(specs) > _MOST_NAMED else ""
             raise OtherSenderError(

@@ -33,6 +33,7 @@ _SI = {f"{spec.name}.{field.signal}": field.si_per_unit for spec in _SPECS.value
     for signal in (CRC_SIGNAL, COUNTER_SIGNAL)
 }
 _WRONG_LENGTH = "wrong length"
+_NEVER_NS = 1 << 62  # a message without a cycle has no gaps
 _WHY = {FrameUse.CORRUPT: "corrupt", FrameUse.REPEATED: "repeated", FrameUse.OUT_OF_SEQUENCE: "out of sequence"}
 
 
@@ -105,9 +106,11 @@ class Signals:
 
 
 def _use_of(spec: MessageSpec, recording: Recording, rows: NDArray[np.int64]) -> NDArray[np.uint8]:
-    data, length = recording.frames.data[rows], recording.frames.length[rows]
+    frames = recording.frames
+    data, length = frames.data[rows], frames.length[rows]
     if spec.data_id is not None:
-        return use_of_frames(data, length, spec.data_id, spec.length)
+        gap_ns = 3 * spec.cycle_ns or _NEVER_NS  # a shorter gap leaves the sequence as it is
+        return use_of_frames(data, length, frames.time_ns[rows], spec.data_id, spec.length, gap_ns)
     return np.where(length == spec.length, FrameUse.USED, FrameUse.CORRUPT).astype(np.uint8)
 
 
@@ -162,8 +165,8 @@ class RunResult:
         return asdict(self)
 
 
-def measure(signals: Signals) -> RunResult:
-    """Measure a recorded run."""
+def measure(signals: Signals, bit_rate: int | None = None) -> RunResult:
+    """Measure a recorded run; ``bit_rate`` of the vehicle bus where it is not the one that its database states."""
     braking = _braking_window(signals)
     distance = time = mean = demanded = energy = None
     if braking is not None:
@@ -187,7 +190,7 @@ def measure(signals: Signals) -> RunResult:
         frames_corrupt=sum(_last(signals, f"{node}_RECEPTION.FRAMES_CORRUPT") for node in nodes),
         overruns=sum(_overruns(signals, node) for node in nodes),
         lateness_ms=max((_lateness(signals, node) for node in nodes), key=lambda lateness: lateness.p99),
-        bus_load=_bus_load(signals),
+        bus_load=_bus_load(signals, bit_rate or contract(BusName.VEHICLE).bit_rate),
         link_states=dict(Counter(event.state.value for event in link_events(signals))),
     )
 
@@ -237,7 +240,7 @@ def _vehicle_frames(signals: Signals) -> NDArray[np.intp]:
     return np.flatnonzero(ours & ((frames.flags & FrameFlag.ERROR) == 0))
 
 
-def _bus_load(signals: Signals) -> float:
+def _bus_load(signals: Signals, bit_rate: int) -> float:
     """Share of the bit rate; a stuffed 11-bit frame takes 47 + 8 n + floor((34 + 8 n - 1) / 4) bits (Tindell 1994)."""
     frames, rows = signals.decoded.recording.frames, _vehicle_frames(signals)
     rows = rows[signals.decoded.time_s[rows] >= signals.start_s]
@@ -247,7 +250,7 @@ def _bus_load(signals: Signals) -> float:
     bits = int((47 + payload_bits + (33 + payload_bits) // 4).sum())
     t_s = signals.decoded.time_s[rows]
     span_s = float(t_s.max() - t_s.min())  # 0 where a run ended in its first tick
-    return bits / (contract(BusName.VEHICLE).bit_rate * span_s) if span_s > 0.0 else 0.0
+    return bits / (bit_rate * span_s) if span_s > 0.0 else 0.0
 
 
 def link_events(signals: Signals) -> list[LinkEvent]:

@@ -145,7 +145,7 @@ def finish(bench_run: BenchRun, seed: int, provenance: Mapping[str, object], fai
     scenario = bench_run.scenario
     missing: list[str] = []
     signals = _recorded(bench_run, missing)
-    result = measure(signals)
+    result = measure(signals, bench_run.bit_rate)
     met = list(expected(scenario, result, signals))
     findings = list(_judgements(bench_run, met, failure))
     verdict, reason = judge(findings)

@@ -16,7 +16,7 @@ from dbc.bench_messages import (
     StimulusRoad,
     TruthMotion,
 )
-from dbc.contract import Message, spec_of
+from dbc.contract import Message
 from dbc.exchange import Receiver, Transmitter
 from dbc.frame import BusName, Frame, Received
 from hil.faults.fault import FROM_THE_FIRST_TICK, MOST_SEEDS, Injection, Side
@@ -38,6 +38,8 @@ class Channel(StrEnum):
     FRICTION_LEFT = "friction_left"
     FRICTION_RIGHT = "friction_right"
     GRADE = "grade"
+
+    __hash__ = str.__hash__  # that of an enum is slow, and asked several times a tick
 
 
 _DRIVER = (Channel.PEDAL, Channel.SPEED, Channel.STEERING)
@@ -66,7 +68,7 @@ class StimulusNode:
     ----------
     injects : whether it has sent a fault of frames or processes.
     motion : the plant's last word about its motion.
-    inbox : what came with the last step.
+    inbox, sent : what came with the last step, and what went.
     time_s : manoeuvre time, None before its start. What is sent now acts at ``next_s``, the plant's next tick.
     """
 
@@ -80,6 +82,7 @@ class StimulusNode:
         self.injects = False
         self.motion: TruthMotion | None = None
         self.inbox: Sequence[Received] = ()
+        self.sent: Sequence[Frame] = ()
         self.time_s: float | None = None
         self._traces: dict[Channel, Trace] = {Channel.BLENDING: blending} if blending else {}
         self._waiting: list[_Planned] = []
@@ -91,7 +94,6 @@ class StimulusNode:
         self._extra: list[Frame] = []
         self._lock = Lock()
         self._receiver = Receiver((TruthMotion,))
-        self._motion_id = spec_of(TruthMotion).can_id
         self._transmitter = Transmitter()
         for fault in faults:
             self.plan(fault)
@@ -136,7 +138,7 @@ class StimulusNode:
             first = events_of(injection)[0]
             end = _switched(FaultEvent(at_s, first.fault, first.wheels, active=False))
         else:
-            end = _Planned(at_s, tuple(stop_messages(injection)), injection.target.nodes == {"ECU"})
+            end = _Planned(at_s, tuple(stop_messages(injection)), "ECU" in injection.target.nodes)
         with self._lock:
             kept = [one for one in self._waiting if one.at_s < at_s or not _same_fault(one, end)]
             self._waiting = sorted([*kept, end], key=lambda one: one.at_s)
@@ -148,7 +150,7 @@ class StimulusNode:
             injection = replace(injection, seed=(257 * self._seed + self._seeded) % MOST_SEEDS)
             self._seeded += 1
         messages = tuple(start_messages(injection))
-        return [_Planned(injection.at_s - injection.lead_s, messages, injection.target.nodes == {"ECU"})]
+        return [_Planned(injection.at_s - injection.lead_s, messages, "ECU" in injection.target.nodes)]
 
     def also_send(self, frames: Iterable[Frame]) -> None:
         """Send frames of any sender, as they are, with the next step."""
@@ -160,7 +162,7 @@ class StimulusNode:
         """Take what the nodes sent, and send what acts next."""
         with self._lock:
             self.inbox = inbox
-            self._receiver.accept(now_ns, [item for item in inbox if item[1] == self._motion_id])  # few of many
+            self._receiver.accept(now_ns, inbox)
             self.motion = self._receiver.latest(TruthMotion)
             if self.motion is not None:
                 if self._start_ns is None and self.motion.manoeuvre not in (None, ManoeuvreState.HOLDING):
@@ -168,7 +170,9 @@ class StimulusNode:
                 if self._start_ns is not None:
                     self.time_s = (now_ns - self._start_ns) * 1e-9
             extra, self._extra = self._extra, []
-            return self._transmitter.frames(now_ns, self._outgoing()) + extra
+            frames = self._transmitter.frames(now_ns, self._outgoing()) + extra
+            self.sent = frames
+            return frames
 
     def _outgoing(self) -> list[Message]:
         out: list[Message] = []

@@ -76,7 +76,7 @@ def simulate(
     frames: list[Frame] = []
     times: list[int] = []
     taking_part = members(scenario, plant or own_plant, ecu or own_ecu, stimulus_node)
-    for step in lockstep(taking_part) if line is None else line.lockstep(taking_part):
+    for step in lockstep(taking_part) if line is None else line.lockstep(taking_part, (_STIMULUS_NODE,)):
         if line is None:
             frames += step.frames
             times += [step.now_ns] * len(step.frames)
@@ -168,7 +168,7 @@ class VirtualBench(BenchRun):
         super().__init__(scenario, out, seed, say, stop)
         self._line = line
         if line is not None:
-            self.spec, self.note = line.spec, line.note
+            self.spec, self.note, self.bit_rate = line.spec, line.note, line.bus.bit_rate
         self._nodes = (plant, ecu)
         self._tap = _Tap()
         self._recorder: Recorder | None = None
@@ -182,7 +182,9 @@ class VirtualBench(BenchRun):
             given or own for given, own in zip(self._nodes, own_nodes(self.scenario, self._seed), strict=True)
         )
         taking_part = members(self.scenario, _Process(PLANT, plant), _Process(ECU, ecu), self.stimulus_node)
-        self._steps = lockstep(taking_part) if self._line is None else self._line.lockstep(taking_part)
+        self._steps = (
+            lockstep(taking_part) if self._line is None else self._line.lockstep(taking_part, (_STIMULUS_NODE,))
+        )
         self.alive_at_end = 2
 
     def _pass_period(self) -> int:

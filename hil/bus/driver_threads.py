@@ -25,7 +25,7 @@ OPEN_S = 10.0  # a driver may sleep after it has opened its port (slcan: 2 s), o
 CLOSE_S = 0.5  # then the node ends without the driver
 _HANDOVER_NS = 2_000_000  # how long a sender may be held up, so that a burst does not overtake the driver
 _MOST_WAITING = 1024  # frames; at 500 kbit/s a bus carries about 4000 a second
-_MOST_AGE_NS = 50_000_000  # older than the time-outs of those who wait for it: as good as lost, or worse
+MOST_AGE_NS = 50_000_000  # older than the time-outs of those who wait for it: as good as lost, or worse
 _TURN_S = 0.05  # of a reader that nothing can wake
 _WAITED_NS = 200_000  # a driver that hands a message over at once had it already
 _PAUSE_S = 0.001  # between two looks at a driver that does not wait
@@ -240,11 +240,12 @@ class DriverThreads:
             driver.send(message, self._timeout)
         except Exception as error:  # as in reading
             self._told(LinkState.TX_OVERFLOW, 1, str(error))
+            discard_output(driver)  # half a line, with nothing but older ones before it
             if is_gone(error):
                 self._lose(driver, error)
 
     def _late(self, began_ns: int) -> bool:
-        return monotonic_ns() - began_ns > _MOST_AGE_NS
+        return monotonic_ns() - began_ns > MOST_AGE_NS
 
     def _await_room(self, driver: "can.BusABC") -> bool:
         """Wait until the driver's descriptor takes something, at most for the age of a frame.
@@ -252,7 +253,7 @@ class DriverThreads:
         pyserial, under slcan, would spin on a port that takes nothing. What the port still holds then is older than
         the frame that waits, and is taken back.
         """
-        if has_room(driver, _MOST_AGE_NS * 1e-6):
+        if has_room(driver, MOST_AGE_NS * 1e-6):
             return True
         discard_output(driver)
         return False

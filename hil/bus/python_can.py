@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Self
 from dbc.frame import BusName, Frame, LinkEvent, LinkState, Received
 from hil.bus.bus import BusSpec
 from hil.bus.can_frame import pack_frame
-from hil.bus.driver_threads import DriverThreads
+from hil.bus.driver_threads import MOST_AGE_NS, DriverThreads
 from hil.bus.error_frame import append_event, link_events
 from hil.bus.wall_stamps import WallStamps
 from hil.rt.clock import monotonic_ns
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     import can
 
 _MOST_RECEIVED = 1 << 16  # frames and events that wait to be received; beyond it they are lost and counted
-_WAITING_DRIVERS = {"slcan", "canalystii"}  # with a timeout of 0 these write half a line, or fail although they sent
+# with a timeout of 0 these write half a line, or fail although they sent; None waits
+_SEND_TIMEOUTS_S: dict[str, float | None] = {"slcan": MOST_AGE_NS * 1e-9, "canalystii": None}
 
 
 class PythonCanBus:
@@ -50,9 +51,8 @@ class PythonCanBus:
         self._overrun = 0
         self._closed = False
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
-        timeout = None if spec.kind in _WAITING_DRIVERS else 0.0
         try:
-            self._driver = DriverThreads(spec, self._take, self._tell, timeout)
+            self._driver = DriverThreads(spec, self._take, self._tell, _SEND_TIMEOUTS_S.get(spec.kind, 0.0))
         except BaseException:
             os.close(self._wake)
             raise

@@ -31,7 +31,7 @@ _ANCILLARY_BYTES = 128
 _STAMP_SLACK_NS = 1_000_000  # the kernel stamps a frame before it queues it
 _MOST_FRAMES = 1 << 14  # per receive: a babbling bus holds nobody up
 _QUEUE_FULL = {errno.ENOBUFS, errno.EAGAIN}
-_FIRST_RETRY_NS, _LAST_RETRY_NS = 10_000_000, 100_000_000  # a try is a bind: frames flow 0.1 s after the link is up
+_FIRST_RETRY_NS, _LAST_RETRY_NS = 10_000_000, 50_000_000  # a try is a bind: it costs nothing
 
 
 class SocketcanBus:

@@ -2,10 +2,8 @@
 
 from collections.abc import Callable
 
-from hil.rt.clock import monotonic_ns, wall_time_ns
+from hil.rt.clock import clocks_ns, monotonic_ns, wall_time_ns
 
-_READINGS = 3  # of both clocks: the closest pair counts, since a thread may lose the processor in between
-_CLOSE_NS = 100_000
 _SLACK_NS = 20_000_000  # an adapter may hand a frame over later than the window it came in (USB, a busy driver)
 _STEP_NS = 1_000_000  # a smaller change is slewing or reading noise: at most 500 ppm, adjtimex(2)
 _FOREIGN_NS = 1_000_000_000  # further outside than this, a stamp counts from somewhere else
@@ -34,7 +32,7 @@ class WallStamps:
         self._monotonic = monotonic
         self._wall = wall
         self._slack_ns = slack_ns
-        self._looked_ns, self._offset_ns = self._look()
+        self._looked_ns, self._offset_ns = clocks_ns(self._monotonic, self._wall)
         self._used_ns = self._offset_ns
         self._stepped = False
         self._begin_ns = self._last_ns = self._looked_ns
@@ -48,7 +46,7 @@ class WallStamps:
         """
         if drained:
             self._begin_ns = self._looked_ns
-        self._looked_ns, offset_ns = self._look()
+        self._looked_ns, offset_ns = clocks_ns(self._monotonic, self._wall)
         self._stepped = abs(offset_ns - self._offset_ns) > _STEP_NS
         self._offset_ns = offset_ns
         return self._looked_ns
@@ -67,15 +65,3 @@ class WallStamps:
                     break
         self._last_ns = max(self._last_ns, best_ns)
         return self._last_ns
-
-    def _look(self) -> tuple[int, int]:
-        """Monotonic time, and how far the time of day is ahead of it."""
-        best_ns = (1 << 62, 0, 0)
-        for _ in range(_READINGS):
-            before_ns = self._monotonic()
-            wall_ns = self._wall()
-            after_ns = self._monotonic()
-            best_ns = min(best_ns, (after_ns - before_ns, after_ns, wall_ns - (before_ns + after_ns) // 2))
-            if best_ns[0] < _CLOSE_NS:
-                break
-        return best_ns[1:]

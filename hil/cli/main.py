@@ -21,6 +21,7 @@ COMMANDS = (
     "ecu",
     "plant",
     "record",
+    "inject",
     "replay",
     "decode",
     "convert",

@@ -11,9 +11,12 @@ from hil.bus.channel import bench_channel
 from hil.bus.open import open_bus
 from hil.cli.options import add_bus, add_ready_fd
 from hil.errors import BrakebenchError
+from hil.faults.line import FaultyListener
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop
 from hil.rt.process import StopSignal, end_with_parent, say_ready
+
+TOLD_S = 1.0  # more than a clock that is kept right drifts in a recording
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -35,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
             vehicle = stack.enter_context(open_bus(args.bus, BusName.VEHICLE))
             bench = stack.enter_context(open_bus(bench_channel(args.bus), BusName.BENCH))
         try:
-            recorder = Recorder(args.out, [vehicle, bench])
+            recorder = Recorder(args.out, [vehicle, FaultyListener(bench, ("RECORDER",))])
         except RecorderError as error:  # nothing has begun: wrong use
             raise BrakebenchError(str(error)) from error
         try:
@@ -48,5 +51,7 @@ def run(args: argparse.Namespace) -> int:
         finally:
             recorder.close()
     lost = f", {recorder.lost} lost on the way" if recorder.lost else ""
+    if abs(set_s := recorder.clock_set_ns() * 1e-9) > TOLD_S:
+        print(f"the time of day was set by {set_s:+.1f} s meanwhile; stamps go on from the start's", file=sys.stderr)
     print(f"{recorder.frames} frames recorded to {args.out}{lost}", file=sys.stderr)
     return 0

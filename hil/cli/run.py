@@ -15,7 +15,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--virtual",
         action="store_true",
-        help="virtual time: both nodes in this process, as fast as it goes; the same seed gives the same bytes",
+        help="virtual time: both nodes in this process, as fast as it goes; the same seed gives the same bytes; "
+        "with --bus timed[:BITRATE][,bit_error_rate=P][,queue=fifo] on a CAN bus with real bit times",
     )
     parser.add_argument(
         "--without",

@@ -2,7 +2,7 @@
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -93,6 +93,7 @@ class FaultKind:
     of_target : whether trouble codes (and the pedal's modes) follow from the target.
     in_virtual_time : whether it exists there; else real processes only.
     lead : name of the parameter by which it begins to listen before it acts.
+    refuses : why a target cannot have it; empty where it can.
     """
 
     number: int
@@ -109,6 +110,7 @@ class FaultKind:
     in_virtual_time: bool = True
     lead: str = ""
     usual_values: tuple[tuple[str, float], ...] = ()
+    refuses: Callable[[Target], str] | None = None
 
     @property
     def all_parameters(self) -> tuple[Parameter, ...]:
@@ -131,6 +133,9 @@ class FaultKind:
             A target that it does not take, an unknown parameter, or a number out of its bounds.
         """
         what = target_named(self.usual[0] if target is None else target, self.takes, self.name)
+        why = "" if self.refuses is None else self.refuses(what)
+        if why:
+            raise FaultError(f"fault {self.name}: {what} {why}; choose another signal")
         given = dict(values or {})
         known = {p.name: p for p in self.all_parameters}
         for name, value in given.items():

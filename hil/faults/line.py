@@ -6,7 +6,7 @@ from typing import Protocol
 from dbc.frame import Frame, Node, Received
 from hil.faults.act import Act
 from hil.faults.catalogue import BY_NUMBER
-from hil.faults.fault import FaultError, Injection
+from hil.faults.fault import Injection
 from hil.faults.wire import Commands
 
 
@@ -49,10 +49,7 @@ class FaultLine:
         make = BY_NUMBER[injection.kind.number].act
         if make is None or self._nodes.isdisjoint(injection.target.nodes):
             return
-        try:
-            self.acts[injection.key] = make(injection, now_ns, self._real)
-        except FaultError:  # a signal that has no such value: refused where it was asked for
-            return
+        self.acts[injection.key] = make(injection, now_ns, self._real)
 
     def step(self, now_ns: int, inbox: list[Received], node: Node) -> list[Frame]:
         """One tick of the node under the armed faults, in the order in which they were armed."""
@@ -88,3 +85,27 @@ class FaultyNode:
             if self.line.acts:
                 return self.line.step(now_ns, inbox, self._node)
         return self._node.step(now_ns, inbox)
+
+
+class Source(Protocol):
+    """What is listened to."""
+
+    def receive(self, timeout_s: float) -> list[Received]:
+        """Return what arrived since the last call."""
+        ...
+
+
+class FaultyListener:
+    """A bus that is only listened to, by a process that faults befall: the recorder's bench bus."""
+
+    def __init__(self, bus: Source, nodes: Iterable[str]) -> None:
+        self._bus = bus
+        self._line = FaultLine(nodes, real=True)
+
+    def receive(self, timeout_s: float) -> list[Received]:
+        """What arrived; commands among it act at once."""
+        heard = self._bus.receive(timeout_s)
+        self._line.take(0, heard)
+        for key in list(self._line.acts):
+            self._line.acts.pop(key).hear(0, [])
+        return heard

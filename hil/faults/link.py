@@ -110,18 +110,20 @@ _DOWN = Expected(_MODES, _EVERYTHING, detect_ms=10.0, motor_zero_ms=50.0)
 _LOSES = Expected(_MODES | NORMAL | {BrakeMode.DEGRADED}, _EVERYTHING)
 
 
-def _kind(number: int, name: str, text: str, side: Side, reaction: Expected) -> FaultKind:
+def _kind(number: int, name: str, text: str, side: Side, reaction: Expected, for_s: float) -> FaultKind:
     return FaultKind(
-        number, name, "link", text, _ROW, side, Takes.PROCESS, ("ECU", "PLANT"), reaction, of_target=False
+        number, name, "link", text, _ROW, side, Takes.PROCESS, ("ECU", "PLANT"), reaction, of_target=False,
+        usual_values=(("for_s", for_s),),
     )  # fmt: skip
 
 
 FAULTS: tuple[tuple[FaultKind, type[Act]], ...] = (
     (_kind(40, "bus_off", "The node is off the vehicle bus: neither sends nor hears; restarted at the end.",
-           Side.RECEIVER, _DOWN), BusOff),
-    (_kind(41, "unplugged", "The node's adapter is gone, and comes back at the end.", Side.RECEIVER, _DOWN), Unplugged),
+           Side.RECEIVER, _DOWN, 0.3), BusOff),
+    (_kind(41, "unplugged", "The node's adapter is gone, and comes back at the end.", Side.RECEIVER, _DOWN, 0.3),
+     Unplugged),
     (_kind(42, "queue_full", "Frames of the node are not taken by its transmit queue, and do not come later.",
-           Side.SENDER, _LOSES), QueueFull),
-    (_kind(43, "rx_overflow", "Frames are lost in the node's receive queue; others get them.", Side.RECEIVER, _LOSES),
-     RxOverflow),
+           Side.SENDER, _LOSES, 0.05), QueueFull),
+    (_kind(43, "rx_overflow", "Frames are lost in the node's receive queue; others get them.", Side.RECEIVER, _LOSES,
+           0.05), RxOverflow),
 )  # fmt: skip

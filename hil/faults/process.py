@@ -105,15 +105,18 @@ _GONE = Expected(_MODES, _EVERYTHING, detect_ms=DETECT_MS, motor_zero_ms=50.0, b
 _SHORT = Expected(_MODES | NORMAL, _EVERYTHING)
 
 
-def _kind(number: int, name: str, text: str, reaction: Expected, row: str = _ROW) -> FaultKind:
+def _kind(number: int, name: str, text: str, reaction: Expected, for_s: float, row: str = _ROW) -> FaultKind:
     return FaultKind(
-        number, name, "process", text, row, Side.PROCESS, Takes.PROCESS, ("ECU", "PLANT"), reaction, of_target=False
+        number, name, "process", text, row, Side.PROCESS, Takes.PROCESS, ("ECU", "PLANT"), reaction, of_target=False,
+        usual_values=(("for_s", for_s),) if for_s else (),
     )  # fmt: skip
 
 
 FAULTS: tuple[tuple[FaultKind, type[Act]], ...] = (
-    (_kind(90, "process_killed", "The node's process is killed (SIGKILL).", _GONE), Killed),
-    (_kind(91, "process_stopped", "The node's process stands still for `for_s` (SIGSTOP, SIGCONT).", _SHORT), Stopped),
-    (_kind(92, "process_busy", "One tick of the node takes `for_s`: an overrun.", _SHORT), Busy),
-    (_kind(93, "process_late", "The node joins `for_s` after the others.", _SHORT, "start order, late join"), Late),
+    (_kind(90, "process_killed", "The node's process is killed (SIGKILL).", _GONE, 0.0), Killed),
+    (_kind(91, "process_stopped", "The node's process stands still for `for_s` (SIGSTOP, SIGCONT).", _SHORT, 0.05),
+     Stopped),
+    (_kind(92, "process_busy", "One tick of the node takes `for_s`: an overrun.", _SHORT, 0.05), Busy),
+    (_kind(93, "process_late", "The node joins `for_s` after the others.", _SHORT, 0.5, "start order, late join"),
+     Late),
 )  # fmt: skip

@@ -127,13 +127,14 @@ class _Counter(FrameAct):
             self.valid[frame.can_id] = counter
             return (frame,)
         if frame.can_id not in self._shift:
-            last = self.valid.get(frame.can_id, counter) if self._goes_on == 1 else self.sent[frame.can_id]
+            last = self.valid[frame.can_id] if self._goes_on == 1 else self.sent[frame.can_id]
             self._shift[frame.can_id] = last + 1 - counter
         return (self._with(frame, (counter + self._shift[frame.can_id]) % COUNTER_MODULUS),)
 
     def alter(self, frame: Frame) -> Sequence[Frame]:
         """The frame with another counter."""
         self._shift.pop(frame.can_id, None)
+        self.valid.setdefault(frame.can_id, ((frame.data[1] & 0x0F) - 1) % COUNTER_MODULUS)
         counter = self.sent[frame.can_id] = self.counter(frame)
         return (self._with(frame, counter),)
 
@@ -161,11 +162,11 @@ class CounterValue(_Counter):
 
 
 class CounterFrozen(_Counter):
-    """The last one before; that of the first frame where none was seen."""
+    """The last one before."""
 
     def counter(self, frame: Frame) -> int:
         """The one remembered."""
-        return self.valid.setdefault(frame.can_id, frame.data[1] & 0x0F)
+        return self.valid[frame.can_id]
 
 
 class CounterRandom(_Counter):
@@ -189,7 +190,7 @@ class CounterJump(_Counter):
 
     def counter(self, frame: Frame) -> int:
         """The last one sent and the step."""
-        before = self.sent.get(frame.can_id, self.valid.get(frame.can_id, frame.data[1] & 0x0F))
+        before = self.sent.get(frame.can_id, self.valid[frame.can_id])
         return (before + int(self.injection.number("step"))) % COUNTER_MODULUS
 
 
@@ -227,7 +228,17 @@ def _kind(
     usual: tuple[str, ...] = _WHERE,
 ) -> FaultKind:  # fmt: skip
     return FaultKind(
-        number, name, "protection", text, row, Side.SENDER, Takes.MESSAGES, usual, reaction, (SHARE, *parameters)
+        number,
+        name,
+        "protection",
+        text,
+        row,
+        Side.SENDER,
+        Takes.MESSAGES,
+        usual,
+        reaction,
+        (SHARE, *parameters),
+        usual_values=(("for_s", 0.5),),
     )
 
 

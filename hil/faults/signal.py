@@ -3,14 +3,14 @@
 Values are raw ones on the wire in the end: a value goes to the nearest step, and to the end of what the bits can hold.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from dbc.frame import BusName, Frame
 from dbc.raw import RawSignal, protected_again, raw_signals
 from hil.faults.act import Act, FrameAct, message_of
 from hil.faults.bus import FOUND, NORMAL
-from hil.faults.fault import Expected, FaultError, FaultKind, Injection, Parameter, Side
-from hil.faults.targets import Takes
+from hil.faults.fault import Expected, FaultKind, Injection, Parameter, Side
+from hil.faults.targets import Takes, Target
 
 
 class _Signal(FrameAct):
@@ -20,7 +20,7 @@ class _Signal(FrameAct):
         super().__init__(injection, armed_ns, real)
         (self.can_id,) = injection.target.can_ids
         self.spec = message_of(self.can_id)
-        self.signal: RawSignal = raw_signals(BusName.VEHICLE)[self.spec.name][injection.target.signal]
+        self.signal = _signal_of(injection.target)
         self.before: int | None = None
 
     def keep(self, frame: Frame) -> Sequence[Frame]:
@@ -128,11 +128,6 @@ class Random(_Signal):
 class NotAvailable(_Signal):
     """Says that it is not available."""
 
-    def __init__(self, injection: Injection, armed_ns: int, real: bool = False) -> None:
-        super().__init__(injection, armed_ns, real)
-        if self.signal.sna is None:
-            raise FaultError(f"fault {injection.kind.name}: {injection.target} has no value that means not available")
-
     def raw(self, raw: int) -> int:
         """That value."""
         return raw if self.signal.sna is None else self.signal.sna
@@ -146,8 +141,6 @@ class OutOfRange(_Signal):
         s = self.signal
         self._spans = [(s.lowest, s.first), (s.last + 1, s.highest + 1)]  # half open
         self._number = sum(b - a for a, b in self._spans)
-        if self._number <= (s.sna is not None):
-            raise FaultError(f"fault {injection.kind.name}: {injection.target} has no raw value beyond its range")
 
     def raw(self, raw: int) -> int:
         """A random one of them."""
@@ -161,10 +154,28 @@ class OutOfRange(_Signal):
                 return first + index
 
 
+def _signal_of(target: Target) -> RawSignal:
+    (can_id,) = target.can_ids
+    return raw_signals(BusName.VEHICLE)[message_of(can_id).name][target.signal]
+
+
+def without_sna(target: Target) -> str:
+    """Why a signal cannot say that it is not available."""
+    return "has no value that means not available" if _signal_of(target).sna is None else ""
+
+
+def without_beyond(target: Target) -> str:
+    """Why a signal cannot be out of its range."""
+    s = _signal_of(target)
+    number = s.first - s.lowest + s.highest - s.last
+    return "" if number > (s.sna is not None) else "has no raw value beyond its range"
+
+
 OFFSET_SHARE, STEP_SHARE, NOISE_SHARE = 0.1, 0.2, 0.02
 """What offset, step and noise are of the signal's range where nothing is given: far beyond what a sensor may do."""
 
 PLAUSIBLE_MS = 100.0  # sensors that tell a wrong value: found within ten cycles (an assumption of the project)
+SPIKES_MS = 500.0  # ten spikes of one frame in five
 _ROW, _NONE = "implausible sensor", "not available, out of range"
 _SENSORS = (
     "WHEEL_SPEED_FRONT.WHEEL_SPEED_FL", "WHEEL_SPEED_REAR.WHEEL_SPEED_RR", "BRAKE_PEDAL.PEDAL_TRAVEL_1",
@@ -183,9 +194,12 @@ def _optional(name: str, text: str) -> Parameter:
 
 def _kind(
     number: int, name: str, text: str, reaction: Expected, *parameters: Parameter,
-    usual: tuple[str, ...] = _SENSORS, row: str = _ROW,
+    usual: tuple[str, ...] = _SENSORS, row: str = _ROW, refuses: Callable[[Target], str] | None = None,
 ) -> FaultKind:  # fmt: skip
-    return FaultKind(number, name, "signal", text, row, Side.SENDER, Takes.SIGNAL, usual, reaction, parameters)
+    return FaultKind(
+        number, name, "signal", text, row, Side.SENDER, Takes.SIGNAL, usual, reaction, parameters,
+        usual_values=(("for_s", 0.5),), refuses=refuses,
+    )  # fmt: skip
 
 
 FAULTS: tuple[tuple[FaultKind, type[Act]], ...] = (
@@ -199,13 +213,14 @@ FAULTS: tuple[tuple[FaultKind, type[Act]], ...] = (
     (_kind(53, "signal_stuck", "A signal stays at its last value.", _MAY_BE_FOUND), Stuck),
     (_kind(54, "signal_step", "A signal jumps and stays there.", _FOUND,
            _optional("step", "the jump; left out: a fifth of the range")), Step),
-    (_kind(55, "signal_spike", "One frame in `every` has another value.", _FOUND,
+    (_kind(55, "signal_spike", "One frame in `every` has another value.", Expected(FOUND, detect_ms=SPIKES_MS),
            Parameter("every", "", 1.0, 1e5, 5.0, "frames from spike to spike"),
            _optional("value", "the value; left out: the upper end of the range")), Spike),
     (_kind(56, "signal_noise", "Noise beside the signal.", _MAY_BE_FOUND,
            Parameter("sigma", "SI", 0.0, 1e9, None, "standard deviation; left out: a fiftieth of the range")), Noise),
     (_kind(57, "signal_random", "A random value of the range in each frame.", _FOUND), Random),
-    (_kind(58, "signal_not_available", "A signal says that it is not available (SNA).", _FOUND, usual=_ANY, row=_NONE),
-     NotAvailable),
-    (_kind(59, "signal_out_of_range", "Raw values beyond the range.", _FOUND, usual=_ANY, row=_NONE), OutOfRange),
+    (_kind(58, "signal_not_available", "A signal says that it is not available (SNA).", _FOUND, usual=_ANY, row=_NONE,
+           refuses=without_sna), NotAvailable),
+    (_kind(59, "signal_out_of_range", "Raw values beyond the range.", _FOUND, usual=_ANY, row=_NONE,
+           refuses=without_beyond), OutOfRange),
 )  # fmt: skip

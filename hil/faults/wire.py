@@ -1,23 +1,18 @@
-"""Armed faults on the bench bus: FAULT_PARAMETER and FAULT_SELECT, and what a process reads from them.
-
-A command counts by its check value alone, not by its place in a sequence: several may come in one tick, and from a
-second sender (`brakebench inject`) beside the bench.
-"""
+"""Armed faults on the bench bus: FAULT_PARAMETER and FAULT_SELECT, and what a process reads from them."""
 
 from collections.abc import Iterable, Sequence
 from decimal import Decimal
 from typing import NamedTuple
 
 from dbc.bench_messages import FaultAction, FaultParameter, FaultSelect
+from dbc.commands import CommandReader
 from dbc.contract import Message, spec_of
-from dbc.e2e import check_value
-from dbc.frame import BusName, Frame, LinkEvent, Received
+from dbc.frame import Received
 from hil.faults.catalogue import BY_NUMBER
 from hil.faults.fault import FaultError, Injection
 from hil.faults.targets import WHOLE_MESSAGE, target_coded
 
 SELECT_ID = spec_of(FaultSelect).can_id
-_PARAMETER_ID = spec_of(FaultParameter).can_id
 _DIGITS = 8
 STOP_ALL = FaultSelect(0, FaultAction.STOP, 0, WHOLE_MESSAGE, 0)
 
@@ -61,16 +56,12 @@ class Commands:
 
     def __init__(self) -> None:
         self._parameters: dict[int, dict[int, float]] = {}
+        self._reader = CommandReader((FaultParameter, FaultSelect))
 
     def read(self, inbox: Sequence[Received]) -> list[Command]:
-        """Commands that came, in order; what is not valid, or names what is not known, is passed over."""
+        """Commands that came, in order; what names a fault or target that is not known is passed over."""
         found: list[Command] = []
-        for item in inbox:
-            if item[1] != SELECT_ID and item[1] != _PARAMETER_ID:  # nearly all
-                continue
-            if isinstance(item, LinkEvent) or item.bus is not BusName.BENCH or item.extended:
-                continue
-            message = _valid(item)
+        for message in self._reader.read(inbox):
             if isinstance(message, FaultParameter):
                 self._note(message)
             elif isinstance(message, FaultSelect):
@@ -98,12 +89,3 @@ class Commands:
             yield Command(entry.kind.on(target.name, seed=message.seed or 0, values=values), None)
         except FaultError:  # a number out of its bounds: of no sender of ours
             return
-
-
-def _valid(frame: Frame) -> Message | None:
-    spec = spec_of(FaultSelect if frame.can_id == SELECT_ID else FaultParameter)
-    data = frame.data
-    if len(data) != spec.length or spec.data_id is None or data[0] != check_value(spec.data_id, data):
-        return None
-    message: Message = spec.decode(data)
-    return message

@@ -65,7 +65,7 @@ def test_a_scenario_of_the_library(bench):
 @pytest.mark.parametrize(("ask", "says"), [
     (lambda b: b.drive("72 mph"), "expected a number with km/h or m/s"),
     (lambda b: b.pedal(60), "expected a travel from 0 to 1"),
-    (lambda b: b.inject("motor_ill"), "expected one of motor_dead"),
+    (lambda b: b.inject("motor_ded"), "did you mean 'motor_dead'"),
     (lambda b: b.inject("motor_dead", wheel="left"), "expected fl, fr, rl, rr"),
     (lambda b: b.deceleration_dip(), "has not run yet"),
     (lambda b: (b.run(0.1), b.load("stop72")), "runs already"),

@@ -1,12 +1,12 @@
 """A CAN bus in virtual time: arbitration, acknowledge, errors, bus-off; integer nanoseconds, the same each time."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from dbc.frame import BusName, LinkState
 from dbc.frame_length import FD_TAIL, FrameBits
 from hil.bus.timed import disturbance
+from hil.bus.timed.attempt import Attempt, collision, fail
 from hil.bus.timed.controller import SEQUENCES_TO_RECOVER, Controller, Reception
 from hil.bus.timed.disturbance import WRONG_RATE_BITS, Disturbance, Seen
 from hil.bus.timed.frame_length import PAUSE, Length, exact_bits
@@ -37,22 +37,6 @@ class Sent(NamedTuple):
     start_ns: int
     end_ns: int
     free_ns: int
-
-
-@dataclass(slots=True)
-class _Attempt:
-    """A frame on the wire, and how it will end."""
-
-    frame: WireFrame
-    requests: list[tuple[Controller, Request]]
-    receivers: list[Controller]
-    start_ns: int
-    end_ns: int
-    free_ns: int
-    recessive_from_ns: int
-    error: Disturbance | None = None
-    missing: tuple[Controller, ...] = ()  # receivers that read it wrong and flagged nothing that others could see
-    losing: tuple[Controller, ...] = ()  # error-passive senders of the same identifier with other data
 
 
 class TimedBus:
@@ -99,9 +83,10 @@ class TimedBus:
         self._length = length
         self._on_sent = on_sent
         self._noise = BitErrors(bit_error_rate, f"{seed} wire")
+        self._pause_ns, self._recessive_end_ns = self.bits_ns(PAUSE), self.bits_ns(RECESSIVE_END)
         self._free_ns = 0
         self._recessive_from_ns = 0
-        self._attempt: _Attempt | None = None
+        self._attempt: Attempt | None = None
 
     def join(
         self,
@@ -150,67 +135,95 @@ class TimedBus:
                 if self._attempt.end_ns > now_ns:
                     break
                 self._end(self._attempt)
-            start_ns = self._next_start_ns()
-            recovered = self._next_recovered()
-            if recovered is not None and recovered[0] <= min(start_ns, now_ns):
-                recovered[1].recovered(recovered[0])
-                continue
+            start_ns, offering, recovering = self._next_start()
+            if recovering:
+                back_ns, controller = self._next_recovered()
+                if back_ns <= min(start_ns, now_ns):
+                    controller.recovered(back_ns)
+                    continue
             if start_ns >= now_ns:
                 break
-            self._attempt = self._begin(start_ns)
+            if recovering:
+                self._count_sequences(start_ns)
+            self._attempt = self._begin(start_ns, offering)
         self.now_ns = now_ns
 
     def bits_ns(self, bits: int) -> int:
         """Time of nominal bits, ns."""
         return bits * 1_000_000_000 // self.bit_rate
 
-    def _start_ns(self, controller: Controller) -> int:
-        """When a controller can offer its head to arbitration."""
-        if not len(controller.queue) or not controller.present:
-            return _NEVER
-        return max(self._free_ns, controller.ready_ns, controller.queue.since_ns)
+    def _next_start(self) -> tuple[int, list[Controller], bool]:
+        """When the next frame can start, who then offers one to arbitration, and whether anyone recovers from off."""
+        start_ns, offering, recovering = _NEVER, [], False
+        for controller in self.controllers:
+            if controller.queue.waiting:
+                if controller.unplugged:
+                    continue
+                at_ns = max(self._free_ns, controller.ready_ns, controller.queue.since_ns)
+                if at_ns < start_ns:
+                    start_ns, offering = at_ns, [controller]
+                elif at_ns == start_ns:
+                    offering.append(controller)
+            elif controller.recover_from_ns is not None:
+                recovering = True
+        return start_ns, offering, recovering
 
-    def _next_start_ns(self) -> int:
-        return min(map(self._start_ns, self.controllers), default=_NEVER)
-
-    def _next_recovered(self) -> tuple[int, Controller] | None:
+    def _next_recovered(self) -> tuple[int, Controller]:
         """Which controller is back from bus-off first, if nobody sends before, and when."""
-        back = [
-            (max(c.recover_from_ns, self._recessive_from_ns) + self.bits_ns(left * SEQUENCE), k)
-            for k, c in enumerate(self.controllers)
-            if c.recover_from_ns is not None and (left := SEQUENCES_TO_RECOVER - c.sequences)
-        ]
-        return None if not back else (min(back)[0], self.controllers[min(back)[1]])
+        back = []
+        for k, c in enumerate(self.controllers):
+            if c.recover_from_ns is not None:
+                left = (SEQUENCES_TO_RECOVER - c.sequences) * SEQUENCE
+                back.append((max(c.recover_from_ns, self._recessive_from_ns) + self.bits_ns(left), k))
+        back_ns, k = min(back)
+        return back_ns, self.controllers[k]
 
-    def _begin(self, start_ns: int) -> _Attempt:
+    def _begin(self, start_ns: int, offering: list[Controller]) -> Attempt:
         """Arbitrate, and find out how the frame that wins will end."""
-        self._count_sequences(start_ns)
-        offers = [(c, c.queue.head) for c in self.controllers if self._start_ns(c) <= start_ns]
-        least = min(request.key for _, request in offers)
-        requests = [(c, request) for c, request in offers if request.key == least]
+        requests = [(c, c.queue.head) for c in offering]
+        if len(requests) > 1:
+            least = min(request.key for _, request in requests)
+            requests = [(c, request) for c, request in requests if request.key == least]
         losing: list[Controller] = []
         error = None
         if len(requests) > 1:
-            requests, losing, error = _collision(requests)
-        frame = requests[0][1].frame
-        senders = [c for c, _ in requests]
-        receivers = [c for c in self.controllers if c.present and c not in senders and c not in losing]
+            requests, losing, error = collision(requests)
+        frame, senders = requests[0][1].frame, [c for c, _ in requests]
+        receivers: list[Controller] = []
+        acknowledged, undisturbed = False, error is None and not self._noise.rate
+        for c in self.controllers:
+            if c.present and c not in senders and c not in losing:
+                receivers.append(c)
+                acknowledged = acknowledged or not c.listen_only
+                undisturbed = undisturbed and c.bit_rate == senders[0].bit_rate and not c.noise.rate
+            elif c.noise.rate:
+                undisturbed = False
         bits = self._length(frame)
+        missing: list[Controller] = []
+        if not undisturbed or not acknowledged:
+            error, missing = self._disturbed(frame, senders, receivers, bits, error)
+        return self._planned(frame, requests, receivers, start_ns, bits, error, missing, losing)
+
+    def _disturbed(
+        self,
+        frame: WireFrame,
+        senders: list[Controller],
+        receivers: list[Controller],
+        bits: FrameBits,
+        error: Disturbance | None,
+    ) -> tuple[Disturbance | None, list[Controller]]:
+        """Find what breaks the frame off first, and the receivers that misread it without a flag that all could see."""
         length = bits.nominal + bits.data - PAUSE
         foreign = [c for c in receivers if c.bit_rate != senders[0].bit_rate]
-        missing: list[Controller] = []
-        errors = [error]
-        if foreign:
-            flagging = [c for c in foreign if c.flags]
-            missing += [c for c in foreign if not c.flags]
-            errors.append(Disturbance(WRONG_RATE_BITS, Seen.BY_RECEIVERS, flagging) if flagging else None)
-        errors.append(disturbance.sender_noise(self._noise, senders, frame, length))
+        flagging = [c for c in foreign if c.flags]
         own, silent = disturbance.missed_by([c for c in receivers if c not in foreign], length)
-        errors.append(own)
-        missing += silent
+        missing = [c for c in foreign if not c.flags] + silent
+        errors = [error, own, disturbance.sender_noise(self._noise, senders, frame, length)]
+        if flagging:
+            errors.append(Disturbance(WRONG_RATE_BITS, Seen.BY_RECEIVERS, flagging))
         if all(c.listen_only or c in missing for c in receivers):
             errors.append(Disturbance(length - 1 - RECESSIVE_END, Seen.ACKNOWLEDGE))
-        return self._planned(frame, requests, receivers, start_ns, bits, disturbance.earliest(errors), missing, losing)
+        return disturbance.earliest(errors), missing
 
     def _planned(
         self,
@@ -222,13 +235,13 @@ class TimedBus:
         error: Disturbance | None,
         missing: list[Controller],
         losing: list[Controller],
-    ) -> _Attempt:
+    ) -> Attempt:
         who = frame, requests, receivers, start_ns
         if error is None:
             free_ns = start_ns + bits.duration_ns(self.bit_rate, self.data_bit_rate)
-            end_ns = free_ns - self.bits_ns(PAUSE)
-            recessive_ns = end_ns - self.bits_ns(RECESSIVE_END)
-            return _Attempt(*who, end_ns, free_ns, recessive_ns, None, tuple(missing), tuple(losing))
+            end_ns = free_ns - self._pause_ns
+            recessive_ns = end_ns - self._recessive_end_ns
+            return Attempt(*who, end_ns, free_ns, recessive_ns, None, tuple(missing), tuple(losing))
         seen_ns = start_ns + self._time_ns(bits, error.bit + 1)
         senders = [c for c, _ in requests]
         answering = [c for c in (*senders, *receivers, *losing) if c.flags]
@@ -237,7 +250,7 @@ class TimedBus:
         flags = FLAG + FLAG * (len(answering) > len(first) and error.seen is not Seen.LAST_BIT)
         end_ns = seen_ns + self.bits_ns(flags)
         recessive_ns = end_ns if answering else seen_ns
-        return _Attempt(
+        return Attempt(
             *who, end_ns, end_ns + self.bits_ns(DELIMITER + PAUSE), recessive_ns, error, tuple(missing), tuple(losing)
         )
 
@@ -256,7 +269,7 @@ class TimedBus:
                 quiet_ns = start_ns - max(c.recover_from_ns, self._recessive_from_ns)
                 c.sequences += max(0, quiet_ns) * self.bit_rate // (SEQUENCE * 1_000_000_000)
 
-    def _end(self, attempt: _Attempt) -> None:
+    def _end(self, attempt: Attempt) -> None:
         self._attempt = None
         self._free_ns = attempt.free_ns
         self._recessive_from_ns = attempt.recessive_from_ns
@@ -264,12 +277,13 @@ class TimedBus:
         if attempt.error is None:
             self._deliver(attempt)
         else:
-            self._fail(attempt, attempt.error)
+            self.errors += 1
+            fail(attempt, attempt.error)
         for controller in (*[c for c, _ in attempt.requests], *attempt.losing):
             if controller.state is LinkState.ERROR_PASSIVE:
                 controller.ready_ns = attempt.free_ns + self.bits_ns(SUSPEND)
 
-    def _deliver(self, attempt: _Attempt) -> None:
+    def _deliver(self, attempt: Attempt) -> None:
         reception = Reception(attempt.frame, attempt.end_ns)
         for controller in attempt.receivers:
             if controller in attempt.missing:
@@ -286,57 +300,3 @@ class TimedBus:
             if self._on_sent is not None:
                 times = request.queued_ns, attempt.start_ns, attempt.end_ns, attempt.free_ns
                 self._on_sent(Sent(controller.name, attempt.frame, *times))
-
-    def _fail(self, attempt: _Attempt, error: Disturbance) -> None:
-        self.errors += 1
-        end_ns = attempt.end_ns
-        senders = [c for c, _ in attempt.requests]
-        if error.seen is Seen.LAST_BIT:
-            reception = Reception(attempt.frame, end_ns)
-            for controller in attempt.receivers:
-                if controller not in attempt.missing:
-                    controller.take(reception)
-        else:
-            others = any(c.flags for c in (*senders, *attempt.receivers) if c not in error.first)
-            for controller in attempt.receivers:
-                controller.counters.receive_error(first=controller in error.first and others)
-        for controller in (*senders, *attempt.losing):
-            if error.senders_receive:
-                controller.counters.receive_error()
-            elif error.counts and not (error.seen is Seen.ACKNOWLEDGE and _exempt(controller, attempt.receivers)):
-                controller.counters.transmit_error()
-            if error.seen is Seen.ACKNOWLEDGE:
-                controller.unacknowledged(end_ns)
-        for controller in (*senders, *attempt.losing, *attempt.receivers):
-            controller.follow(end_ns)
-
-
-def _exempt(sender: Controller, receivers: list[Controller]) -> bool:
-    """An error-passive sender that sees no dominant bit while it flags a missing acknowledge does not count it."""
-    return sender.state is LinkState.ERROR_PASSIVE and not any(c.flags for c in receivers)
-
-
-def _collision(
-    requests: list[tuple[Controller, Request]],
-) -> tuple[list[tuple[Controller, Request]], list[Controller], Disturbance | None]:
-    """Several controllers send the same identifier: equal frames are one frame, others meet a bit error.
-
-    Returns
-    -------
-    Who sends on; error-passive controllers that drop out unseen; the error that all see, None where there is none.
-    """
-    best = requests[0]
-    for other in requests[1:]:
-        difference = disturbance.first_difference(best[1].frame, other[1].frame)
-        if difference is not None and not difference[1]:
-            best = other
-    differing = [
-        (difference[0], c)
-        for c, request in requests
-        if (difference := disturbance.first_difference(best[1].frame, request.frame)) is not None
-    ]
-    active = [bit for bit, c in differing if c.flags]
-    if active:
-        return requests, [], Disturbance(min(active), Seen.BY_SENDER)
-    dropped = [c for _, c in differing]
-    return [(c, request) for c, request in requests if c not in dropped], dropped, None

@@ -1,7 +1,7 @@
 """Nodes in virtual time whose vehicle bus is a timed one: `hil.rt.lockstep` with bit times between them."""
 
 import heapq
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 
 from dbc.frame import BusName, Frame, LinkEvent, Received
 from hil.bus.bus import BusError, parse_spec
@@ -77,26 +77,36 @@ class TimedLine:
         queue = "FIFO" if self._fifo else "priority"
         return f"virtual time, {self.bus.bit_rate / 1e3:g} kbit/s, {queue} queues"
 
-    def lockstep(self, members: Sequence[Member]) -> Iterator[Step]:
+    def lockstep(self, members: Sequence[Member], listening: Container[int] = ()) -> Iterator[Step]:
         """Step the members for ever, as `hil.rt.lockstep.lockstep`; `heard` says what a recorder hears.
 
+        Parameters
+        ----------
+        members : one controller each.
+        listening : those of them, by index, that acknowledge nothing until they send a frame for the first time.
+
+        Notes
+        -----
         A frame of the vehicle bus reaches the others when its end of frame has passed on the wire, with that time; a
         controller's link events reach its own node.
         """
         self._ear = self.bus.join("recorder", listen_only=True)
-        self.controllers = [self.bus.join(f"node {k}", fifo=self._fifo) for k in range(len(members))]
+        self.controllers = [
+            self.bus.join(f"node {k}", fifo=self._fifo, listen_only=k in listening) for k in range(len(members))
+        ]
         inboxes: list[list[Received]] = [[] for _ in members]
         due = [(member.phase_ns, index) for index, member in enumerate(members)]
         heapq.heapify(due)
         while due:
             now_ns = due[0][0]
             self.bus.advance(now_ns)
-            self._heard += _frames(self._ear)
+            self._heard += [one for one in _frames(self._ear) if isinstance(one, Frame)]
             sent: list[Step] = []
             while due and due[0][0] == now_ns:
                 _, index = heapq.heappop(due)
                 arrived = _frames(self.controllers[index])
-                self._heard += [one for one in arrived if isinstance(one, LinkEvent)]
+                if index not in listening:
+                    self._heard += [one for one in arrived if isinstance(one, LinkEvent)]
                 inbox, inboxes[index] = arrived + inboxes[index], []
                 sent.append(Step(now_ns, index, members[index].node.step(now_ns, inbox)))
                 heapq.heappush(due, (now_ns + members[index].period_ns, index))
@@ -113,7 +123,9 @@ class TimedLine:
         for frame in step.frames:
             if frame.bus is self.bus.name:
                 wire = WireFrame(frame.can_id, frame.data, frame.extended)
-                self.controllers[step.member].send(wire, step.now_ns)
+                controller = self.controllers[step.member]
+                controller.listen_only = False
+                controller.send(wire, step.now_ns)
                 continue
             self._heard.append(frame._replace(time_ns=step.now_ns))
             for index, inbox in enumerate(inboxes):

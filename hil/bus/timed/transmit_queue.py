@@ -27,6 +27,7 @@ class TransmitQueue:
 
     Attributes
     ----------
+    waiting : requests, a heap by rank.
     since_ns : since when there has been a head.
     """
 
@@ -34,36 +35,33 @@ class TransmitQueue:
         self.fifo = fifo
         self.length = length
         self.since_ns = 0
-        self._waiting: list[Request] = []
+        self.waiting: list[Request] = []
         self._numbers = count()
-
-    def __len__(self) -> int:
-        return len(self._waiting)
 
     def push(self, frame: WireFrame, now_ns: int) -> bool:
         """Take a frame; False where the queue is full."""
-        if len(self._waiting) >= self.length:
+        if len(self.waiting) >= self.length:
             return False
-        if not self._waiting:
+        if not self.waiting:
             self.since_ns = now_ns
         key = arbitration_key(frame)
-        heapq.heappush(self._waiting, Request(0 if self.fifo else key, next(self._numbers), key, frame, now_ns))
+        heapq.heappush(self.waiting, Request(0 if self.fifo else key, next(self._numbers), key, frame, now_ns))
         return True
 
     @property
     def head(self) -> Request:
         """The frame to send next."""
-        return self._waiting[0]
+        return self.waiting[0]
 
     def remove(self, request: Request) -> None:
         """Drop a request that has been sent; more urgent ones may have come before it meanwhile."""
-        if self._waiting[0] is request:
-            heapq.heappop(self._waiting)
+        if self.waiting[0] is request:
+            heapq.heappop(self.waiting)
         else:
-            self._waiting.remove(request)
-            heapq.heapify(self._waiting)
+            self.waiting.remove(request)
+            heapq.heapify(self.waiting)
 
     def clear(self) -> int:
         """Drop all; how many that were."""
-        dropped, self._waiting = len(self._waiting), []
+        dropped, self.waiting = len(self.waiting), []
         return dropped

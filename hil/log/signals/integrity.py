@@ -152,14 +152,22 @@ class FrameUse(IntEnum):
     USED = 0
     CORRUPT = 1  # wrong check value, length or counter 15
     REPEATED = 2  # with the counter of the one before
-    OUT_OF_SEQUENCE = 3  # more than two frames missing before it, or another sender's
+    OUT_OF_SEQUENCE = 3  # more than two frames missing before it without a gap in time: another sender's
 
 
-def use_of_frames(data: Bytes, length: Bytes, data_id: int, message_length: int) -> Bytes:
+def use_of_frames(
+    data: Bytes, length: Bytes, time_ns: npt.NDArray[np.int64], data_id: int, message_length: int, gap_ns: int
+) -> Bytes:
     """Tell of each frame of one message whether a receiver uses it: `FrameUse`, uint8 (n,).
 
-    The first sound frame counts as used: nothing came before that it could contradict. Where nearly all frames carry
-    the legacy check value, that one counts.
+    Unlike a receiver it takes the first sound frame, and the first one after a gap: nothing contradicts these. Where
+    nearly all frames carry the legacy check value, that one counts.
+
+    Parameters
+    ----------
+    data, length, data_id, message_length : as of `IntegrityCounter`.
+    time_ns : int64 (n,), stamps.
+    gap_ns : time without a sound frame after which a sequence may begin anew, ns.
     """
     use = np.full(len(data), FrameUse.CORRUPT, np.uint8)
     counter = IntegrityCounter(data_id, message_length)
@@ -171,9 +179,10 @@ def use_of_frames(data: Bytes, length: Bytes, data_id: int, message_length: int)
     count = (data[:, 1] & 0x0F).astype(np.int8)
     sound = np.flatnonzero((length == message_length) & (count < e2e.COUNTER_MODULUS) & (difference == wanted))
     steps = np.diff(count[sound]) % e2e.COUNTER_MODULUS
+    in_sequence = ((steps > 0) & (steps <= _MOST_LOST + 1)) | (np.diff(time_ns[sound]) >= gap_ns)
     use[sound[:1]] = FrameUse.USED
     use[sound[1:]] = np.where(
-        steps == 0, FrameUse.REPEATED, np.where(steps <= _MOST_LOST + 1, FrameUse.USED, FrameUse.OUT_OF_SEQUENCE)
+        in_sequence, FrameUse.USED, np.where(steps == 0, FrameUse.REPEATED, FrameUse.OUT_OF_SEQUENCE)
     )
     return use
 

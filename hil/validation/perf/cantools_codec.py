@@ -9,16 +9,21 @@ from types import ModuleType
 from typing import Any
 
 import cantools
+import numpy as np
 from cantools.database import Database
 from cantools.database.can import Message as DbcMessage
 from cantools.database.namedsignalvalue import NamedSignalValue
+from numpy.typing import NDArray
 
 from dbc import e2e, exchange
 from dbc.batch import Batch
 from dbc.codec import SNA
+from dbc.compiled import PAYLOAD
 from dbc.contract import Message, MessageSpec, database_text, spec_of
 from dbc.exchange import Transmitter
 from dbc.frame import BusName, Frame
+from dbc.intake import BAD_IN_ROW, FRESH, LAST_VALID_NS, RECEIVED, VALID_IN_ROW, WORD, Intake
+from ecu import node
 from plant import reports
 
 
@@ -98,9 +103,31 @@ class _CantoolsBatch(Batch):
         return self._transmitter.frames(now_ns, messages)
 
 
+class _CantoolsIntake(Intake):
+    """An intake that takes no frame as usual: each is checked and decoded alone, by cantools."""
+
+    def take(self, now_ns: int, begin: int, frames: NDArray[np.uint8]) -> int:
+        if begin == 0:
+            for memory in self.memory:
+                memory[FRESH] = 0
+        return min(begin, len(frames) // (1 + PAYLOAD))
+
+    def keep(self, now_ns: int, index: int, payload: bytes) -> None:
+        message = self.specs[index].decode(payload)
+        self.of(index)[:] = [math.nan if value is None else value for value in message]
+        memory = self.memory[index]
+        memory[FRESH] = memory[RECEIVED] = 1
+        memory[VALID_IN_ROW] += 1
+        memory[BAD_IN_ROW] = 0
+        memory[LAST_VALID_NS] = now_ns
+        memory[WORD] = int.from_bytes(payload, "little", signed=True)
+
+
 _REPLACED: tuple[tuple[ModuleType, str, Any], ...] = (
     (exchange, "spec_of", cantools_spec),
+    (exchange, "Intake", _CantoolsIntake),
     (reports, "Batch", _CantoolsBatch),
+    (node, "Batch", _CantoolsBatch),
 )
 
 

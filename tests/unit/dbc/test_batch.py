@@ -1,10 +1,7 @@
 """Messages encoded side by side are, byte for byte, what each gives alone, and what cantools gives."""
 
 import math
-import os
 import random
-import subprocess
-import sys
 from dataclasses import replace
 
 import pytest
@@ -83,32 +80,3 @@ def test_refuses_a_big_endian_signal(monkeypatch):
     monkeypatch.setattr(batch, "spec_of", lambda kind: turned)
     with pytest.raises(CodecError, match=r"BRAKE_PEDAL.PEDAL_TRAVEL_1: expected a little-endian signal"):
         Batch([BrakePedal])
-
-
-UNCOMPILED = """
-import math
-from dbc.batch import Batch
-from dbc.bench_messages import BENCH_MESSAGES
-from dbc.messages import BRAKE_MESSAGES
-from dbc.contract import spec_of
-kinds = [kind for kind in (*BRAKE_MESSAGES, *BENCH_MESSAGES)]
-side_by_side = Batch(kinds)
-for share in (-0.3, 0.0, 0.123456, 1.0, 1.5):
-    for kind in kinds:
-        for i, f in enumerate(spec_of(kind).fields):
-            side_by_side.of(kind)[i] = (f.minimum + share * (f.maximum - f.minimum)) * f.si_per_unit
-    side_by_side.of(BRAKE_MESSAGES[0])[0] = math.nan
-    print(b"".join(frame.data for frame in side_by_side.frames(int(share * 1e9))).hex())
-"""
-
-
-@pytest.mark.slow
-def test_same_bytes_uncompiled():
-    told = [
-        subprocess.run(
-            [sys.executable, "-c", UNCOMPILED], env=os.environ | more, capture_output=True, text=True, check=True
-        ).stdout
-        for more in ({}, {"NUMBA_DISABLE_JIT": "1"})
-    ]
-    assert told[0] == told[1]
-    assert len(told[0]) > 1000

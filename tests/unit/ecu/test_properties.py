@@ -11,6 +11,7 @@ from dbc.exchange import Transmitter
 from dbc.frame import BusName, Frame, LinkEvent, LinkState
 from dbc.messages import BrakeMode, EhbDemandFront, EhbDemandRear
 from ecu.law.step import initial_memory, step
+from ecu.law.trouble_codes import consequence
 from ecu.law.types import Brake, Health, Inputs, Source
 from ecu.node import SOURCES, EcuNode
 
@@ -45,7 +46,15 @@ inputs = st.builds(
     blending_factor=values(0.0, 1.0),
     link_down=st.booleans(),
     health=st.tuples(
-        *[st.builds(Health, st.sampled_from([0.0, 0.01, 0.05, math.inf]), st.booleans(), st.integers(0, 6))]
+        *[
+            st.builds(
+                Health,
+                st.sampled_from([0.0, 0.01, 0.05, math.inf]),
+                st.booleans(),
+                st.integers(0, 6),
+                *[st.sampled_from([0, 0, 0, 1])] * 3,
+            )
+        ]
         * len(Source)
     ),
 )
@@ -80,6 +89,28 @@ def test_no_input_sequence_gives_an_output_out_of_range(parameters, sequence, mo
             memory, outputs = step(memory, values_now, parameters, 0.01)
             check_outputs(outputs, parameters)
     assert np.all(np.isfinite(memory.observer))
+
+
+@settings(RELAXED, max_examples=20)
+@given(
+    sequence=st.lists(st.tuples(inputs, st.integers(1, 25)), min_size=1, max_size=12), mode=st.sampled_from(BrakeMode)
+)
+def test_no_degradation_without_an_active_code(parameters, sequence, mode):
+    """The mode never gets worse than an active code's reaction; it stays worse only while the upgrade waits."""
+    memory = initial_memory(parameters)
+    memory = memory._replace(modes=memory.modes._replace(mode=mode))
+    for values_now, ticks in sequence:
+        for _ in range(ticks):
+            before = memory.modes.mode
+            memory, outputs = step(memory, values_now, parameters, 0.01)
+            if outputs.mode == BrakeMode.INIT:
+                continue
+            active = [trouble.code for trouble in memory.troubles.troubles if trouble.active]
+            allowed = max([code.reaction for code in active], default=BrakeMode.NORMAL)
+            assert outputs.mode >= allowed
+            assert outputs.mode == allowed or outputs.mode <= before
+            assert bool(outputs.faults) == bool(active)
+            assert consequence(memory.troubles.active) == (allowed, outputs.faults)
 
 
 @RELAXED

@@ -106,7 +106,7 @@ def test_a_lock_that_is_never_released_is_an_error_not_a_hang(place, monkeypatch
     with open_bus("loopback:demo", VEHICLE) as bus:
         lock = os.open(place / "demo" / "lock", os.O_RDWR)
         rendezvous.fcntl.flock(lock, rendezvous.fcntl.LOCK_EX)
-        with pytest.raises(BusError, match="locked for 0.03 s by another member"):
+        with pytest.raises(BusError, match=r"locked for 0\.03 s by another member"):
             open_bus("loopback:demo", VEHICLE)
         open_bus("loopback:other", VEHICLE).close()
         bus.close()  # a member that leaves waits no longer than it said

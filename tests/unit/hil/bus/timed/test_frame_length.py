@@ -1,5 +1,7 @@
 """Frame lengths: tables against bit by bit, published check values, bounds."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,6 +10,8 @@ from hypothesis import strategies as st
 from dbc.frame_length import FD_LENGTHS, FrameBits
 from hil.bus.timed.frame_length import exact_bits, most_bits
 from hil.bus.timed.wire import CRC15_POLYNOMIAL, WireFrame, arbitration_key, crc15, stuffed_part
+
+PAGE = Path(__file__).parents[5] / "docs" / "bus-timing.md"
 
 
 def bits_of(data: bytes) -> list[int]:
@@ -118,6 +122,18 @@ def test_the_bound_of_24_stuff_bits_is_never_reached() -> None:
     most = most_stuff_bits(8)
     print(f"at most {most} of 24 stuff bits, {111 + most} of 135 bits")
     assert 20 <= most < 24
+
+
+@pytest.mark.slow
+def test_the_page_says_how_many_stuff_bits_there_are_at_most() -> None:
+    rows = [
+        line for line in PAGE.read_text().splitlines() if line.startswith(("| stuff bits at most", "| frame at most"))
+    ]
+    most = [most_stuff_bits(n) for n in range(9)]
+    assert [[int(word) for word in row.split("|")[2:-1]] for row in rows] == [
+        most,
+        [47 + 8 * n + stuff_bits for n, stuff_bits in enumerate(most)],
+    ]
 
 
 def test_arbitration_is_by_bits() -> None:
