@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -45,6 +45,7 @@ IN_TURN: dict[str, tuple[dict[str, float], ...]] = {
 
 The delays of a replay are no multiples of 15 frames: such a shift cannot be seen by a counter 0 to 14.
 """
+OF_TIME: dict[str, dict[str, float]] = {"silent": {}, "lost": {"share": 0.2}}
 _NEVER_BOUNDED = frozenset({"process_killed"})
 _FROM_THE_START = frozenset({"process_late"})
 
@@ -92,14 +93,24 @@ def virtual_faults() -> tuple[FaultKind, ...]:
     return tuple(kind for kind in FAULTS if kind.in_virtual_time)
 
 
-def cases(kinds: Sequence[FaultKind], instants: int, seed: int) -> list[Case]:
+def cases(kinds: Sequence[FaultKind], instants: int, seed: int, timeout_s: float | None = None) -> list[Case]:
     """Cases of single faults: each on each of its usual targets, at so many instants."""
     return [
-        Case((kind.name, target), _noise_seed(seed, i), (_armed(kind, target, i, instants, seed),))
+        Case((kind.name, target), _noise_seed(seed, i), (_armed(kind, target, i, instants, seed),), timeout_s)
         for kind in kinds
         for target in kind.usual
         for i in range(instants)
     ]
+
+
+def cases_of_time(instants: int, seed: int, timeout_s: float | None) -> list[Case]:
+    """Cases whose finding depends on the time-out: messages silent for good, and one frame in five lost."""
+    found = []
+    for name, values in OF_TIME.items():
+        for case in cases([fault_named(name)], instants, seed, timeout_s):
+            (armed,) = case.faults
+            found.append(replace(case, faults=(replace(armed, values=values),)))
+    return found
 
 
 def pairs(instants: int, seed: int) -> list[Case]:

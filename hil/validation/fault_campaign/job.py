@@ -7,7 +7,7 @@ from dbc.messages import BrakeMode
 from hil.faults.fault import Expected
 from hil.validation.fault_campaign.cases import PAIR, Case
 from hil.validation.fault_campaign.drive import Trace, drive
-from hil.validation.fault_campaign.measure import Measured, measure, measured
+from hil.validation.fault_campaign.measure import Measured, forget_brakes, measure, measured, without_car
 
 
 @lru_cache(maxsize=64)
@@ -34,6 +34,8 @@ def _pair(case: Case) -> Measured:
     right = Expected(frozenset(BrakeMode), first.trouble | second.trouble, braking=first.braking or second.braking)
     until_s = max(fault.until_s for fault in faults)
     both = measured(drive(case.seed, faults, case.timeout_s), beside, right, until_s, (), False)
+    if any(map(without_car, faults)):
+        forget_brakes(both)
     worst = max(one.worst_mode for one in alone)
     if both.worst_mode < worst:
         wrong = f"{BrakeMode(both.worst_mode).name} where one of the two alone leads to {BrakeMode(worst).name}"
