@@ -101,6 +101,11 @@ class EcuNode:
         self._next_code = 0
 
     @property
+    def receiver(self) -> Receiver:
+        """What it has taken of what was sent to it, for who watches."""
+        return self._receiver
+
+    @property
     def trouble_codes(self) -> tuple[Trouble, ...]:
         """Every trouble code found since the start, active or not, in order of appearance."""
         return self.memory.troubles.troubles

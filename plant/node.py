@@ -123,6 +123,11 @@ class PlantNode:
         return self._reports.frames(now_ns, self._x, self._y, self._switch, sensed, brakes, self.state, self._receiver)
 
     @property
+    def receiver(self) -> Receiver:
+        """What it has taken of what was sent to it, for who watches."""
+        return self._receiver
+
+    @property
     def model_state(self) -> Vector:
         """State of the model at this tick (``STATE``), a copy."""
         return self._x.copy()

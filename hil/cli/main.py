@@ -38,6 +38,7 @@ COMMANDS = (
     "trials",
     "effects",
     "sensitivities",
+    "faults",
 )
 """Subcommands in the order of the help; each is a module of this package."""
 
