@@ -123,7 +123,7 @@ class EcuNode:
         elapsed_ns = self.period_ns if self._last_ns is None else now_ns - self._last_ns
         self._last_ns = now_ns
         self.memory, self.outputs = step(self.memory, self._inputs(now_ns), self.parameters, elapsed_ns * 1e-9)
-        return self._transmitter.frames(now_ns, self._outgoing(now_ns, self.outputs))
+        return self._transmitter.frames(now_ns, self._outgoing(self.outputs))
 
     def _inputs(self, now_ns: int) -> Inputs:
         """What the receiver holds, as the law takes it."""
@@ -150,18 +150,18 @@ class EcuNode:
             health=tuple([_health(reception, now_ns) for reception in self._receptions]),
         )
 
-    def _trouble(self, now_ns: int) -> BrakeTroubleCode:
+    def _trouble(self) -> BrakeTroubleCode:
         """The trouble code that is told next: one after the other, without end."""
         troubles = self.memory.troubles.troubles
         if not troubles:
             return _NO_TROUBLE
         index = self._next_code % len(troubles)
-        self._next_code = index + self._transmitter.due(BrakeTroubleCode, now_ns)
+        self._next_code = index + self._transmitter.due(BrakeTroubleCode, self._last_ns or 0)
         code, active, occurrences, *_ = troubles[index]
         status = TroubleStatus.ACTIVE if active else TroubleStatus.STORED
         return BrakeTroubleCode(code.number, status, occurrences, min(len(troubles), _MOST_CODES), index)
 
-    def _outgoing(self, now_ns: int, o: Outputs) -> tuple[tuple[Any, ...], ...]:
+    def _outgoing(self, o: Outputs) -> tuple[tuple[Any, ...], ...]:
         """The law's outputs as messages, with the report of what was consumed."""
         p, m, t, mu, c = o.pressure_demand_pa, o.motor_demand_nm, o.wheel_torque_nm, o.pad_friction, o.confidence
         counters = [_NO_COUNTER if (n := self._receiver.counter(t)) is None else n for t in SOURCES]
@@ -173,7 +173,7 @@ class EcuNode:
             BrakeStatus(o.mode, int(o.faults), o.blending_factor, o.demanded_deceleration_mps2),
             BrakeEstimateFront(t[0], mu[0], c[0], t[1], mu[1], c[1]),
             BrakeEstimateRear(t[2], mu[2], c[2], t[3], mu[3], c[3]),
-            self._trouble(now_ns),
+            self._trouble(),
             EcuReception._make((*counters, self._receiver.lost, self._receiver.corrupt)),
         )
 

@@ -33,7 +33,7 @@ def entry(function: F) -> F:
 def _source_stamp() -> str:
     """Digest of every source file of the control law."""
     digest = hashlib.sha256()
-    for folder in ("ecu.law", "ecu.law.joint"):
+    for folder in ("ecu.law", "ecu.law.joint", "ecu.law.plausibility"):
         for file in sorted(resources.files(folder).iterdir(), key=lambda f: f.name):
             if file.name.endswith(".py"):
                 digest.update(file.read_bytes())

@@ -23,7 +23,8 @@ class Estimates(NamedTuple):
     """Speed over ground, wheel torques (negative braking), pad friction with confidence 0..1, mass over nominal.
 
     ``implausible`` wheels have not turned as the car moves for longer than a wheel slides; ``stuck``: the acceleration
-    sensor repeats itself while the wheels tell of another acceleration.
+    sensor repeats itself while the wheels tell of another acceleration. ``expected_mps2``: what it should show by
+    the wheels' torques, NaN where that is not known; ``grade_mps2``: what it shows of its offset and of the grade.
     """
 
     speed_mps: float
@@ -33,6 +34,8 @@ class Estimates(NamedTuple):
     mass_factor: float
     implausible: tuple[bool, bool, bool, bool] = PLAUSIBLE
     stuck: bool = False
+    expected_mps2: float = math.nan
+    grade_mps2: float = 0.0
 
 
 def _four(values: Vector, start: int) -> Four:
@@ -40,8 +43,22 @@ def _four(values: Vector, start: int) -> Four:
     return (a, b, c, d)
 
 
-def measured(inputs: Inputs, lost: tuple[bool, ...], demand_mps2: float, torque_per_current_nm_a: float) -> Vector:
-    """Inputs of the observers (`joint.layout`), NaN where a source is lost."""
+def measured(
+    inputs: Inputs,
+    lost: tuple[bool, ...],
+    demand_mps2: float,
+    asked_pressure_pa: Four,
+    asked_motor_nm: Four,
+    torque_per_current_nm_a: float,
+) -> Vector:
+    """Inputs of the observers (`joint.layout`), NaN where a source is lost.
+
+    Parameters
+    ----------
+    demand_mps2 : demanded deceleration.
+    asked_pressure_pa, asked_motor_nm : what was asked of the actuators in the last step; NaN of one that does not
+        follow.
+    """
     nan = math.nan
     body = not lost[Source.BODY_MOTION]
     w, q, i = inputs.wheel_speed_rad_s, inputs.pressure_pa, inputs.motor_current_a
@@ -68,6 +85,10 @@ def measured(inputs: Inputs, lost: tuple[bool, ...], demand_mps2: float, torque_
             k * i[1] if front_i else nan,
             k * i[2] if rear_i else nan,
             k * i[3] if rear_i else nan,
+            *inputs.motor_available_nm,
+            *asked_pressure_pa,
+            *asked_motor_nm,
+            0.0,
         )
     )
 
@@ -152,12 +173,12 @@ def estimate(state: Vector, z: Vector, parameters: EcuParameters, dt_s: float) -
     nominal = parameters.friction_brake.pad_friction
     if parameters.compensation.method == "joint":
         state = joint_step(state, z, joint_parameters(parameters), dt_s)
-        started, speed, torque, mu, confidence, mass, implausible, stuck = read_estimates(
-            state, parameters.compensation.confidence_full
+        started, speed, torque, mu, confidence, mass, implausible, stuck, expected, level = read_estimates(
+            state, joint_parameters(parameters), parameters.compensation.confidence_full
         )
         if not started:
             return state, Estimates(0.0, UNKNOWN, (nominal, nominal, nominal, nominal), ZERO, 1.0)
-        return state, Estimates(speed, torque, mu, confidence, mass, implausible, stuck)
+        return state, Estimates(speed, torque, mu, confidence, mass, implausible, stuck, expected, level)
     state = paper.paper_step(state, z, paper_parameters(parameters), dt_s)
     return state, Estimates(
         float(state[paper.SPEED]),
