@@ -2,6 +2,7 @@
 
 import math
 from functools import lru_cache
+from struct import Struct
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from ecu.parameters.ecu import EcuParameters
 
 Vector = NDArray[np.float64]
 PLAUSIBLE = (False, False, False, False)
+_PACK = Struct(f"{joint.INPUTS}d").pack
 
 
 class Estimates(NamedTuple):
@@ -66,31 +68,30 @@ def measured(
     front_w, rear_w = not lost[Source.WHEEL_SPEED_FRONT], not lost[Source.WHEEL_SPEED_REAR]
     front_q, rear_q = not lost[Source.EHB_PRESSURE_FRONT], not lost[Source.EHB_PRESSURE_REAR]
     front_i, rear_i = not lost[Source.MOTOR_FRONT], not lost[Source.MOTOR_REAR]
-    return np.array(
-        (
-            inputs.acceleration_x_mps2 if body else nan,
-            inputs.acceleration_y_mps2 if body else nan,
-            inputs.yaw_rate_rad_s if body else nan,
-            nan if lost[Source.STEERING] else inputs.steering_wheel_angle_rad,
-            demand_mps2,
-            w[0] if front_w else nan,
-            w[1] if front_w else nan,
-            w[2] if rear_w else nan,
-            w[3] if rear_w else nan,
-            q[0] if front_q else nan,
-            q[1] if front_q else nan,
-            q[2] if rear_q else nan,
-            q[3] if rear_q else nan,
-            k * i[0] if front_i else nan,
-            k * i[1] if front_i else nan,
-            k * i[2] if rear_i else nan,
-            k * i[3] if rear_i else nan,
-            *inputs.motor_available_nm,
-            *asked_pressure_pa,
-            *asked_motor_nm,
-            0.0,
-        )
+    packed = _PACK(
+        inputs.acceleration_x_mps2 if body else nan,
+        inputs.acceleration_y_mps2 if body else nan,
+        inputs.yaw_rate_rad_s if body else nan,
+        nan if lost[Source.STEERING] else inputs.steering_wheel_angle_rad,
+        demand_mps2,
+        w[0] if front_w else nan,
+        w[1] if front_w else nan,
+        w[2] if rear_w else nan,
+        w[3] if rear_w else nan,
+        q[0] if front_q else nan,
+        q[1] if front_q else nan,
+        q[2] if rear_q else nan,
+        q[3] if rear_q else nan,
+        k * i[0] if front_i else nan,
+        k * i[1] if front_i else nan,
+        k * i[2] if rear_i else nan,
+        k * i[3] if rear_i else nan,
+        *inputs.motor_available_nm,
+        *asked_pressure_pa,
+        *asked_motor_nm,
+        0.0,
     )
+    return np.frombuffer(bytearray(packed))  # writable; half the time of np.array
 
 
 @lru_cache(maxsize=16)
@@ -174,7 +175,7 @@ def estimate(state: Vector, z: Vector, parameters: EcuParameters, dt_s: float) -
     if parameters.compensation.method == "joint":
         state = joint_step(state, z, joint_parameters(parameters), dt_s)
         started, speed, torque, mu, confidence, mass, implausible, stuck, expected, level = read_estimates(
-            state, joint_parameters(parameters), parameters.compensation.confidence_full
+            state, parameters.compensation.confidence_full
         )
         if not started:
             return state, Estimates(0.0, UNKNOWN, (nominal, nominal, nominal, nominal), ZERO, 1.0)

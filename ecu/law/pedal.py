@@ -24,6 +24,7 @@ class PedalMemory(NamedTuple):
     levels: tuple[float, float, float]
 
 
+_new = tuple.__new__  # without the Python-made one of a NamedTuple
 _NO_LEVELS = (0.0, 0.0, 0.0)
 INITIAL = PedalMemory(math.nan, (math.nan, math.nan), 0, _NO_LEVELS)
 
@@ -59,8 +60,8 @@ def read_pedal(
         return memory, PedalReading(travel, lost_1, lost_2, memory.levels[2] > s.pedal_disagreement_s)
     if abs(one - two) <= s.pedal_disagreement:
         travel = 0.5 * (one + two)
-        if levels == _NO_LEVELS:
-            return PedalMemory(travel, (one, two), 0, levels), PedalReading(travel, False, False, False)
+        if levels == _NO_LEVELS:  # mostly
+            return _new(PedalMemory, (travel, (one, two), 0, levels)), PedalReading(travel, False, False, False)
         suspect, levels = 0, _rest(levels, s, p, dt_s)
         named = _named(levels, s.pedal_disagreement_s)
         travel = two if named == 1 else one if named == 2 else travel

@@ -10,7 +10,7 @@ from ecu.law.gravity import GRAVITY_MPS2
 from ecu.law.joint.layout import (
     BIAS,
     COVARIANCE,
-    FORCE_LAG,
+    EXPECTED,
     FRICTION,
     GRADE,
     MASS,
@@ -21,7 +21,6 @@ from ecu.law.joint.layout import (
     TORQUE,
     N,
 )
-from ecu.law.joint.motion import expected_acceleration
 from ecu.law.types import Four
 
 Vector = NDArray[np.float64]
@@ -38,7 +37,7 @@ def confidence_of(s: Vector, i: int, full: float) -> float:
 
 @entry
 def read_estimates(
-    s: Vector, p: Vector, full: float
+    s: Vector, full: float
 ) -> tuple[bool, float, Four, Four, Four, float, tuple[bool, bool, bool, bool], bool, float, float]:
     """Whether it has started, speed, wheel torques, pad friction and its confidence, mass, wheels that do not turn as
     the car moves, whether the accelerometer is stuck, what the accelerometer should show by the torques,
@@ -46,8 +45,7 @@ def read_estimates(
 
     Parameters
     ----------
-    s : state (`layout`).  p : parameters, `estimator.joint_parameters`.
-    full : relative uncertainty of the pad friction that counts as no confidence.
+    s : state (`layout`).  full : relative uncertainty of the pad friction that counts as no confidence.
     """
     t, m = TORQUE, FRICTION
     return (
@@ -64,6 +62,6 @@ def read_estimates(
             s[ODD_S + 3] > IMPLAUSIBLE_S,
         ),
         s[STUCK] != 0.0,
-        expected_acceleration(s, p, s[FORCE_LAG], 0.0) + s[BIAS],
+        s[EXPECTED],
         s[BIAS] + GRAVITY_MPS2 * s[GRADE],
     )

@@ -12,6 +12,7 @@ from ecu.law.joint.layout import (
     AX,
     AY,
     BIAS,
+    EXPECTED,
     FORCE_LAG,
     GRADE,
     HOLD,
@@ -185,6 +186,7 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
 
     # bound
     keep_in_bounds(s)
+    s[EXPECTED] = expected_acceleration(s, p, force, side_n) + s[BIAS]
     if body and s[LOCKED] + s[LOCKED + 1] + s[LOCKED + 2] + s[LOCKED + 3] > 0.0:
         torque_of_standing_wheels(s, p, ax, acceleration, loads, spin)
     return s

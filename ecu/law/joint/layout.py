@@ -20,7 +20,8 @@ PITCH, PITCH_RATE, LOAD_ACCELERATION, FORCE_LAG, RELEASED_S, STARTED, REJECTED_S
 LAST_AX = SLID_S + 11  # for how long it has repeated itself, when that was last looked at and the wheels' speed then
 REPEATED_S, LOOKED_S, SPEED_THEN, STUCK = LAST_AX + 1, LAST_AX + 2, LAST_AX + 3, LAST_AX + 4
 ODD_S = LAST_AX + 5  # how long a wheel has been sliding alone or with one other, less than it has rolled since
-SIZE = ODD_S + 4
+EXPECTED = ODD_S + 4  # what the accelerometer should show by the wheels' torques, m/s2
+SIZE = EXPECTED + 1
 
 # inputs
 AX, AY, YAW_RATE, STEER, DEMAND = 0, 1, 2, 3, 4

@@ -166,6 +166,28 @@ def test_a_failing_current_is_found_though_it_comes_and_goes():
     assert stop.ticks <= 60
 
 
+def test_a_motor_is_tried_again_after_the_pedal_was_free_for_long_enough_never_before(normal_rig):
+    car, retry_s = normal_rig.car, normal_rig.node.parameters.plausibility.motor_retry_s
+    car.blending, car.follow = 0.7, lambda _: None  # its motors give nothing
+
+    def asked_of_motors(ticks: int) -> bool:
+        return any(normal_rig.step() and min(normal_rig.node.outputs.motor_demand_nm) < 0.0 for _ in range(ticks))
+
+    normal_rig.step(30)
+    assert normal_rig.node.outputs.faults & Fault.MOTOR_FRONT
+    assert not asked_of_motors(round(150 * retry_s))  # within the same braking
+    car.pedal = (0.0, 0.0)
+    normal_rig.step(round(100 * retry_s) - 20)
+    car.pedal = (0.6, 0.6)
+    assert not asked_of_motors(20)
+    car.pedal = (0.0, 0.0)
+    normal_rig.step(30)
+    car.pedal = (0.6, 0.6)
+    assert asked_of_motors(5)
+    normal_rig.step(10)
+    assert normal_rig.node.outputs.faults & Fault.MOTOR_FRONT
+
+
 @pytest.mark.parametrize("on_off_s", [None, 0.3])
 def test_no_wheel_speed_releases_pressure(on_off_s):
     def fast(now: float, t: float) -> float:
@@ -250,12 +272,14 @@ def broken(kind: str, size: float) -> Callable[[float, float], float]:
 @pytest.mark.parametrize("channel", CHANNELS)
 def test_each_fault_names_its_own_sensor_or_none(channel, kind):
     field, indices, sizes, own = CHANNELS[channel]
-    for index in indices:
-        for size in sizes if kind not in ("stuck", "gain") else sizes[:1]:
-            for from_s in (0.3, MID_STOP_S):
-                stop = drive(BLENDED, put(field, index, broken(kind, size)), from_s=from_s)
-                assert not stop.told & ~own, (channel, index, kind, size, from_s, stop.told)
-                assert stop.distance_m < 1.1 * healthy(BLENDED).distance_m, (channel, index, kind, size, from_s)
+    for index, size, from_s in {
+        (indices[0], sizes[0], 0.3),
+        (indices[0], sizes[1], MID_STOP_S),
+        (indices[-1], sizes[1], 0.3),
+    }:
+        stop = drive(BLENDED, put(field, index, broken(kind, size)), from_s=from_s)
+        assert not stop.told & ~own, (channel, index, kind, size, from_s, stop.told)
+        assert stop.distance_m < 1.1 * healthy(BLENDED).distance_m, (channel, index, kind, size, from_s)
 
 
 def raised(scenario: Scenario) -> tuple[int, tuple[int, ...]]:
@@ -290,6 +314,5 @@ SENSOR_FAULTS = {"wrong_scale", "quantisation", "speed_scale"}  # wheels in anot
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [e.name for e in BUILT_IN if e.name not in SENSOR_FAULTS])
 def test_no_effect_of_typical_size_is_taken_for_a_fault(name):
-    for scenario in (FRICTION, BLENDED):
-        effects = read_effects({name: {}}, name)
-        assert raised(dataclasses.replace(load_scenario(scenario), effects=effects)) == (0, (0, 0, 0)), scenario
+    effects = read_effects({name: {}}, name)
+    assert raised(dataclasses.replace(load_scenario(BLENDED), effects=effects)) == (0, (0, 0, 0))
