@@ -102,7 +102,8 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     )
     if math.isfinite(pedal.travel):
         deceleration = base_brake.reference_deceleration(pedal.travel, p.pedal)
-        if streams is not ALL_CLEAN and streams[Source.PEDAL].suspect:  # perhaps another's: the driver's may be larger
+        # frames of another's: the driver's may be the larger
+        if streams is not ALL_CLEAN and streams[Source.PEDAL].suspect:
             deceleration = max(deceleration, *memory.recent_mps2)
         without_pedal_s = 0.0
     else:
@@ -134,7 +135,7 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     mode = mode_memory.mode
     troubles = memory.troubles
     if active != troubles.active and (mode != BrakeMode.INIT or time_s > p.supervision.start_tolerated_s):
-        troubles = trouble_codes.remember(troubles, active, time_s, _freeze_frame(memory, inputs, p))
+        troubles = trouble_codes.remember(troubles, active, time_s, _freeze_frame(memory, inputs))
     handed_over = mode == BrakeMode.SAFE_STOP and (
         memory.handed_over or without_pedal_s > p.supervision.demand_hold_s + 0.5 * dt_s
     )
@@ -176,12 +177,11 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     return memory, outputs
 
 
-def _freeze_frame(memory: Memory, inputs: Inputs, p: EcuParameters) -> trouble_codes.FreezeFrame:
-    """The car as it is now, with the mode and the demand of the tick before."""
-    speeds = [w for w in inputs.wheel_speed_rad_s if math.isfinite(w)]
+def _freeze_frame(memory: Memory, inputs: Inputs) -> trouble_codes.FreezeFrame:
+    """The car as it is now, with mode, speed and demand of the tick before."""
     return trouble_codes.FreezeFrame(
         memory.modes.mode,
-        max(speeds) * p.vehicle.rolling_radius_m if speeds else math.nan,
+        memory.estimates.speed_mps,
         memory.deceleration_mps2,
         (inputs.pedal_1, inputs.pedal_2),
         inputs.pressure_pa,

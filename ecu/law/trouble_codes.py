@@ -15,8 +15,8 @@ class TroubleCode(NamedTuple):
     """One row of the list.
 
     ``number``: on the wire; ``reaction``: best mode while it is active; ``debounce``, ``healing``: when it becomes
-    active, when it no longer is (``{name}`` stands for a parameter of the supervision); ``fault``: how it shows in
-    BRAKE_STATUS.ACTIVE_FAULTS.
+    active, when it no longer is (``{name}`` stands for a parameter of supervision or plausibility); ``fault``: how it
+    shows in BRAKE_STATUS.ACTIVE_FAULTS.
     """
 
     number: int
@@ -33,7 +33,7 @@ _PEDALS = Fault.PEDAL_1 | Fault.PEDAL_2
 _WHEEL_SPEEDS = Fault.WHEEL_SPEED_FRONT | Fault.WHEEL_SPEED_REAR
 _MOTORS = Fault.MOTOR_FRONT | Fault.MOTOR_REAR
 _GONE = "with its cause"
-_CHECKED = "of the plausibility check"
+_HEALS = "{heal_s} without evidence"
 
 SOURCES: tuple[tuple[Source, str, str, Fault, BrakeMode], ...] = (
     (Source.PEDAL, "pedal", "BRAKE_PEDAL", _PEDALS, _STOP),
@@ -99,12 +99,12 @@ def _of_wheels() -> list[TroubleCode]:
             (
                 f"wheel_speed_{wheel}_implausible",
                 f"wheel speed {where} does not agree with the others and the car's motion",
-                *(_DEGRADED, _CHECKED, _CHECKED, speed),
+                *(_DEGRADED, "{wheel_s} of evidence; a slow wheel 1 s", _HEALS, speed),
             ),
             (
                 f"pressure_{wheel}_implausible",
                 f"brake pressure {where} does not agree with its demand and the others",
-                *(_DEGRADED, _CHECKED, _CHECKED, pressure),
+                *(_DEGRADED, "{pressure_s} of evidence", _HEALS, pressure),
             ),
             (
                 f"motor_{wheel}_failed",
@@ -114,7 +114,12 @@ def _of_wheels() -> list[TroubleCode]:
             (
                 f"motor_{wheel}_torque",
                 f"motor {where} reports another torque than demanded, or none",
-                *(_DEGRADED, _CHECKED, _CHECKED, motor | Fault.MOTOR_TORQUE),
+                *(
+                    _DEGRADED,
+                    "{motor_s} of evidence",
+                    "after {motor_retry_s} of free pedal",
+                    motor | Fault.MOTOR_TORQUE,
+                ),
             ),
         ]
         codes += [TroubleCode(0x2001 + 0x10 * i + k, *row) for k, row in enumerate(rows)]
@@ -125,16 +130,16 @@ _OTHERS = [
     TroubleCode(0x3001, "pedal_1_lost", "pedal channel 1 is not available", _DEGRADED, "none", _GONE, Fault.PEDAL_1),
     TroubleCode(0x3002, "pedal_2_lost", "pedal channel 2 is not available", _DEGRADED, "none", _GONE, Fault.PEDAL_2),
     TroubleCode(0x3003, "pedal_1_implausible", "pedal channel 1 moves as no pedal does", _DEGRADED,
-                _CHECKED, _CHECKED, Fault.PEDAL_1),
+                "{pedal_disagreement_s} of evidence", _HEALS, Fault.PEDAL_1),
     TroubleCode(0x3004, "pedal_2_implausible", "pedal channel 2 moves as no pedal does", _DEGRADED,
-                _CHECKED, _CHECKED, Fault.PEDAL_2),
+                "{pedal_disagreement_s} of evidence", _HEALS, Fault.PEDAL_2),
     TroubleCode(0x3005, "pedal_disagree", "the two pedal channels do not agree", _DEGRADED,
-                "{pedal_disagreement} of travel apart for {pedal_disagreement_s}", _GONE, Fault.PEDAL_DISAGREE),
+                "{pedal_disagreement} of travel apart for {pedal_disagreement_s}", _HEALS, Fault.PEDAL_DISAGREE),
     TroubleCode(0x3006, "pedal_none", "neither pedal channel can be used", _STOP, "none", _GONE, _PEDALS),
     TroubleCode(0x3011, "wheel_speed_both_axles", "wheel speeds of both axles are lost or wrong", _FRICTION, "none",
                 _GONE, _WHEEL_SPEEDS),
     TroubleCode(0x3012, "acceleration_implausible", "the acceleration sensor does not agree with the wheels", _DEGRADED,
-                _CHECKED, _CHECKED, Fault.BODY_MOTION),
+                "{acceleration_s} of evidence", _HEALS, Fault.BODY_MOTION),
     TroubleCode(0x3021, "brake_front_failed", "the brake reports failure of its front axle", _DEGRADED, "none", _GONE,
                 Fault.EHB_PRESSURE_FRONT),
     TroubleCode(0x3022, "brake_rear_failed", "the brake reports failure of its rear axle", _DEGRADED, "none", _GONE,

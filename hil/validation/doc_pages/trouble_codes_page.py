@@ -20,6 +20,8 @@ What the brake controller can find wrong. Generated from `ecu/law/trouble_codes.
   became active (up to 255), whether it is active, and a freeze frame of its first occurrence: mode, speed, demanded
   deceleration, both pedal channels, pressures, motor currents. `EcuNode.trouble_codes` gives it. In INIT nothing is
   kept for {start_tolerated_s}: nodes may start one after the other.
+- **Evidence** that does not agree with the rest adds up, and its absence takes off {forget} of its time: a fault that
+  comes and goes is found, too.
 - **On the bus**: `BRAKE_TROUBLE_CODE` (320, every 100 ms) tells one code after the other, number 0 where there is none;
   `BRAKE_STATUS.ACTIVE_FAULTS` shows the active ones by source.
 
@@ -50,11 +52,11 @@ _HEADS = (("0x1", "Frames of each source"), ("0x2", "Each wheel"), ("0x3", "Peda
 
 
 def _values() -> dict[str, str]:
-    """Parameters of the supervision as text."""
+    """Parameters of supervision and plausibility as text."""
     source = resources.files("ecu.parameters") / "paper_ecu.toml"
-    table = tomllib.loads(source.read_text(encoding="utf-8"))["supervision"]
+    tables = tomllib.loads(source.read_text(encoding="utf-8"))
     values = {}
-    for name, entry in table.items():
+    for name, entry in (tables["supervision"] | tables["plausibility"]).items():
         value, unit = entry["value"], entry["unit"]
         if unit == "s":
             values[name] = f"{value:g} s" if value >= 1.0 else f"{1e3 * value:g} ms"

@@ -105,7 +105,9 @@ def _judged(everything: Sequence[Case], workers: int, progress: Callable[[float]
     found: Judged = {}
     with worker_pool(workers) as pool:
         try:
-            for number, (case, m) in enumerate(zip(everything, pool.map(run, everything, chunksize=_CHUNK), strict=True)):
+            for number, (case, m) in enumerate(
+                zip(everything, pool.map(run, everything, chunksize=_CHUNK), strict=True)
+            ):
                 faults = [armed.injection() for armed in case.faults]
                 found[id(case)] = (case, m, judge(m, faults, scenario.plant, scenario.ecu))
                 progress((number + 1) / len(everything))

@@ -147,7 +147,7 @@ def _armed(kind: FaultKind, target: str, i: int, instants: int, seed: int) -> Ar
 
 def _instant(i: int, instants: int, dice: np.random.Generator) -> float:
     """The i-th instant, s: spread over the spans, drawn inside its part of one, on a tick of the bus."""
-    place = ((i * 0.6180339887) % 1.0 if instants > len(SPANS) else (i + 0.5) / instants)  # golden ratio: even at any i
+    place = (i * 0.6180339887) % 1.0 if instants > len(SPANS) else (i + 0.5) / instants  # golden ratio: even at any i
     for begin_s, end_s, share in SPANS:
         if place < share:
             at_s = begin_s + (end_s - begin_s) * min(place / share + float(dice.uniform(0.0, 0.1)), 1.0)

@@ -7,7 +7,20 @@ from hil.validation.fault_campaign.budgets import ORIGINS
 from hil.validation.fault_campaign.campaign import Campaign
 from hil.validation.fault_campaign.table import Found, Row
 
-HEADS = ("", "runs", "found ms", "motor 0", "friction", "dip m/s2", "stop", "back ms", "stale", "wrong", "miss", "bound")
+HEADS = (
+    "",
+    "runs",
+    "found ms",
+    "motor 0",
+    "friction",
+    "dip m/s2",
+    "stop",
+    "back ms",
+    "stale",
+    "wrong",
+    "miss",
+    "bound",
+)
 """Heads of the table; times and sizes as median and maximum."""
 _TIMES = {"detect_ms": 0, "motor_zero_ms": 0, "friction_back_ms": 0, "dip_mps2": 2, "stop_distance_ratio": 3,
           "recovery_ms": 0}  # fmt: skip

