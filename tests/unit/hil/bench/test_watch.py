@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from dbc.bench_messages import EcuTiming, PlantReception
+from dbc.bench_messages import EcuTiming, FaultCommand, PlantReception
 from dbc.contract import contract, encode, spec_of
 from dbc.e2e import COUNTER_MODULUS, protect
 from dbc.frame import BusName, Frame
@@ -202,6 +202,8 @@ def test_what_the_test_itself_disturbs_is_not_judged(heard):
     assert findings(heard, pause) != []
     assert findings(heard, pause, excused=[(spec.bus, spec.can_id)]) == []
     assert findings(heard, pause, excused=None) == []
+    by_hand = Frame(BusName.BENCH, spec_of(FaultCommand).can_id, bytes(8))
+    assert findings(heard, lambda t, f: [*pause(t, f), by_hand]) == []
 
 
 def test_frames_of_nobody_change_nothing(heard):
