@@ -7,22 +7,40 @@ SILENT_CYCLES = 4
 """Time-out of a message in cycles: the controller, brake and motors react after 40 ms without a 10 ms message."""
 _BURST = 6.0  # frames of one message ahead of its cycle: a late sender that catches up is not two senders
 _FASTER = 1.1  # than its cycle time a sender may be: clocks differ
+_EACH = 2  # of so many reports one is looked at: a counter of 15 values never comes round in that time
 _MOST_LOST = 2  # as of `dbc.e2e.Checker`
 
 
 class Track:
-    """One message as heard since the manoeuvre began."""
+    """One message as heard since the manoeuvre began.
 
-    __slots__ = ("ahead", "corrupt", "count", "counter", "first_ns", "gaps", "jumps", "last_ns", "missing", "spec")
+    Attributes
+    ----------
+    spec, node : the message, and the node that sends it as people call it.
+    timeout_ns : time without it after which its receivers react, ns.
+    first_ns, last_ns, count : its frames; -1 before the first.
+    gaps : when it was silent for longer than its time-out.
+    missing : frames lost by the counters.
+    jumps : sound frames with a counter out of sequence, at full rate.
+    """
 
-    def __init__(self, spec: MessageSpec) -> None:
-        self.spec = spec
+    __slots__ = (
+        "_ahead", "_counter", "_cycle_ns", "_drain", "_length", "_protected", "count", "first_ns", "gaps", "jumps",
+        "last_ns", "missing", "node", "spec", "timeout_ns",
+    )  # fmt: skip
+
+    def __init__(self, spec: MessageSpec, node: str) -> None:
+        self.spec, self.node = spec, node
+        self.timeout_ns = SILENT_CYCLES * spec.cycle_ns
         self.last_ns = -1
-        self.first_ns = -1
-        self.count = self.jumps = self.corrupt = self.missing = 0
-        self.ahead = 0.0
-        self.counter = -1
+        self._cycle_ns = spec.cycle_ns
+        self._drain = _FASTER / spec.cycle_ns
+        self._length = spec.length
+        self._protected = spec.data_id is not None
+        self._ahead = 0.0
+        self._counter = -1
         self.gaps: list[tuple[int, int]] = []
+        self.begin()
 
     def begin(self) -> None:
         """Count from now on."""
@@ -30,44 +48,44 @@ class Track:
         self.count = self.jumps = self.missing = 0
         self.gaps = []
 
-    @property
-    def timeout_ns(self) -> int:
-        """Time without it after which its receivers react, ns."""
-        return SILENT_CYCLES * self.spec.cycle_ns
-
     def hear(self, now_ns: int, data: bytes) -> bool:
         """Take one frame; True where it comes more often than its cycle allows."""
-        since_ns = now_ns - self.last_ns
-        if self.last_ns >= 0 and since_ns > self.timeout_ns:
-            self.gaps.append((self.last_ns, now_ns))
-        if self.spec.data_id is not None:
-            self._follow(since_ns, data)
-        self.ahead = max(0.0, self.ahead - since_ns * _FASTER / self.spec.cycle_ns) + 1.0
-        self.last_ns = now_ns
-        self.first_ns = now_ns if self.first_ns < 0 else self.first_ns
+        last_ns, self.last_ns = self.last_ns, now_ns
+        since_ns = now_ns - last_ns
+        if self.first_ns < 0:
+            self.first_ns = now_ns
         self.count += 1
-        if self.ahead < _BURST:
+        if self._protected:
+            counter = data[1] & 0x0F if len(data) == self._length else COUNTER_MODULUS
+            if counter == self._counter + 1:  # the way of nearly every frame
+                self._counter = counter
+            else:
+                self._follow(counter, since_ns, data)
+        if since_ns > self.timeout_ns and last_ns >= 0:
+            self.gaps.append((last_ns, now_ns))
+        ahead = self._ahead - since_ns * self._drain
+        self._ahead = ahead = ahead + 1.0 if ahead > 0.0 else 1.0
+        if ahead < _BURST:
             return False
-        self.ahead = 0.0
+        self._ahead = 0.0
         return True
 
-    def _follow(self, since_ns: int, data: bytes) -> None:
-        counter = data[1] & 0x0F if len(data) == self.spec.length else COUNTER_MODULUS
-        step = (counter - self.counter) % COUNTER_MODULUS
-        if self.counter >= 0 and not 0 < step <= _MOST_LOST + 1:
-            sound = counter < COUNTER_MODULUS and data[0] == check_value(self.spec.data_id or 0, data)
-            if not sound:
-                self.corrupt += 1
+    def _follow(self, counter: int, since_ns: int, data: bytes) -> None:
+        """Take a counter that is not the one before plus one."""
+        step = (counter - self._counter) % COUNTER_MODULUS
+        if self._counter >= 0 and not 0 < step <= _MOST_LOST + 1:
+            if counter >= COUNTER_MODULUS or data[0] != check_value(self.spec.data_id or 0, data):
                 return
-            self.jumps += since_ns < 2 * self.spec.cycle_ns  # else it is what was lost in a gap
-        elif self.counter >= 0:
+            self.jumps += since_ns < 2 * self._cycle_ns  # else it is what was lost in a gap
+        elif self._counter >= 0:
             self.missing += step - 1
-        self.counter = counter if counter < COUNTER_MODULUS else self.counter
+        if counter < COUNTER_MODULUS:
+            self._counter = counter
 
     @property
     def missed(self) -> tuple[int, int]:
         """Cycles in which nothing was sent, and all cycles, between its first and its last frame."""
-        cycles = round((self.last_ns - self.first_ns) / self.spec.cycle_ns) + 1 if self.count else 0
+        cycles = round((self.last_ns - self.first_ns) / self._cycle_ns) + 1 if self.count else 0
         return max(0, cycles - self.count - self.missing), cycles
 
 
@@ -106,6 +124,7 @@ class Intake:
         names = [field.signal.removeprefix("COUNTER_") for field in spec.fields]
         self.tracks = [by_name[name] for name in names if name in by_name]
         self._spec = spec
+        self._reports = 0
         self._totals = [0, 0]
         self._before = [0, 0]
         self.begin()
@@ -119,7 +138,8 @@ class Intake:
 
     def hear(self, data: bytes, at_ns: int) -> None:
         """Take one report."""
-        if len(data) != self._spec.length:
+        self._reports += 1
+        if self._reports % _EACH or len(data) != self._spec.length:
             return
         *counters, lost, corrupt = self._spec.decode(data)
         self._totals = [lost or 0, corrupt or 0]
@@ -129,7 +149,7 @@ class Intake:
                 self._unchanged[i] = (1, at_ns, track.count)
             else:
                 self._unchanged[i] = (reports + 1, from_ns, sent)
-                if reports > SILENT_CYCLES and track.count - sent > SILENT_CYCLES:
+                if reports * _EACH > SILENT_CYCLES and track.count - sent > SILENT_CYCLES:
                     self.missed[track.spec.name] = (from_ns, at_ns)
         self._counters = counters
 

@@ -30,6 +30,9 @@ _ECU, _PLANT = "ECU", "plant"
 _TIMINGS = {spec_of(EcuTiming): _ECU, spec_of(PlantTiming): _PLANT}
 _RECEPTIONS = {spec_of(EcuReception): _ECU, spec_of(PlantReception): _PLANT}
 _NODE_TIMEOUT_NS = SILENT_CYCLES * 10_000_000  # every node sends something every 10 ms
+_FAULT_COMMANDS = frozenset(
+    spec.can_id for spec in contract(BusName.BENCH).sent_by("BENCH") if spec.name.startswith("FAULT_")
+)
 Key = tuple[BusName, int]
 
 
@@ -51,7 +54,11 @@ class Watch:
     def __init__(self, say: Callable[[str], None] = lambda _: None) -> None:
         self._say = say
         self._vehicle, self._bench = (
-            {i: Track(spec) for i, spec in contract(bus).by_id.items() if spec.cycle_ns and spec.sender != "BENCH"}
+            {
+                i: Track(spec, _node_of(spec))
+                for i, spec in contract(bus).by_id.items()
+                if spec.cycle_ns and spec.sender != "BENCH"
+            }
             for bus in (BusName.VEHICLE, BusName.BENCH)
         )
         self._ticks = {spec.can_id: Ticks(spec) for spec in _TIMINGS}
@@ -92,16 +99,21 @@ class Watch:
             tracks = self._vehicle if bus is BusName.VEHICLE else self._bench
             track = tracks.get(can_id)
             if track is None or extended:
+                if bus is BusName.BENCH and can_id in _FAULT_COMMANDS and not extended:
+                    self.excuse()  # somebody injects faults by hand
                 continue
             at_ns = stamp_ns or now_ns
-            self._newest_ns = max(self._newest_ns, at_ns)
+            if at_ns > self._newest_ns:
+                self._newest_ns = at_ns
             if track.hear(at_ns, data):
                 self._another(track)
-            self._follow(_node_of(track.spec), at_ns)
-            if tracks is self._bench and can_id in self._ticks:
-                self._ticks[can_id].hear(data)
-            elif tracks is self._bench and can_id in self._intakes:
-                self._intakes[can_id].hear(data, at_ns)
+            if at_ns != self._last_ns.get(track.node):
+                self._follow(track.node, at_ns)
+            if tracks is self._bench:
+                if can_id in self._ticks:
+                    self._ticks[can_id].hear(data)
+                elif can_id in self._intakes:
+                    self._intakes[can_id].hear(data, at_ns)
         for node, last_ns in self._last_ns.items():
             if self._newest_ns - last_ns > _NODE_TIMEOUT_NS and node not in self._silent:
                 self._silent.add(node)
@@ -150,7 +162,7 @@ class Watch:
         ended: dict[str, list[Track]] = {}
         for track in self._judged():
             if self._newest_ns - track.last_ns > track.timeout_ns:
-                ended.setdefault(_node_of(track.spec), []).append(track)
+                ended.setdefault(track.node, []).append(track)
         for node, tracks in ended.items():
             tracks.sort(key=lambda track: track.last_ns)
             listed = ", ".join(f"{track.spec.name} at {self._s(track.last_ns)}" for track in tracks[:3])
@@ -165,7 +177,7 @@ class Watch:
                 (a, b), more = stalls[0], f", {len(stalls)} times in all" if len(stalls) > 1 else ""
                 yield Finding(Verdict.INCONCLUSIVE, f"the {node} was silent from {self._s(a)} to {self._s(b)}{more}")
         for track in self._judged():
-            stalls = self._stalls[_node_of(track.spec)]
+            stalls = self._stalls[track.node]
             alone = [gap for gap in track.gaps if not any(a < gap[1] and gap[0] < b for a, b in stalls)]
             if alone:
                 (a, b), timeout = alone[0], f"time-out {track.timeout_ns * 1e-6:g} ms"
@@ -183,7 +195,7 @@ class Watch:
         """Nodes that skipped ticks, by their own word, or else by the worst of their messages."""
         worst: dict[str, tuple[int, int, str]] = {}
         for track in self._judged():
-            node, (missed, cycles) = _node_of(track.spec), track.missed
+            node, (missed, cycles) = track.node, track.missed
             if missed >= worst.get(node, (0, 0, ""))[0]:
                 worst[node] = (missed, cycles, f"cycles of {track.spec.name}")
         for spec, node in _TIMINGS.items():
