@@ -108,13 +108,16 @@ def test_order_is_kept(join):
     received, refused = [], 0
     for start in range(0, 3000, 30):
         here.send(frames(range(start, start + 30)))
-        received += there.receive(0.01)
-        if here.name.startswith("virtual"):  # its driver's threads may be run over, where the machine is slow
-            refused += lost(here.receive(), LinkState.TX_OVERFLOW)
-    received += receive_all(there, 3000 - len(received) - refused)
+        received += there.receive()
+    while (news := there.receive(0.5)) or len(received) + refused < 3000:
+        received += news
+        told = here.receive()  # a driver's threads may be run over, where the machine is slow
+        refused += lost(told, LinkState.TX_OVERFLOW)
+        assert news or told, f"{len(received)} arrived, {refused} refused"
     arrived = numbers(received)
     assert arrived == sorted(arrived)
     assert len(arrived) + refused == 3000
+    assert refused == 0 or here.name.startswith("virtual")
 
 
 @every_bus
