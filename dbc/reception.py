@@ -28,6 +28,8 @@ from dbc.intake import (
 _OK, _OK_SOME_LOST, _SYNC, _REPEATED = Status.OK, Status.OK_SOME_LOST, Status.SYNC, Status.REPEATED
 _WRONG_SEQUENCE, _WRONG_CRC = Status.WRONG_SEQUENCE, Status.WRONG_CRC
 MOST_LATE_CYCLES = 5  # a sender that is later does not catch up: 30 ms of a late node and two of its cycles
+FORGOTTEN_IN = 50  # lateness is forgotten by 2 % of the time: a sender's clock may be as much too fast
+_QUEUE_NS = -(1 << 62)  # what has waited before the first tick all comes at once
 SILENT_CYCLES = COUNTER_MODULUS  # without any frame for the counter's length, any counter may follow
 ADOPTED_CYCLES = 1000  # 10 s at 10 ms, longer than a stop: a sender that restarted within the counter's length
 
@@ -78,6 +80,7 @@ class Reception:
         self._cycle_ns = 0 if self.checker is None else spec.cycle_ns
         self._usual_ns = self._cycle_ns
         self._ahead_ns = 0  # by its counter, of its earliest phase so far; at most 0, negative where late
+        self._judged_ns = 0  # tick for which that holds
         self._stray_ns = self._stray_since_ns = self._stray_counter = -1
 
     @property
@@ -161,7 +164,10 @@ class Reception:
             elif since_ns < SILENT_CYCLES * cycle_ns:
                 self._note(now_ns, foreign=1)  # the same counter with other bytes
             return status
-        late_ns = max(self._ahead_ns, -MOST_LATE_CYCLES * cycle_ns) if since_ns else self._ahead_ns
+        late_ns = self._ahead_ns
+        if now_ns != self._judged_ns:
+            late_ns = max(late_ns, -MOST_LATE_CYCLES * cycle_ns) + (now_ns - self._judged_ns) // FORGOTTEN_IN
+            late_ns = min(late_ns, 0)
         ahead_ns = late_ns + step * cycle_ns - since_ns
         if self._usual_ns < 0:  # frames of another counter came since
             gap = (since_ns - step * cycle_ns + cycle_ns) % (COUNTER_MODULUS * cycle_ns)
@@ -174,7 +180,7 @@ class Reception:
         if fits:
             if 2 * ahead_ns > cycle_ns and status is not _WRONG_SEQUENCE:
                 self._note(now_ns, foreign=1)  # more frames than cycles
-            self._ahead_ns = min(ahead_ns, 0)
+            self._ahead_ns, self._judged_ns = min(ahead_ns, 0), now_ns
             self._usual_ns = cycle_ns
             self._remember(now_ns, data)
             return status
@@ -190,7 +196,7 @@ class Reception:
 
     def _begin(self, now_ns: int, data: bytes, status: Status) -> Status:
         """Follow a stream from this frame on."""
-        self._ahead_ns = 0
+        self._ahead_ns, self._judged_ns = _QUEUE_NS, now_ns
         self._usual_ns = self._cycle_ns
         self._remember(now_ns, data)
         return status

@@ -61,11 +61,12 @@ def _judge(stream: Stream, h: Health, timed_out: bool, p: SupervisionParameters,
     odd = h.bad or h.foreign or h.doubled
     if stream is CLEAN and not odd:
         return stream
+    # foreign frames of one tick count as one: a node that was late may bring all of them at once
     bad_limit = p.bad_frame_weight * p.bad_frames_to_downgrade
     foreign_limit = p.foreign_frame_weight * p.foreign_frames_to_downgrade
     bad = _level(stream.bad, p.bad_frame_weight * h.bad, h.fresh, bad_limit)
-    foreign = _level(stream.foreign, p.foreign_frame_weight * h.foreign, h.fresh, foreign_limit)
-    doubled = _level(stream.doubled, h.doubled, h.fresh, foreign_limit)
+    foreign = _level(stream.foreign, p.foreign_frame_weight * min(h.foreign, 1), h.fresh, foreign_limit)
+    doubled = _level(stream.doubled, min(h.doubled, 1), h.fresh, foreign_limit)
     clean_s = 0.0 if odd or timed_out else stream.clean_s + dt_s
     healed = clean_s >= p.communication_healing_s
     corrupted = bad >= bad_limit or (stream.corrupted and not (healed and bad == 0))

@@ -39,8 +39,8 @@ A frame is used when its check value, its length, its counter and its time are r
 
 Not seen, by the nature of a counter 0..14 without a key:
 
-- a replay whose age is a multiple of 15 frames, or one frame more or less (three of 15 ages; up to five more where the
-  sender has been late before, by as many cycles);
+- a replay whose age is a multiple of 15 frames, or one frame more or less (three of 15 ages; up to five more, for
+  2.5 s, after the sender has started or has been late);
 - one that starts after 15 cycles of silence: the silence itself has its code and its reaction, but the stream is then
   taken for a sender that restarted; a stream delayed by a pause, which goes on with the next counter, likewise;
 - a sender that silences the real one and counts on in step. This is no fault but an attack; end-to-end protection is

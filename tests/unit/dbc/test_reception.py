@@ -9,9 +9,10 @@ from dbc.e2e import COUNTER_MODULUS
 from dbc.exchange import Receiver
 from dbc.frame import BusName, Frame
 from dbc.messages import BrakePedal
-from dbc.reception import ADOPTED_CYCLES, MOST_LATE_CYCLES, SILENT_CYCLES
+from dbc.reception import ADOPTED_CYCLES, FORGOTTEN_IN, MOST_LATE_CYCLES, SILENT_CYCLES
 
 CYCLE_NS = 10_000_000
+STEADY = MOST_LATE_CYCLES * FORGOTTEN_IN
 REAL, FAKE = 0.6, 0.0
 
 
@@ -48,11 +49,11 @@ class Ear:
 
 @pytest.fixture
 def ear():
-    """In step with its sender for forty ticks."""
+    """In step with its sender for long enough."""
     made = Ear()
-    for tick in range(40):
+    for tick in range(40 - STEADY, 40):
         made.hear(tick, payload(tick))
-    assert (len(made.used), made.odd) == (39, (0, 0, 0))
+    assert (len(made.used), made.odd) == (STEADY - 1, (0, 0, 0))
     return made
 
 
@@ -147,7 +148,16 @@ def test_a_receiver_that_was_stopped_reads_its_queue(ear):
     ear.hear(60, *[payload(n) for n in range(40, 61)])
     ear.hear(61, payload(61))
     assert ear.odd == (0, 0, 0)
-    assert len(ear.used) == 39 + 22
+    assert len(ear.used) == STEADY - 1 + 22
+
+
+def test_what_waited_before_the_first_tick_comes_at_once():
+    ear = Ear()
+    ear.hear(200, *[payload(n) for n in range(200)])
+    for tick in range(201, 300):
+        ear.hear(tick, payload(tick - 1))
+    assert ear.odd == (0, 0, 0)
+    assert len(ear.used) == 199 + 99
 
 
 def test_a_sender_restarted_without_silence_is_adopted_when_it_has_lived_alone_long_enough(ear):

@@ -15,6 +15,7 @@ from hil.scenario.scenario import load_scenario
 
 BRAKING = 300  # tick in which it begins: 1.9 s into the stop at full pedal
 BRAKING_S = 1.9
+SLOW = pytest.mark.slow
 PEDAL, FRONT_SPEED = spec_of(BrakePedal).can_id, spec_of(WheelSpeedFront).can_id
 
 
@@ -79,7 +80,14 @@ def second_pedal(offset, first=False):
     return alter
 
 
-@pytest.mark.parametrize(("offset", "first"), [(0, False), (0, True), (1, False), (1, True), (3, False), (9, False)])
+@pytest.mark.parametrize(
+    ("offset", "first"),
+    [
+        (0, False),
+        (1, False),
+        *[pytest.param(*case, marks=SLOW) for case in ((0, True), (1, True), (3, False), (9, False))],
+    ],
+)
 def test_a_second_pedal_sender_never_releases_the_brake(nominal, offset, first):
     stop = Stop(second_pedal(offset, first))
     assert list(stop.codes) == ["pedal_second_sender"]
@@ -90,7 +98,7 @@ def test_a_second_pedal_sender_never_releases_the_brake(nominal, offset, first):
     assert stop.least_pressure > 0.9
 
 
-@pytest.mark.parametrize("late", [200, 7])
+@pytest.mark.parametrize("late", [200, pytest.param(7, marks=SLOW)])
 def test_replayed_pedal_frames_are_not_used(nominal, late):
     heard = []
 
@@ -136,19 +144,24 @@ def test_five_corrupt_frames_in_a_row_have_their_code_and_heal(nominal):
     assert stop.distance_m == pytest.approx(nominal.distance_m, abs=0.3)
 
 
+@pytest.mark.slow
 def test_one_frame_in_five_corrupt_changes_nothing(nominal):
     stop = Stop(corrupted(lambda n: n % 5 == 0))
     assert stop.codes == {}
     assert set(stop.modes) == {BrakeMode.NORMAL}
 
 
-@pytest.mark.parametrize("faults", [{"drop": 0.01}, {"late": 0.1}, {"duplicate": 0.3}, {"stale": 0.02}])
+@pytest.mark.parametrize(
+    "faults",
+    [{"late": 0.1}, *[pytest.param(one, marks=SLOW) for one in ({"drop": 0.01}, {"duplicate": 0.3}, {"stale": 0.02})]],
+)
 def test_moderate_faults_of_frames_flip_nothing(nominal, faults):
     stop = Stop(**faults)
     assert stop.codes == {}
     assert set(stop.modes) == {BrakeMode.NORMAL}
 
 
+@pytest.mark.slow
 def test_many_lost_frames_are_lost_frames_and_nothing_else(nominal):
     stop = Stop(drop=0.2)
     assert {name.rpartition("_")[2] for name in stop.codes} - {"none", "axles"} == {"lost"}
