@@ -15,7 +15,7 @@ from hil.bench.result import Signals
 
 NO_TAKEOVER = """
 import ecu.law.step  # every motor is taken for able, whatever it reports
-ecu.law.step._usable_torque = lambda inputs, lost, mode: (700.0, 700.0, 700.0, 700.0)
+ecu.law.step._usable_torque = lambda *_: (700.0, 700.0, 700.0, 700.0)
 """
 FIXTURES = """
 import pytest
@@ -215,6 +215,7 @@ def test_an_ecu_that_says_nothing_is_named(run_pytest):
     assert named(out, "recording").exists()
 
 
+@pytest.mark.slow
 def test_an_exception_in_an_own_node_is_shown_with_file_and_line(run_pytest):
     out = output(run_pytest(RAISING_ECU), 1)
     assert "return 1.0 / (now_ns - now_ns)" in out
@@ -258,6 +259,7 @@ def test_in_real_time(run_pytest, tmp_path):
     assert f'<property name="brakebench verdict" value="{verdict}"' in junit
 
 
+@pytest.mark.slow
 def test_a_run_that_a_second_sender_disturbs_has_not_passed(run_pytest, channel):
     """Somebody sends pedal frames in the middle of a test whose own checks hold."""
     text = REAL.replace("bench.run_until(stopped", "disturb(bench)\n    bench.run_until(stopped") + DISTURB
