@@ -24,7 +24,9 @@ from plant.parameters.plant import PlantParameters
 FRICTION_BACK_MS = 150.0
 DIP_REPORTED_MS, DIP_SILENT_MS = 100.0, 150.0
 SHARE_OF_LONG_FLIPS = 0.006  # exact for CRC 0x1D over 64 bits: 0.475 % at 3 bits, about 0.39 % above
-FOREIGN_BEFORE_FOUND = 3  # frames of a second sender that are taken before it can be found (foreign_frames_to_downgrade)
+FOREIGN_BEFORE_FOUND = (
+    3  # frames of a second sender that are taken before it can be found (foreign_frames_to_downgrade)
+)
 FOREIGN_AT_ACTUATOR = 15  # cycles until an actuator that does other than asked is found (budget of the silent motor)
 NO_DIP_MPS2 = 0.3
 ORIGINS = {
@@ -38,8 +40,8 @@ ORIGINS = {
     "trouble codes)",
     "stale_used": "1 or 2 bits turned: never; 3 to 16: 0.6 % (exact for the check value); old frames: never; of a "
     "second sender: three until it is found",
-    "release": f"less than half of the braking due for {DIP_SILENT_MS:g} ms at most: losing a demand never releases the "
-    "brake (design)",
+    "release": f"less than half of the braking due for {DIP_SILENT_MS:g} ms at most: losing a demand never releases "
+    "the brake (design)",
     "wrong_code": "no trouble code of another part, no mode beside those of the fault library",
     "exceptions": "none",
 }
@@ -95,9 +97,7 @@ def step_pa(lost_nm: float, ecu: EcuParameters) -> float:
     return lost_nm / per_pa
 
 
-def judge(
-    m: Measured, faults: Sequence[Injection], plant: PlantParameters, ecu: EcuParameters
-) -> list[Miss]:
+def judge(m: Measured, faults: Sequence[Injection], plant: PlantParameters, ecu: EcuParameters) -> list[Miss]:
     """Misses of one run, those that physics forces included; of a pair without the times of a single fault."""
     fault = faults[0] if len(faults) == 1 else None
     misses = []

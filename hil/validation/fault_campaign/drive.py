@@ -209,7 +209,7 @@ def drive(seed: int, faults: Sequence[Injection], timeout_s: float | None = None
     stale_s: list[float] = []
     standing_since_s = math.nan
     try:
-        for now_ns, member, frames in lockstep(taking_part):
+        for now_ns, member, _ in lockstep(taking_part):
             if member > _ECU:
                 if plant.manoeuvre_start_ns is None and now_ns > 15_000_000_000:
                     raise RuntimeError("the manoeuvre did not start within 15 s")
@@ -244,11 +244,15 @@ def drive(seed: int, faults: Sequence[Injection], timeout_s: float | None = None
     status = np.array(notes.status or [[-1, -1]])
     return Trace(
         speed, distance, friction,
-        -np.array(notes.motor or [[math.nan] * 4]), -np.array(notes.followed or [[math.nan] * 4]),
-        -np.array(notes.asked or [[math.nan] * 4]), status[:, 0], status[:, 1],
+        _braking(notes.motor), _braking(notes.followed), _braking(notes.asked), status[:, 0], status[:, 1],
         befallen_s, outside[0].altered + outside[1].altered, tuple(stale_s), np.array(notes.own_map, bool),
         tuple((t.code, t.occurrences) for t in ecu.trouble_codes), error,
     )  # fmt: skip
+
+
+def _braking(rows: Sequence[Sequence[float] | Vector]) -> NDArray[np.float64]:
+    """Torques of four wheels, positive where they brake."""
+    return -np.array(rows if rows else [[math.nan] * 4], np.float64)
 
 
 def _judged_ids(fault: Injection) -> frozenset[int]:

@@ -19,8 +19,15 @@ HALF = 0.5  # a brake that gives less than half of what is due has let go
 MISSING = {"motor_deaf": 40.0, "motor_weak": 110.0}
 """Torque asked of a motor below which a missing part is not seen: inside the 20 % and 30 Nm of a motor that is well."""
 _HANDOVER_S = 1.0  # friction takes over within, or never
-_MOTOR_SOURCES = {"MOTOR_STATUS_FRONT": (0, 1), "MOTOR_STATUS_REAR": (2, 3), "MOTOR_DEMAND_FRONT": (0, 1),
-                  "MOTOR_DEMAND_REAR": (2, 3), "IWM": (0, 1, 2, 3), "ECU": (0, 1, 2, 3), "PLANT": (0, 1, 2, 3)}  # fmt: skip
+_MOTOR_SOURCES = {
+    "MOTOR_STATUS_FRONT": (0, 1),
+    "MOTOR_STATUS_REAR": (2, 3),
+    "MOTOR_DEMAND_FRONT": (0, 1),
+    "MOTOR_DEMAND_REAR": (2, 3),
+    "IWM": (0, 1, 2, 3),
+    "ECU": (0, 1, 2, 3),
+    "PLANT": (0, 1, 2, 3),
+}
 FROM_THE_CONTROLLER = ("EHB_DEMAND_FRONT", "EHB_DEMAND_REAR", "MOTOR_DEMAND_FRONT", "MOTOR_DEMAND_REAR", "ECU")
 
 
@@ -145,7 +152,7 @@ def measured(
     _look_at_motors(m, trace, other, first, seen, wheels, from_controller)
     _look_at_brakes(m, trace, other, first, until_s)
     if math.isfinite(until_s) and seen is not None:
-        end = int(round(until_s / TICK_S))
+        end = round(until_s / TICK_S)
         begun, said = max(first, end - 5), np.flatnonzero(trace.mode >= 0)
         if worse[begun:].any():
             last = begun + int(np.flatnonzero(worse[begun:])[-1])

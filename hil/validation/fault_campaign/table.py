@@ -54,6 +54,7 @@ class Row:
     numbers : each run's, by column; NaN where there is nothing to measure, infinite where it never came.
     longest : the run that stopped last, m beyond its twin, and which it was.
     found : misses, those with a bound included.
+    parts : its rows by target, where it is all of them.
     """
 
     fault: str
@@ -67,6 +68,7 @@ class Row:
     exceptions: int = 0
     wrong_code: int = 0
     found: list[Found] = field(default_factory=list)
+    parts: list["Row"] = field(default_factory=list)
 
     def statistics(self, column: str) -> dict[str, float | None]:
         """Median, 99th percentile and maximum; None where nothing was measured, or it never came."""
@@ -94,7 +96,7 @@ class Row:
         """As JSON values."""
         return {
             "fault": self.fault,
-            "target": self.target,
+            **({"target": self.target} if self.target else {}),
             "row": self.heading,
             "runs": self.runs,
             **{column: self.statistics(column) for column in NUMBERS},
@@ -106,6 +108,7 @@ class Row:
             "wrong_code": self.wrong_code,
             "misses": [one.as_json() for one in self.misses],
             "bounded": [one.as_json() for one in self.bounded],
+            **({"targets": [part.as_json() for part in self.parts]} if self.parts else {}),
         }
 
 
@@ -145,6 +148,7 @@ def merged(rows: Iterable[Row]) -> list[Row]:
         whole.exceptions += row.exceptions
         whole.wrong_code += row.wrong_code
         whole.found += row.found
+        whole.parts.append(row)
     return list(found.values())
 
 

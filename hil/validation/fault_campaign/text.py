@@ -7,7 +7,20 @@ from hil.validation.fault_campaign.budgets import ORIGINS
 from hil.validation.fault_campaign.campaign import Campaign
 from hil.validation.fault_campaign.table import Found, Row
 
-HEADS = ("", "runs", "found ms", "motor 0", "friction", "dip m/s2", "stop", "back ms", "stale", "wrong", "miss", "bound")
+HEADS = (
+    "",
+    "runs",
+    "found ms",
+    "motor 0",
+    "friction",
+    "dip m/s2",
+    "stop",
+    "back ms",
+    "stale",
+    "wrong",
+    "miss",
+    "bound",
+)
 """Heads of the table; times and sizes as median and maximum."""
 _TIMES = {"detect_ms": 0, "motor_zero_ms": 0, "friction_back_ms": 0, "dip_mps2": 2, "stop_distance_ratio": 3,
           "recovery_ms": 0}  # fmt: skip
@@ -44,7 +57,7 @@ def at_timeouts(timeouts: dict[int, list[Row]]) -> tuple[list[str], list[tuple[s
     """Heads and lines of the table at several time-outs: found, longest dip and longest stop at each."""
     first = next(iter(timeouts.values()))
     heads = ["", "runs"]
-    for column, name in (("detect_ms", "found"), ("dip_ms", "dip ms"), ("stop_distance_ratio", "stop")):
+    for name in ("found", "dip ms", "stop"):
         heads += [f"{name} {t}" if k == 0 else str(t) for k, t in enumerate(timeouts)]
     lines = []
     for k, row in enumerate(first):
