@@ -69,7 +69,7 @@ def _tell(text: str) -> None:
 
 def _lines(campaign: "Campaign", by_target: bool, width: int) -> list[str]:
     from hil.validation.fault_campaign.table import merged
-    from hil.validation.fault_campaign.text import at_timeouts, legend, missed, verdict
+    from hil.validation.fault_campaign.text import at_timeouts, bounded, legend, missed, verdict
 
     lines = _table(campaign.rows if by_target else merged(campaign.rows), by_target, width)
     if campaign.pairs:
@@ -82,9 +82,10 @@ def _lines(campaign: "Campaign", by_target: bool, width: int) -> list[str]:
                   "own): maxima"]  # fmt: skip
         lines += columns(*at_timeouts(campaign.timeouts), width)
     lines += ["", *wrapped(legend(), width, "")]
-    sentences = [missed(found, row) for row in campaign.judged for found in sorted(row.found, key=lambda f: f.bound)]
-    lines += [""] + [line for sentence in sorted(sentences) for line in wrapped(sentence, width)]
-    return [*lines, ""] + [line for sentence in verdict(campaign) for line in wrapped(sentence, width)]
+    for sentences in (missed(campaign.judged), bounded(campaign.judged), verdict(campaign)):
+        if sentences:
+            lines += ["", *(line for sentence in sentences for line in wrapped(sentence, width))]
+    return lines
 
 
 def _table(rows: "list[Row]", by_target: bool, width: int) -> list[str]:

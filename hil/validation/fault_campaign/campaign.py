@@ -112,7 +112,7 @@ def _judged(everything: Sequence[Case], workers: int, progress: Callable[[float]
                 zip(everything, pool.map(run, everything, chunksize=_CHUNK), strict=True)
             ):
                 faults = [armed.injection() for armed in case.faults]
-                found[id(case)] = (case, m, judge(m, faults, scenario.plant, scenario.ecu))
+                found[id(case)] = (case, m, judge(m, faults, scenario.ecu))
                 progress((number + 1) / len(everything))
         except BaseException:  # a Ctrl-C must not wait for what nobody will see
             pool.shutdown(wait=False, cancel_futures=True)

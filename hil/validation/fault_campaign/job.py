@@ -7,7 +7,8 @@ from dbc.messages import BrakeMode
 from hil.faults.fault import Expected
 from hil.validation.fault_campaign.cases import PAIR, Case
 from hil.validation.fault_campaign.drive import Trace, drive
-from hil.validation.fault_campaign.measure import Measured, forget_brakes, measure, measured, without_car
+from hil.validation.fault_campaign.measure import Measured, measured
+from hil.validation.fault_campaign.rules import forget_brakes, measure, without_car
 
 
 @lru_cache(maxsize=64)
@@ -37,7 +38,8 @@ def _pair(case: Case) -> Measured:
     if any(map(without_car, faults)):
         forget_brakes(both)
     worst = max(one.worst_mode for one in alone)
-    if both.worst_mode < worst:
+    silent = any(fault.target.name == "ECU" and fault.kind.family == "process" for fault in faults)
+    if both.worst_mode < worst and not silent:
         wrong = f"{BrakeMode(both.worst_mode).name} where one of the two alone leads to {BrakeMode(worst).name}"
         both = replace(both, wrong_modes=(*both.wrong_modes, wrong))
     return both

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dbc.messages import BrakeMode, Fault
-from hil.faults.fault import Expected, Injection, Side
+from hil.faults.fault import Expected
 from hil.validation.fault_campaign.drive import STANDING_MPS, TICK_S, Trace
+from hil.validation.fault_campaign.physics import follows_s
 
 Array = NDArray[np.float64]
 NONE_NM = 10.0  # motor torque that counts as none: 0.02 m/s2 of the car
@@ -16,19 +17,7 @@ LITTLE_NM = 100.0  # regeneration below which its loss is not looked at: 0.2 m/s
 SHORTFALL_MPS2 = 1.0  # budget: deceleration below the demand
 TAKEN = 0.9  # budget: share of the lost regeneration that friction gives
 HALF = 0.5  # a brake that gives less than half of what is due has let go
-MISSING = {"motor_deaf": 40.0, "motor_weak": 110.0}
-"""Torque asked of a motor below which a missing part is not seen: inside the 20 % and 30 Nm of a motor that is well."""
 _HANDOVER_S = 1.0  # friction takes over within, or never
-_MOTOR_SOURCES = {
-    "MOTOR_STATUS_FRONT": (0, 1),
-    "MOTOR_STATUS_REAR": (2, 3),
-    "MOTOR_DEMAND_FRONT": (0, 1),
-    "MOTOR_DEMAND_REAR": (2, 3),
-    "IWM": (0, 1, 2, 3),
-    "ECU": (0, 1, 2, 3),
-    "PLANT": (0, 1, 2, 3),
-}
-FROM_THE_CONTROLLER = ("EHB_DEMAND_FRONT", "EHB_DEMAND_REAR", "MOTOR_DEMAND_FRONT", "MOTOR_DEMAND_REAR", "ECU")
 
 
 @dataclass(slots=True)
@@ -39,7 +28,8 @@ class Measured:
     ----------
     detect_ms : first frame befallen (or switch in the car) to the controller's report.
     motor_zero_ms : to no torque demand for what has failed.
-    friction_back_ms : report to friction giving 90 % of the lost regeneration.
+    friction_back_ms : report (or the loss, where it comes later) to friction giving 90 % of the lost regeneration.
+    friction_bound_ms : the same of a brake that is asked for exactly what is lost.
     dip_mps2, dip_ms : deepest shortfall of deceleration, and how long it was above 1.0 m/s2.
     lost_nm, lost_mps2 : regeneration that was lost, at its most.
     release_ms : how long the brakes gave less than half of what the driver asked for.
@@ -47,7 +37,7 @@ class Measured:
     recovery_ms : end of the fault to the twin's mode.
     worst_mode : while it acted.
     left_s : from the first frame befallen to the stop.
-    stale_used, altered : frames.
+    stale_used, stale_in_all, altered : frames; the first until the fault was found.
     error : what was raised.
     wrong_faults, wrong_modes : what was reported beside what is right.
     """
@@ -55,6 +45,7 @@ class Measured:
     detect_ms: float = math.nan
     motor_zero_ms: float = math.nan
     friction_back_ms: float = math.nan
+    friction_bound_ms: float = math.nan
     dip_mps2: float = math.nan
     dip_ms: float = math.nan
     lost_nm: float = math.nan
@@ -67,49 +58,13 @@ class Measured:
     befallen_s: float = math.nan
     left_s: float = math.nan
     stale_used: int = 0
+    stale_in_all: int = 0
     altered: int = 0
     error: str = ""
     wrong_faults: Fault = Fault.NONE
     wrong_modes: tuple[str, ...] = ()
     codes: tuple[str, ...] = ()
     healing: tuple[str, ...] = field(default_factory=tuple)
-
-
-def measure(trace: Trace, twin: Trace, fault: Injection) -> Measured:
-    """Measure the run of one fault."""
-    name, right = fault.kind.name, fault.expected
-    wheels = wheels_of(fault)
-    if name in MISSING and not math.isnan(trace.befallen_s):  # nothing is missing of what is not asked for
-        asked = twin.motor_nm[:, list(wheels)].max(axis=1)
-        due = np.flatnonzero(asked[int(trace.befallen_s / TICK_S + 1e-6) :] > MISSING[name])
-        trace.befallen_s = trace.befallen_s + int(due[0]) * TICK_S if len(due) else math.nan
-    m = measured(trace, twin, right, fault.until_s, wheels, _of_controller(fault))
-    if right.motor_zero_ms is None:
-        m.motor_zero_ms = math.nan
-    if without_car(fault):
-        forget_brakes(m)
-    return m
-
-
-def without_car(fault: Injection) -> bool:
-    """Whether the process of the car stands still: a brake's figures say nothing then."""
-    return fault.kind.family == "process" and fault.target.name == "PLANT"
-
-
-def forget_brakes(m: Measured) -> None:
-    """Take out what a car that is not stepped cannot show."""
-    m.dip_mps2 = m.dip_ms = m.release_ms = m.lost_nm = m.lost_mps2 = m.friction_back_ms = math.nan
-
-
-def wheels_of(fault: Injection) -> tuple[int, ...]:
-    """Motors that a fault takes away; none where it does not."""
-    if fault.kind.name.startswith("motor_"):
-        return tuple(i for i in range(4) if fault.target.wheels >> i & 1)
-    return _MOTOR_SOURCES.get(fault.target.name.partition(".")[0], ())
-
-
-def _of_controller(fault: Injection) -> bool:
-    return fault.target.name in FROM_THE_CONTROLLER and fault.kind.side is not Side.PLANT
 
 
 def measured(
@@ -148,6 +103,7 @@ def measured(
     if len(own_map) and (trace.mode[first + int(own_map[0])] < 0 or seen is None):  # the brake itself finds it
         seen = min(first + int(own_map[0]), n if seen is None else seen)
         m.detect_ms = 1e3 * (seen * TICK_S - trace.befallen_s)
+    m.stale_in_all = len(trace.stale_s)
     m.stale_used = sum(seen is None or at_s < seen * TICK_S for at_s in trace.stale_s)
     _look_at_motors(m, trace, other, first, seen, wheels, from_controller)
     _look_at_brakes(m, trace, other, first, until_s)
@@ -157,7 +113,13 @@ def measured(
         if worse[begun:].any():
             last = begun + int(np.flatnonzero(worse[begun:])[-1])
             m.recovery_ms = math.inf if last >= said[-1] else max(0.0, 1e3 * TICK_S * (last + 1 - end))
+    retried_later = any(name.startswith("motor_") and name.endswith("_torque") for name in m.codes)
+    if retried_later and math.isinf(m.recovery_ms):
+        m.recovery_ms = math.nan  # such a motor is tried again some time after the pedal is released: not in this stop
     return m
+
+
+_PEDALS = Fault.PEDAL_1 | Fault.PEDAL_2
 
 
 class _Rows:
@@ -191,9 +153,11 @@ def _look_at_reports(m: Measured, trace: Trace, other: _Rows, right: Expected, u
 
 
 def _beside(right: Fault) -> Fault:
-    """Bits that name nobody, beside those that do: what is wrong with frames, or with a torque."""
+    """Bits that name no other part: what is wrong with frames, with a torque, or between two channels."""
     motors = right & (Fault.MOTOR_FRONT | Fault.MOTOR_REAR)
-    return Fault.COMMUNICATION | (Fault.MOTOR_TORQUE if motors else Fault.NONE)
+    pedals = right & _PEDALS == _PEDALS
+    beside = Fault.COMMUNICATION | (Fault.MOTOR_TORQUE if motors else Fault.NONE)
+    return beside | (Fault.PEDAL_DISAGREE if pedals else Fault.NONE)
 
 
 def _look_at_motors(
@@ -217,6 +181,7 @@ def _look_at_motors(
     if not len(lost_rows):
         return
     taken = np.flatnonzero((gone >= LITTLE_NM) & (extra >= TAKEN * gone))
+    m.friction_bound_ms = 1e3 * (follows_s(gone, TICK_S, TAKEN, LITTLE_NM) - TICK_S * int(lost_rows[0]))
     if len(taken):  # from when it is lost, where it is found before
         m.friction_back_ms = 1e3 * TICK_S * int(taken[0] - lost_rows[0])
     elif (gone[lost_rows[0] :] >= LITTLE_NM).all():  # else the motors came back before

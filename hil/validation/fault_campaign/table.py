@@ -35,12 +35,13 @@ class Found:
     bound: str
     text: str
     where: str
+    bound_ms: float
 
     def as_json(self) -> dict[str, Any]:
         """As JSON values; a time that never came is null."""
         worst = _finite(self.worst)
         return {"budget": self.budget, "times": self.times, "worst": worst, "limit": self.limit, "bound": self.bound,
-                "text": self.text, "run": self.where}  # fmt: skip
+                "bound_ms": _finite(self.bound_ms), "text": self.text, "run": self.where}  # fmt: skip
 
 
 @dataclass(slots=True)
@@ -130,7 +131,9 @@ def row_of(runs: Sequence[tuple[Case, Measured, Sequence[Miss]]], heading: str) 
             found.setdefault((miss.budget, miss.bound), []).append((miss, case))
     for (budget, bound), those in found.items():
         worst, case = max(those, key=lambda one: one[0].value / max(one[0].limit, 1e-9))
-        row.found.append(Found(budget, len(those), worst.value, worst.limit, bound, worst.text, described(case)))
+        row.found.append(
+            Found(budget, len(those), worst.value, worst.limit, bound, worst.text, described(case), worst.bound_ms)
+        )
     return row
 
 
