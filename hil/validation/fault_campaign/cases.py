@@ -125,8 +125,7 @@ def pairs(instants: int, seed: int) -> list[Case]:
     for number, two in enumerate(combinations(families, 2)):
         for i in range(instants):
             dice = np.random.default_rng([seed, 7, number, i])
-            kinds = [by_family[family][int(dice.integers(len(by_family[family])))] for family in two]
-            targets = [kind.usual[int(dice.integers(len(kind.usual)))] for kind in kinds]
+            kinds, targets = _two(by_family, two, dice)
             place = (i + float(dice.random())) / instants
             first, second = (_armed(k, t, i, place, seed) for k, t in zip(kinds, targets, strict=True))
             if math.isfinite(first.at_s) and math.isfinite(second.at_s):
@@ -134,6 +133,18 @@ def pairs(instants: int, seed: int) -> list[Case]:
                 second = replace(second, at_s=_on_a_tick(at_s))
             found.append(Case((PAIR, " + ".join(two)), _noise_seed(seed, i), (first, second)))
     return found
+
+
+def _two(
+    by_family: dict[str, list[FaultKind]], families: tuple[str, str], dice: np.random.Generator
+) -> tuple[list[FaultKind], list[str]]:
+    """Two faults and their targets; not the same message, where the second could undo the first."""
+    while True:
+        kinds = [by_family[family][int(dice.integers(len(by_family[family])))] for family in families]
+        targets = [kind.usual[int(dice.integers(len(kind.usual)))] for kind in kinds]
+        ids = [kind.on(target).target.can_ids for kind, target in zip(kinds, targets, strict=True)]
+        if ids[0].isdisjoint(ids[1]) or max(map(len, ids)) > 1:
+            return kinds, targets
 
 
 def _noise_seed(seed: int, i: int) -> int:

@@ -1,7 +1,7 @@
 """What a fault did to a stop: the trace beside that of its twin without the fault."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ LITTLE_NM = 100.0  # regeneration below which its loss is not looked at: 0.2 m/s
 SHORTFALL_MPS2 = 1.0  # budget: deceleration below the demand
 TAKEN = 0.9  # budget: share of the lost regeneration that friction gives
 HALF = 0.5  # a brake that gives less than half of what is due has let go
+NEARLY_STANDING_MPS = 0.5  # below, a stop ends with a jerk of its own
 _HANDOVER_S = 1.0  # friction takes over within, or never
 
 
@@ -31,7 +32,7 @@ class Measured:
     friction_back_ms : report (or the loss, where it comes later) to friction giving 90 % of the lost regeneration.
     friction_bound_ms : the same of a brake that is asked for exactly what is lost.
     dip_mps2, dip_ms : deepest shortfall of deceleration, and how long it was above 1.0 m/s2.
-    lost_nm, lost_mps2 : regeneration that was lost, at its most.
+    lost_nm : regeneration that was lost, at its most.
     release_ms : how long the brakes gave less than half of what the driver asked for.
     stop_ratio, longer_m : distance over the twin's, and the difference.
     recovery_ms : end of the fault to the twin's mode.
@@ -40,6 +41,7 @@ class Measured:
     stale_used, stale_in_all, altered : frames; the first until the fault was found.
     error : what was raised.
     wrong_faults, wrong_modes : what was reported beside what is right.
+    codes, healing : trouble codes found, and when each ceases to be active.
     """
 
     detect_ms: float = math.nan
@@ -49,7 +51,6 @@ class Measured:
     dip_mps2: float = math.nan
     dip_ms: float = math.nan
     lost_nm: float = math.nan
-    lost_mps2: float = math.nan
     release_ms: float = math.nan
     stop_ratio: float = math.nan
     longer_m: float = math.nan
@@ -64,11 +65,18 @@ class Measured:
     wrong_faults: Fault = Fault.NONE
     wrong_modes: tuple[str, ...] = ()
     codes: tuple[str, ...] = ()
-    healing: tuple[str, ...] = field(default_factory=tuple)
+    healing: tuple[str, ...] = ()
 
 
 def measured(
-    trace: Trace, twin: Trace, right: Expected, until_s: float, wheels: tuple[int, ...], from_controller: bool
+    trace: Trace,
+    twin: Trace,
+    right: Expected,
+    until_s: float,
+    wheels: tuple[int, ...] = (),
+    *,
+    at_actuators: bool = False,
+    only_wheels: bool = False,
 ) -> Measured:
     """Measure a run.
 
@@ -77,7 +85,8 @@ def measured(
     right : what the controller may do.
     until_s : end of the fault.
     wheels : whose motors it takes away.
-    from_controller : whether it befell what the controller sends: then what the motors follow counts, not the wire.
+    at_actuators : whether it befell what the controller sends: then what the motors follow counts, not the wire.
+    only_wheels : whether the regeneration of these motors alone is lost; else of all.
     """
     m = Measured(altered=trace.altered, error=trace.error, befallen_s=trace.befallen_s)
     n = len(trace.speed_mps)
@@ -105,8 +114,9 @@ def measured(
         m.detect_ms = 1e3 * (seen * TICK_S - trace.befallen_s)
     m.stale_in_all = len(trace.stale_s)
     m.stale_used = sum(seen is None or at_s < seen * TICK_S for at_s in trace.stale_s)
-    _look_at_motors(m, trace, other, first, seen, wheels, from_controller)
-    _look_at_brakes(m, trace, other, first, until_s)
+    _look_at_motors(m, trace, other, first, list(wheels), at_actuators)
+    _look_at_friction(m, trace, other, first, seen, list(wheels) if only_wheels else [0, 1, 2, 3])
+    _look_at_brakes(m, trace, other, first)
     if math.isfinite(until_s) and seen is not None:
         end = round(until_s / TICK_S)
         begun, said = max(first, end - 5), np.flatnonzero(trace.mode >= 0)
@@ -160,43 +170,39 @@ def _beside(right: Fault) -> Fault:
     return beside | (Fault.PEDAL_DISAGREE if pedals else Fault.NONE)
 
 
-def _look_at_motors(
-    m: Measured, trace: Trace, other: _Rows, first: int, seen: int | None, wheels: tuple[int, ...],
-    from_controller: bool,
-) -> None:  # fmt: skip
-    lost = other.motor_nm.sum(axis=1) - trace.motor_nm.sum(axis=1)
-    moving = other.speed_mps > STANDING_MPS
-    m.lost_nm = float(np.max(lost[first:] * moving[first:], initial=0.0))
-    if wheels and (other.motor_nm[first, list(wheels)] > NONE_NM).any():  # else there is nothing to end
-        asked = trace.followed_nm if from_controller else trace.asked_nm
-        zero = (np.abs(asked[first:][:, list(wheels)]) < NONE_NM).all(axis=1)
-        at = np.flatnonzero(zero)
-        at_s = (first + int(at[0]) + (0.0 if from_controller else 0.5)) * TICK_S if len(at) else math.inf
-        m.motor_zero_ms = 1e3 * (at_s - trace.befallen_s)
-    if seen is None or m.lost_nm < LITTLE_NM:
+def _look_at_motors(m: Measured, trace: Trace, other: _Rows, first: int, wheels: list[int], at_actuators: bool) -> None:
+    if not wheels or not (other.motor_nm[first, wheels] > NONE_NM).any():  # there is nothing to end
+        return
+    asked = trace.followed_nm if at_actuators else trace.asked_nm
+    zero = np.flatnonzero((np.abs(asked[first:][:, wheels]) < NONE_NM).all(axis=1))
+    at_s = (first + int(zero[0]) + (0.0 if at_actuators else 0.5)) * TICK_S if len(zero) else math.inf
+    m.motor_zero_ms = 1e3 * (at_s - trace.befallen_s)
+
+
+def _look_at_friction(m: Measured, trace: Trace, other: _Rows, first: int, seen: int | None, wheels: list[int]) -> None:
+    lost = (other.motor_nm - trace.motor_nm)[:, wheels].sum(axis=1)
+    m.lost_nm = float(np.max((lost * (other.speed_mps > STANDING_MPS))[first:], initial=0.0))
+    if seen is None:
         return
     window = slice(seen, seen + round(_HANDOVER_S / TICK_S))
     gone, extra = lost[window], (trace.friction_nm - other.friction_nm)[window]
     lost_rows = np.flatnonzero(gone >= LITTLE_NM)
     if not len(lost_rows):
         return
+    begin = int(lost_rows[0])  # where it is found before it is lost: from the loss
+    m.friction_bound_ms = 1e3 * (follows_s(gone, TICK_S, TAKEN, LITTLE_NM) - TICK_S * begin)
     taken = np.flatnonzero((gone >= LITTLE_NM) & (extra >= TAKEN * gone))
-    m.friction_bound_ms = 1e3 * (follows_s(gone, TICK_S, TAKEN, LITTLE_NM) - TICK_S * int(lost_rows[0]))
-    if len(taken):  # from when it is lost, where it is found before
-        m.friction_back_ms = 1e3 * TICK_S * int(taken[0] - lost_rows[0])
-    elif (gone[lost_rows[0] :] >= LITTLE_NM).all():  # else the motors came back before
+    if len(taken):
+        m.friction_back_ms = 1e3 * TICK_S * int(taken[0] - begin)
+    elif (gone[begin:] >= LITTLE_NM).all():  # else the motors came back before
         m.friction_back_ms = math.inf
 
 
-def _look_at_brakes(m: Measured, trace: Trace, other: _Rows, first: int, until_s: float) -> None:
+def _look_at_brakes(m: Measured, trace: Trace, other: _Rows, first: int) -> None:
     decel, due = (-np.diff(rows.speed_mps, append=rows.speed_mps[-1]) / TICK_S for rows in (trace, other))
-    moving = np.minimum(trace.speed_mps, other.speed_mps) > 0.5
+    moving = np.minimum(trace.speed_mps, other.speed_mps) > NEARLY_STANDING_MPS
     short = np.where(moving, due - decel, 0.0)[first:]
     m.dip_mps2 = float(max(short.max(initial=0.0), 0.0))
     m.dip_ms = 1e3 * TICK_S * int((short > SHORTFALL_MPS2).sum())
     let_go = moving & (due > SHORTFALL_MPS2) & (decel < HALF * due)
     m.release_ms = 1e3 * TICK_S * int(let_go[first:].sum())
-    lost = (other.motor_nm - trace.motor_nm).sum(axis=1)
-    total = other.motor_nm.sum(axis=1) + other.friction_nm
-    share = np.where(total > LITTLE_NM, lost / np.maximum(total, LITTLE_NM), 0.0)
-    m.lost_mps2 = float(np.max((share * due * moving)[first:], initial=0.0))

@@ -30,23 +30,39 @@ _MOTORS_OF = {
 
 def measure(trace: Trace, twin: Trace, fault: Injection) -> Measured:
     """Measure the run of one fault beside its twin."""
-    wheels = _motors_of(fault)
-    befallen_s = trace.befallen_s
-    if fault.kind.name in MISSING and not math.isnan(befallen_s):
-        least = MISSING[fault.kind.name]  # nothing is missing of what is not asked for
-        asked = twin.motor_nm[int(befallen_s / TICK_S + 1e-6) :]
-        due = _held_above(asked[:, list(wheels)].max(axis=1), least, fault.expected.detect_ms or 0.0)
-        befallen_s = befallen_s + int(due[0]) * TICK_S if len(due) else math.nan
-        wheels = tuple(i for i in wheels if len(due) and asked[due[0], i] > least)
-    elif fault.kind.name in _SENDERS and fault.target.name == "BRAKE_PEDAL":
-        befallen_s = max(befallen_s, _first_press_s())  # both say the same before
-    right = _right(fault, trace)
-    m = measured(replace(trace, befallen_s=befallen_s), twin, right, fault.until_s, wheels, _at_actuators(fault))
+    wheels, befallen_s = _visible(fault, trace.befallen_s, twin)
+    right = right_of(fault, trace)
+    of_motors = fault.kind.name.startswith("motor_")
+    m = measured(
+        replace(trace, befallen_s=befallen_s), twin, right, fault.until_s, wheels,
+        at_actuators=_at_actuators(fault), only_wheels=of_motors,
+    )  # fmt: skip
     if right.motor_zero_ms is None or not is_seen(m, fault):
         m.motor_zero_ms = math.nan
     if without_car(fault):
         forget_brakes(m)
     return m
+
+
+def _visible(fault: Injection, befallen_s: float, twin: Trace) -> tuple[tuple[int, ...], float]:
+    """Motors that it takes away, and from when anything is to be seen of it: later than the first frame befallen
+    where it changes nothing yet."""
+    wheels = _motors_of(fault)
+    if math.isnan(befallen_s):
+        return wheels, befallen_s
+    name, target = fault.kind.name, fault.target.name
+    if name in _SENDERS and target == "BRAKE_PEDAL":
+        return wheels, max(befallen_s, _first_press_s())  # both say the same before
+    least = MISSING.get(name, MISSING["motor_deaf"] if name in _SENDERS and target.startswith("MOTOR_DEMAND") else None)
+    if least is None:
+        return wheels, befallen_s
+    asked = twin.motor_nm[int(befallen_s / TICK_S + 1e-6) :]
+    due = [_held_above(asked[:, i], least, fault.expected.detect_ms or 0.0) for i in wheels]
+    first = min((rows[0] for rows in due if len(rows)), default=None)
+    if first is None:
+        return (), math.nan
+    seen = tuple(i for i, rows in zip(wheels, due, strict=True) if first in rows)
+    return seen, befallen_s + int(first) * TICK_S
 
 
 def _held_above(values: NDArray[np.float64], least: float, for_ms: float) -> NDArray[np.intp]:
@@ -106,7 +122,7 @@ def _at_actuators(fault: Injection) -> bool:
     return fault.target.name in FROM_THE_CONTROLLER and fault.kind.side is not Side.PLANT
 
 
-def _right(fault: Injection, trace: Trace) -> Expected:
+def right_of(fault: Injection, trace: Trace) -> Expected:
     """What the library expects; more than two frames lost in a row are a silence."""
     right = fault.expected
     if fault.kind.name == "lost" and trace.most_missing > _TOLERATED_IN_A_ROW:
