@@ -13,7 +13,7 @@ from hil.validation.fault_campaign.job import run
 from hil.validation.fault_campaign.table import Row, merged, row_of
 
 TIMEOUTS_MS = (50, 100, 200)
-_SHARE_OF_INSTANTS = 5  # of the table at other time-outs: a fifth
+_OF_PAIRS, _OF_TIMEOUTS = 4, 5  # one of so many instants: of each pair of families, and at each time-out
 _CHUNK = 4  # cases that a process takes at a time
 
 
@@ -87,8 +87,8 @@ def drive_campaign(
     named = [fault_named(name) for name in only if name != PAIR]
     kinds = [kind for kind in virtual_faults() if not only or kind in named]
     single = cases(kinds, instants, seed)
-    double = pairs(instants, seed) if not only or PAIR in only else []
-    fewer = max(1, instants // _SHARE_OF_INSTANTS)
+    double = pairs(-(-instants // _OF_PAIRS), seed) if not only or PAIR in only else []
+    fewer = -(-instants // _OF_TIMEOUTS)
     own_ms = round(1e3 * scenario_of().ecu.supervision.timeout_s)
     shown = (own_ms, *TIMEOUTS_MS) if not only else ()
     later = {t: cases_of_time(fewer, seed, None if t == own_ms else t * 1e-3) for t in shown}

@@ -9,7 +9,7 @@ import pytest
 
 from dbc.messages import BrakeMode, Fault
 from hil.cli.main import main
-from hil.faults.catalogue import injection
+from hil.faults.catalogue import fault_named, injection
 from hil.validation.fault_campaign import budgets
 from hil.validation.fault_campaign.campaign import Campaign, drive_campaign
 from hil.validation.fault_campaign.cases import Armed, Case, cases, cases_of_time, pairs, virtual_faults
@@ -31,34 +31,33 @@ def judged(m, *faults):
 # what is drawn
 
 
-@pytest.mark.parametrize("instants", [1, 5, 200])
+@pytest.mark.parametrize("instants", [1, 5, 20])
 def test_every_fault_has_its_instants_and_every_target_its_turn(instants):
     drawn = cases(virtual_faults(), instants, seed=1)
     for kind in virtual_faults():
         mine = [case for case in drawn if case.row[0] == kind.name]
         assert len(mine) >= instants
         assert {case.row[1] for case in mine} == set(kind.usual)
-    assert cases(virtual_faults(), instants, seed=1) == drawn != cases(virtual_faults(), instants, seed=2)
+    assert (
+        cases(virtual_faults(), 1, seed=1) == cases(virtual_faults(), 1, seed=1) != cases(virtual_faults(), 1, seed=2)
+    )
 
 
 def test_instants_are_spread_over_the_stop_and_some_faults_end():
-    (times,) = ([case.faults[0].at_s for case in cases(virtual_faults(), 200, 1) if case.row[0] == name] for name in
-                ["motor_dead"])  # fmt: skip
-    counts, _ = np.histogram(times, [0.2, 0.5, 1.0, 5.0, 6.2, 7.01])
-    assert (counts / len(times)).tolist() == pytest.approx([0.1, 0.2, 0.4, 0.2, 0.1], abs=0.02)
-    ends = [case.faults[0].values.get("for_s", 0.0) for case in cases(virtual_faults(), 200, 1)]
-    assert 0.2 < np.mean(np.array(ends) > 0.0) < 0.6
+    drawn = [case.faults[0] for case in cases([fault_named("motor_dead")], 200, 1)]
+    counts, _ = np.histogram([armed.at_s for armed in drawn], [0.2, 0.5, 1.0, 5.0, 6.2, 7.01])
+    assert (counts / len(drawn)).tolist() == pytest.approx([0.1, 0.2, 0.4, 0.2, 0.1], abs=0.02)
+    assert sum("for_s" in armed.values for armed in drawn) / len(drawn) == pytest.approx(1 / 3, abs=0.05)
 
 
 def test_every_number_of_the_table_has_its_turn():
     for name, key, number in (("bits_flipped", "bits", 16), ("second_sender", "offset", 14), ("lost", "share", 3)):
-        drawn = [case.faults[0].values[key] for case in cases(virtual_faults(), 200, 1) if case.row[0] == name]
-        assert len(set(drawn)) == number
+        assert len({case.faults[0].values[key] for case in cases([fault_named(name)], 200, 1)}) == number
     assert {case.faults[0].values.get("for_s") for case in cases_of_time(2, 1, None)} == {None}
 
 
 def test_pairs_are_of_two_families_and_two_messages():
-    drawn = pairs(10, 1)
+    drawn = pairs(4, 1)
     assert len({case.row for case in drawn}) == 15
     for case in drawn:
         one, two = (armed.injection() for armed in case.faults)
