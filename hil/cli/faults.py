@@ -3,6 +3,8 @@
 import argparse
 import json
 import os
+import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from hil.cli.columns import columns, say, terminal_width, wrapped
@@ -47,10 +49,13 @@ def run(args: argparse.Namespace) -> int:
     """Drive, judge, print."""
     from hil.cli.progress import Progress
     from hil.validation.fault_campaign.campaign import drive_campaign
+    from hil.validation.fault_campaign.processes import drive_processes
 
     with Progress() as progress:
         progress.part(0, "stops with faults")
         campaign = drive_campaign(args.instants, args.seed, os.cpu_count() or 1, progress, args.only)
+    if not (args.no_processes or args.only):
+        campaign = replace(campaign, processes=drive_processes(args.seed, _tell))
     if args.json:
         say([json.dumps(campaign.as_json() | {"verdict": "passed" if campaign.passed else "failed"}, indent=2)])
     else:
@@ -58,22 +63,29 @@ def run(args: argparse.Namespace) -> int:
     return 0 if campaign.passed else 1
 
 
+def _tell(text: str) -> None:
+    print(text, file=sys.stderr)
+
+
 def _lines(campaign: "Campaign", by_target: bool, width: int) -> list[str]:
     from hil.validation.fault_campaign.table import merged
-    from hil.validation.fault_campaign.text import at_timeouts, legend, missed, verdict
+    from hil.validation.fault_campaign.text import at_timeouts, bounded, legend, missed, verdict
 
     lines = _table(campaign.rows if by_target else merged(campaign.rows), by_target, width)
     if campaign.pairs:
         lines += ["", "two faults at once", *_table(campaign.pairs, True, width)]
+    if campaign.processes:
+        lines += ["", "real processes, in real time", *_table(campaign.processes, True, width)]
     if campaign.timeouts:
         own = next(iter(campaign.timeouts))
         lines += ["", f"at time-outs of the controller of {', '.join(map(str, campaign.timeouts))} ms ({own} ms is its "
                   "own): maxima"]  # fmt: skip
         lines += columns(*at_timeouts(campaign.timeouts), width)
     lines += ["", *wrapped(legend(), width, "")]
-    sentences = [missed(found, row) for row in campaign.judged for found in sorted(row.found, key=lambda f: f.bound)]
-    lines += [""] + [line for sentence in sorted(sentences) for line in wrapped(sentence, width)]
-    return [*lines, ""] + [line for sentence in verdict(campaign) for line in wrapped(sentence, width)]
+    for sentences in (missed(campaign.judged), bounded(campaign.judged), verdict(campaign)):
+        if sentences:
+            lines += ["", *(line for sentence in sentences for line in wrapped(sentence, width))]
+    return lines
 
 
 def _table(rows: "list[Row]", by_target: bool, width: int) -> list[str]:

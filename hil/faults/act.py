@@ -89,7 +89,7 @@ class FrameAct(Act):
         ids, acts = self.injection.target.can_ids, self.acts(now_ns)
         out: list[Frame] = []
         for frame in frames:
-            if frame.can_id in ids and frame.bus is BusName.VEHICLE and not frame.extended:
+            if frame.can_id in ids and frame.bus is BusName.VEHICLE and not frame.extended and _whole(frame):
                 out += self._befall(frame, acts and self.left > 0)
             else:
                 out.append(frame)
@@ -110,6 +110,11 @@ class FrameAct(Act):
     def alter(self, frame: Frame) -> Sequence[Frame]:
         """What goes on the bus in the place of a frame."""
         raise NotImplementedError
+
+
+def _whole(frame: Frame) -> bool:
+    """Whether it is as long as its message: what another fault has cut or made up stays as it is."""
+    return len(frame.data) == message_of(frame.can_id).length
 
 
 def message_of(can_id: int) -> MessageSpec:

@@ -1,7 +1,7 @@
 """The whole campaign: all rows, pairs, and the time-dependent rows at longer time-outs, on several processes."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from hil.faults.catalogue import fault_named
@@ -10,10 +10,10 @@ from hil.validation.fault_campaign.budgets import ORIGINS, judge
 from hil.validation.fault_campaign.cases import PAIR, SCENARIO, Case, cases, cases_of_time, pairs, virtual_faults
 from hil.validation.fault_campaign.drive import scenario_of
 from hil.validation.fault_campaign.job import run
-from hil.validation.fault_campaign.table import Row, row_of
+from hil.validation.fault_campaign.table import Row, merged, row_of
 
 TIMEOUTS_MS = (50, 100, 200)
-_SHARE_OF_INSTANTS = 5  # of the table at other time-outs: a fifth
+_OF_PAIRS, _OF_TIMEOUTS = 4, 5  # one of so many instants: of each pair of families, and at each time-out
 _CHUNK = 4  # cases that a process takes at a time
 
 
@@ -24,7 +24,8 @@ class Campaign:
     Attributes
     ----------
     instants, seed : of the campaign.
-    rows : single faults; pairs : two at once, a row for each two families.
+    rows : single faults, by target; pairs : two at once, a row for each two families.
+    processes : faults of real processes, in real time.
     timeouts : time-dependent rows by the controller's time-out, ms; its own one first.
     """
 
@@ -33,11 +34,12 @@ class Campaign:
     rows: list[Row]
     pairs: list[Row]
     timeouts: dict[int, list[Row]]
+    processes: list[Row] = field(default_factory=list)
 
     @property
     def judged(self) -> list[Row]:
         """Rows that decide; those at other time-outs are shown."""
-        return [*self.rows, *self.pairs]
+        return [*self.rows, *self.pairs, *self.processes]
 
     @property
     def passed(self) -> bool:
@@ -50,8 +52,9 @@ class Campaign:
             "scenario": SCENARIO,
             "instants": self.instants,
             "seed": self.seed,
-            "rows": [row.as_json() for row in self.rows],
+            "rows": [row.as_json() for row in merged(self.rows)],
             "pairs": [row.as_json() for row in self.pairs],
+            "processes": [row.as_json() for row in self.processes],
             "timeouts": [
                 {"timeout_ms": timeout, "rows": [row.as_json() for row in rows]}
                 for timeout, rows in self.timeouts.items()
@@ -84,8 +87,8 @@ def drive_campaign(
     named = [fault_named(name) for name in only if name != PAIR]
     kinds = [kind for kind in virtual_faults() if not only or kind in named]
     single = cases(kinds, instants, seed)
-    double = pairs(instants, seed) if not only or PAIR in only else []
-    fewer = max(1, instants // _SHARE_OF_INSTANTS)
+    double = pairs(-(-instants // _OF_PAIRS), seed) if not only or PAIR in only else []
+    fewer = -(-instants // _OF_TIMEOUTS)
     own_ms = round(1e3 * scenario_of().ecu.supervision.timeout_s)
     shown = (own_ms, *TIMEOUTS_MS) if not only else ()
     later = {t: cases_of_time(fewer, seed, None if t == own_ms else t * 1e-3) for t in shown}
@@ -109,7 +112,7 @@ def _judged(everything: Sequence[Case], workers: int, progress: Callable[[float]
                 zip(everything, pool.map(run, everything, chunksize=_CHUNK), strict=True)
             ):
                 faults = [armed.injection() for armed in case.faults]
-                found[id(case)] = (case, m, judge(m, faults, scenario.plant, scenario.ecu))
+                found[id(case)] = (case, m, judge(m, faults, scenario.ecu))
                 progress((number + 1) / len(everything))
         except BaseException:  # a Ctrl-C must not wait for what nobody will see
             pool.shutdown(wait=False, cancel_futures=True)

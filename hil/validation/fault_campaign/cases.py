@@ -15,11 +15,13 @@ SCENARIO = "stop72_blend70"
 TWINS = 8  # stops without a fault, one for each seed of the noise
 PAIR = "pair"
 
-# spans of the stop, s, and the share of the instants in each: the pedal moves from 0.5 to 0.8 s, the car stands at 7.3 s
+# spans of the stop, s, and their shares of the instants: the pedal moves from 0.5 to 0.8 s, the car stands at 7.1 s
 SPANS = ((0.2, 0.5, 0.1), (0.5, 1.0, 0.2), (1.0, 5.0, 0.4), (5.0, 6.2, 0.2), (6.2, 7.0, 0.1))
 SHORT_S = (0.1, 0.6)  # a bounded fault
 BOUNDED = 3  # every third instant has one that ends, so that recovery is seen
 _TICK_S = 0.01
+_TOGETHER_S = 0.2  # a pair: the second fault begins within
+_OFFSET = 3  # from target to target in what a fault takes in turn
 
 IN_TURN: dict[str, tuple[dict[str, float], ...]] = {
     "lost": ({"share": 0.01}, {"share": 0.05}, {"share": 0.2}),
@@ -94,13 +96,15 @@ def virtual_faults() -> tuple[FaultKind, ...]:
 
 
 def cases(kinds: Sequence[FaultKind], instants: int, seed: int, timeout_s: float | None = None) -> list[Case]:
-    """Cases of single faults: each on each of its usual targets, at so many instants."""
-    return [
-        Case((kind.name, target), _noise_seed(seed, i), (_armed(kind, target, i, instants, seed),), timeout_s)
-        for kind in kinds
-        for target in kind.usual
-        for i in range(instants)
-    ]
+    """Cases of single faults, at so many instants each or more: as many on each of its usual targets."""
+    found = []
+    for kind in kinds:
+        each = -(-instants // len(kind.usual))
+        for place, target in enumerate(kind.usual):
+            for i in range(each):
+                armed = _armed(kind, target, i, (i + (place + 0.5) / len(kind.usual)) / each, seed)
+                found.append(Case((kind.name, target), _noise_seed(seed, i + place), (armed,), timeout_s))
+    return found
 
 
 def cases_of_time(instants: int, seed: int, timeout_s: float | None) -> list[Case]:
@@ -121,36 +125,55 @@ def pairs(instants: int, seed: int) -> list[Case]:
     for number, two in enumerate(combinations(families, 2)):
         for i in range(instants):
             dice = np.random.default_rng([seed, 7, number, i])
-            kinds = [by_family[family][int(dice.integers(len(by_family[family])))] for family in two]
-            targets = [kind.usual[int(dice.integers(len(kind.usual)))] for kind in kinds]
-            armed = [_armed(k, t, i, instants, seed) for k, t in zip(kinds, targets, strict=True)]
-            found.append(Case((PAIR, " + ".join(two)), _noise_seed(seed, i), tuple(armed)))
+            kinds, targets = _two(by_family, two, dice)
+            place = (i + float(dice.random())) / instants
+            first, second = (_armed(k, t, i, place, seed) for k, t in zip(kinds, targets, strict=True))
+            if math.isfinite(first.at_s) and math.isfinite(second.at_s):
+                at_s = first.at_s + float(dice.uniform(0.0, _TOGETHER_S))
+                second = replace(second, at_s=_on_a_tick(at_s))
+            found.append(Case((PAIR, " + ".join(two)), _noise_seed(seed, i), (first, second)))
     return found
+
+
+def _two(
+    by_family: dict[str, list[FaultKind]], families: tuple[str, str], dice: np.random.Generator
+) -> tuple[list[FaultKind], list[str]]:
+    """Two faults and their targets; not the same message, where the second could undo the first."""
+    while True:
+        kinds = [by_family[family][int(dice.integers(len(by_family[family])))] for family in families]
+        targets = [kind.usual[int(dice.integers(len(kind.usual)))] for kind in kinds]
+        ids = [kind.on(target).target.can_ids for kind, target in zip(kinds, targets, strict=True)]
+        if ids[0].isdisjoint(ids[1]) or max(map(len, ids)) > 1:
+            return kinds, targets
 
 
 def _noise_seed(seed: int, i: int) -> int:
     return seed + i % TWINS
 
 
-def _armed(kind: FaultKind, target: str, i: int, instants: int, seed: int) -> Armed:
-    dice = np.random.default_rng([seed, kind.number, kind.usual.index(target), i])
+def _armed(kind: FaultKind, target: str, i: int, place: float, seed: int) -> Armed:
+    """The i-th run on a target, at a place (0 to 1) among the instants of the stop."""
+    number = kind.usual.index(target)
+    dice = np.random.default_rng([seed, kind.number, number, i])
     values = dict(kind.usual_values)
     values.pop("for_s", None)  # how long it acts is the campaign's
     in_turn = IN_TURN.get(kind.name, ({},))
-    values |= in_turn[i % len(in_turn)]
-    bounded = i // len(in_turn) % BOUNDED == BOUNDED - 1 and not any("for_s" in one for one in in_turn)
-    if bounded and kind.name not in _NEVER_BOUNDED:
+    values |= in_turn[(i + _OFFSET * number) % len(in_turn)]
+    bounded = (i // len(in_turn) + number) % BOUNDED == BOUNDED - 1
+    if bounded and not any("for_s" in one for one in in_turn) and kind.name not in _NEVER_BOUNDED:
         values["for_s"] = round(float(dice.uniform(*SHORT_S)), 2)
-    at_s = FROM_THE_FIRST_TICK if kind.name in _FROM_THE_START else _instant(i, instants, dice)
+    at_s = FROM_THE_FIRST_TICK if kind.name in _FROM_THE_START else _instant(place)
     return Armed(kind.name, target, at_s, int(dice.integers(MOST_SEEDS)), values)
 
 
-def _instant(i: int, instants: int, dice: np.random.Generator) -> float:
-    """The i-th instant, s: spread over the spans, drawn inside its part of one, on a tick of the bus."""
-    place = (i * 0.6180339887) % 1.0 if instants > len(SPANS) else (i + 0.5) / instants  # golden ratio: even at any i
+def _instant(place: float) -> float:
+    """Manoeuvre time, s, of a place among the instants: evenly within each span."""
     for begin_s, end_s, share in SPANS:
         if place < share:
-            at_s = begin_s + (end_s - begin_s) * min(place / share + float(dice.uniform(0.0, 0.1)), 1.0)
-            return round(round(at_s / _TICK_S) * _TICK_S, 2)
+            return _on_a_tick(begin_s + (end_s - begin_s) * place / share)
         place -= share
     return SPANS[-1][1]
+
+
+def _on_a_tick(time_s: float) -> float:
+    return round(round(time_s / _TICK_S) * _TICK_S, 2)

@@ -66,7 +66,7 @@ class Trace:
     followed_nm : torque that each motor is asked for in the end; asked_nm : on the wire, NaN where not sent.
     mode, faults : on the wire; -1 where not sent.
     befallen_s : manoeuvre time of the first frame (or tick) that a fault befell; NaN: none.
-    altered : frames that a fault altered.
+    altered : frames that a fault altered.  most_missing : frames of one message that it kept back in a row.
     stale_s : when a receiver took a frame for fresh although its sender had not sent its values within the time-out.
     own_map : whether the brake followed its own pedal map.
     codes : trouble codes that the controller has in its memory, and how often each was found.
@@ -83,6 +83,7 @@ class Trace:
     faults: NDArray[np.int64]
     befallen_s: float = math.nan
     altered: int = 0
+    most_missing: int = 0
     stale_s: tuple[float, ...] = ()
     own_map: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
     codes: tuple[tuple[TroubleCode, int], ...] = ()
@@ -112,7 +113,8 @@ class _Outside:
         self._node = node
         self._inside = inside
         self.befallen = False
-        self.altered = 0
+        self.altered = self.most_missing = 0
+        self._missing: dict[int, int] = {}
         self.frames: list[Frame] = []
 
     def step(self, now_ns: int, inbox: list[Received]) -> list[Frame]:
@@ -127,7 +129,15 @@ class _Outside:
         if not passed:
             truly = set(inside.frames)
             self.altered += sum([frame not in truly for frame in sent])
+        if not passed or self._missing:
+            self._count_missing({frame.can_id for frame in inside.frames}, {frame.can_id for frame in sent})
         return sent
+
+    def _count_missing(self, meant: set[int], sent: set[int]) -> None:
+        for can_id in meant:
+            self._missing[can_id] = 0 if can_id in sent else self._missing.get(can_id, 0) + 1
+        self._missing = {can_id: n for can_id, n in self._missing.items() if n}
+        self.most_missing = max([self.most_missing, *self._missing.values()])
 
 
 class _Freshness:
@@ -209,7 +219,7 @@ def drive(seed: int, faults: Sequence[Injection], timeout_s: float | None = None
     stale_s: list[float] = []
     standing_since_s = math.nan
     try:
-        for now_ns, member, frames in lockstep(taking_part):
+        for now_ns, member, _ in lockstep(taking_part):
             if member > _ECU:
                 if plant.manoeuvre_start_ns is None and now_ns > 15_000_000_000:
                     raise RuntimeError("the manoeuvre did not start within 15 s")
@@ -244,11 +254,16 @@ def drive(seed: int, faults: Sequence[Injection], timeout_s: float | None = None
     status = np.array(notes.status or [[-1, -1]])
     return Trace(
         speed, distance, friction,
-        -np.array(notes.motor or [[math.nan] * 4]), -np.array(notes.followed or [[math.nan] * 4]),
-        -np.array(notes.asked or [[math.nan] * 4]), status[:, 0], status[:, 1],
-        befallen_s, outside[0].altered + outside[1].altered, tuple(stale_s), np.array(notes.own_map, bool),
+        _braking(notes.motor), _braking(notes.followed), _braking(notes.asked), status[:, 0], status[:, 1],
+        befallen_s, outside[0].altered + outside[1].altered,
+        max(outside[0].most_missing, outside[1].most_missing), tuple(stale_s), np.array(notes.own_map, bool),
         tuple((t.code, t.occurrences) for t in ecu.trouble_codes), error,
     )  # fmt: skip
+
+
+def _braking(rows: Sequence[Sequence[float] | Vector]) -> NDArray[np.float64]:
+    """Torques of four wheels, positive where they brake."""
+    return -np.array(rows if rows else [[math.nan] * 4], np.float64)
 
 
 def _judged_ids(fault: Injection) -> frozenset[int]:

@@ -7,7 +7,8 @@ from dbc.messages import BrakeMode
 from hil.faults.fault import Expected
 from hil.validation.fault_campaign.cases import PAIR, Case
 from hil.validation.fault_campaign.drive import Trace, drive
-from hil.validation.fault_campaign.measure import Measured, forget_brakes, measure, measured, without_car
+from hil.validation.fault_campaign.measure import Measured, measured
+from hil.validation.fault_campaign.rules import forget_brakes, measure, right_of, without_car
 
 
 @lru_cache(maxsize=64)
@@ -29,15 +30,16 @@ def _pair(case: Case) -> Measured:
     """Two faults at once beside each alone: the reaction has to be the worse of the two at least."""
     faults = [armed.injection() for armed in case.faults]
     beside = twin(case.seed, case.timeout_s)
-    alone = [measure(drive(case.seed, [fault], case.timeout_s), beside, fault) for fault in faults]
-    first, second = (fault.expected for fault in faults)
+    alone = [(drive(case.seed, [fault], case.timeout_s), fault) for fault in faults]
+    worst = max(measure(trace, beside, fault).worst_mode for trace, fault in alone)
+    trace = drive(case.seed, faults, case.timeout_s)
+    first, second = (right_of(fault, trace) for fault in faults)
     right = Expected(frozenset(BrakeMode), first.trouble | second.trouble, braking=first.braking or second.braking)
-    until_s = max(fault.until_s for fault in faults)
-    both = measured(drive(case.seed, faults, case.timeout_s), beside, right, until_s, (), False)
+    both = measured(trace, beside, right, max(fault.until_s for fault in faults))
     if any(map(without_car, faults)):
         forget_brakes(both)
-    worst = max(one.worst_mode for one in alone)
-    if both.worst_mode < worst:
+    silent = any(fault.target.name == "ECU" and fault.kind.family == "process" for fault in faults)
+    if both.worst_mode < worst and not silent:
         wrong = f"{BrakeMode(both.worst_mode).name} where one of the two alone leads to {BrakeMode(worst).name}"
         both = replace(both, wrong_modes=(*both.wrong_modes, wrong))
     return both

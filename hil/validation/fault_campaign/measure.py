@@ -1,14 +1,15 @@
 """What a fault did to a stop: the trace beside that of its twin without the fault."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dbc.messages import BrakeMode, Fault
-from hil.faults.fault import Expected, Injection, Side
+from hil.faults.fault import Expected
 from hil.validation.fault_campaign.drive import STANDING_MPS, TICK_S, Trace
+from hil.validation.fault_campaign.physics import follows_s
 
 Array = NDArray[np.float64]
 NONE_NM = 10.0  # motor torque that counts as none: 0.02 m/s2 of the car
@@ -16,12 +17,8 @@ LITTLE_NM = 100.0  # regeneration below which its loss is not looked at: 0.2 m/s
 SHORTFALL_MPS2 = 1.0  # budget: deceleration below the demand
 TAKEN = 0.9  # budget: share of the lost regeneration that friction gives
 HALF = 0.5  # a brake that gives less than half of what is due has let go
-MISSING = {"motor_deaf": 40.0, "motor_weak": 110.0}
-"""Torque asked of a motor below which a missing part is not seen: inside the 20 % and 30 Nm of a motor that is well."""
+NEARLY_STANDING_MPS = 0.5  # below, a stop ends with a jerk of its own
 _HANDOVER_S = 1.0  # friction takes over within, or never
-_MOTOR_SOURCES = {"MOTOR_STATUS_FRONT": (0, 1), "MOTOR_STATUS_REAR": (2, 3), "MOTOR_DEMAND_FRONT": (0, 1),
-                  "MOTOR_DEMAND_REAR": (2, 3), "IWM": (0, 1, 2, 3), "ECU": (0, 1, 2, 3), "PLANT": (0, 1, 2, 3)}  # fmt: skip
-FROM_THE_CONTROLLER = ("EHB_DEMAND_FRONT", "EHB_DEMAND_REAR", "MOTOR_DEMAND_FRONT", "MOTOR_DEMAND_REAR", "ECU")
 
 
 @dataclass(slots=True)
@@ -32,26 +29,28 @@ class Measured:
     ----------
     detect_ms : first frame befallen (or switch in the car) to the controller's report.
     motor_zero_ms : to no torque demand for what has failed.
-    friction_back_ms : report to friction giving 90 % of the lost regeneration.
+    friction_back_ms : report (or the loss, where it comes later) to friction giving 90 % of the lost regeneration.
+    friction_bound_ms : the same of a brake that is asked for exactly what is lost.
     dip_mps2, dip_ms : deepest shortfall of deceleration, and how long it was above 1.0 m/s2.
-    lost_nm, lost_mps2 : regeneration that was lost, at its most.
+    lost_nm : regeneration that was lost, at its most.
     release_ms : how long the brakes gave less than half of what the driver asked for.
     stop_ratio, longer_m : distance over the twin's, and the difference.
     recovery_ms : end of the fault to the twin's mode.
     worst_mode : while it acted.
     left_s : from the first frame befallen to the stop.
-    stale_used, altered : frames.
+    stale_used, stale_in_all, altered : frames; the first until the fault was found.
     error : what was raised.
     wrong_faults, wrong_modes : what was reported beside what is right.
+    codes, healing : trouble codes found, and when each ceases to be active.
     """
 
     detect_ms: float = math.nan
     motor_zero_ms: float = math.nan
     friction_back_ms: float = math.nan
+    friction_bound_ms: float = math.nan
     dip_mps2: float = math.nan
     dip_ms: float = math.nan
     lost_nm: float = math.nan
-    lost_mps2: float = math.nan
     release_ms: float = math.nan
     stop_ratio: float = math.nan
     longer_m: float = math.nan
@@ -60,53 +59,24 @@ class Measured:
     befallen_s: float = math.nan
     left_s: float = math.nan
     stale_used: int = 0
+    stale_in_all: int = 0
     altered: int = 0
     error: str = ""
     wrong_faults: Fault = Fault.NONE
     wrong_modes: tuple[str, ...] = ()
     codes: tuple[str, ...] = ()
-    healing: tuple[str, ...] = field(default_factory=tuple)
-
-
-def measure(trace: Trace, twin: Trace, fault: Injection) -> Measured:
-    """Measure the run of one fault."""
-    name, right = fault.kind.name, fault.expected
-    wheels = wheels_of(fault)
-    if name in MISSING and not math.isnan(trace.befallen_s):  # nothing is missing of what is not asked for
-        asked = twin.motor_nm[:, list(wheels)].max(axis=1)
-        due = np.flatnonzero(asked[int(trace.befallen_s / TICK_S + 1e-6) :] > MISSING[name])
-        trace.befallen_s = trace.befallen_s + int(due[0]) * TICK_S if len(due) else math.nan
-    m = measured(trace, twin, right, fault.until_s, wheels, _of_controller(fault))
-    if right.motor_zero_ms is None:
-        m.motor_zero_ms = math.nan
-    if without_car(fault):
-        forget_brakes(m)
-    return m
-
-
-def without_car(fault: Injection) -> bool:
-    """Whether the process of the car stands still: a brake's figures say nothing then."""
-    return fault.kind.family == "process" and fault.target.name == "PLANT"
-
-
-def forget_brakes(m: Measured) -> None:
-    """Take out what a car that is not stepped cannot show."""
-    m.dip_mps2 = m.dip_ms = m.release_ms = m.lost_nm = m.lost_mps2 = m.friction_back_ms = math.nan
-
-
-def wheels_of(fault: Injection) -> tuple[int, ...]:
-    """Motors that a fault takes away; none where it does not."""
-    if fault.kind.name.startswith("motor_"):
-        return tuple(i for i in range(4) if fault.target.wheels >> i & 1)
-    return _MOTOR_SOURCES.get(fault.target.name.partition(".")[0], ())
-
-
-def _of_controller(fault: Injection) -> bool:
-    return fault.target.name in FROM_THE_CONTROLLER and fault.kind.side is not Side.PLANT
+    healing: tuple[str, ...] = ()
 
 
 def measured(
-    trace: Trace, twin: Trace, right: Expected, until_s: float, wheels: tuple[int, ...], from_controller: bool
+    trace: Trace,
+    twin: Trace,
+    right: Expected,
+    until_s: float,
+    wheels: tuple[int, ...] = (),
+    *,
+    at_actuators: bool = False,
+    only_wheels: bool = False,
 ) -> Measured:
     """Measure a run.
 
@@ -115,7 +85,8 @@ def measured(
     right : what the controller may do.
     until_s : end of the fault.
     wheels : whose motors it takes away.
-    from_controller : whether it befell what the controller sends: then what the motors follow counts, not the wire.
+    at_actuators : whether it befell what the controller sends: then what the motors follow counts, not the wire.
+    only_wheels : whether the regeneration of these motors alone is lost; else of all.
     """
     m = Measured(altered=trace.altered, error=trace.error, befallen_s=trace.befallen_s)
     n = len(trace.speed_mps)
@@ -141,16 +112,24 @@ def measured(
     if len(own_map) and (trace.mode[first + int(own_map[0])] < 0 or seen is None):  # the brake itself finds it
         seen = min(first + int(own_map[0]), n if seen is None else seen)
         m.detect_ms = 1e3 * (seen * TICK_S - trace.befallen_s)
+    m.stale_in_all = len(trace.stale_s)
     m.stale_used = sum(seen is None or at_s < seen * TICK_S for at_s in trace.stale_s)
-    _look_at_motors(m, trace, other, first, seen, wheels, from_controller)
-    _look_at_brakes(m, trace, other, first, until_s)
+    _look_at_motors(m, trace, other, first, list(wheels), at_actuators)
+    _look_at_friction(m, trace, other, first, seen, list(wheels) if only_wheels else [0, 1, 2, 3])
+    _look_at_brakes(m, trace, other, first)
     if math.isfinite(until_s) and seen is not None:
-        end = int(round(until_s / TICK_S))
+        end = round(until_s / TICK_S)
         begun, said = max(first, end - 5), np.flatnonzero(trace.mode >= 0)
         if worse[begun:].any():
             last = begun + int(np.flatnonzero(worse[begun:])[-1])
             m.recovery_ms = math.inf if last >= said[-1] else max(0.0, 1e3 * TICK_S * (last + 1 - end))
+    retried_later = any(name.startswith("motor_") and name.endswith("_torque") for name in m.codes)
+    if retried_later and math.isinf(m.recovery_ms):
+        m.recovery_ms = math.nan  # such a motor is tried again some time after the pedal is released: not in this stop
     return m
+
+
+_PEDALS = Fault.PEDAL_1 | Fault.PEDAL_2
 
 
 class _Rows:
@@ -184,47 +163,46 @@ def _look_at_reports(m: Measured, trace: Trace, other: _Rows, right: Expected, u
 
 
 def _beside(right: Fault) -> Fault:
-    """Bits that name nobody, beside those that do: what is wrong with frames, or with a torque."""
+    """Bits that name no other part: what is wrong with frames, with a torque, or between two channels."""
     motors = right & (Fault.MOTOR_FRONT | Fault.MOTOR_REAR)
-    return Fault.COMMUNICATION | (Fault.MOTOR_TORQUE if motors else Fault.NONE)
+    pedals = right & _PEDALS == _PEDALS
+    beside = Fault.COMMUNICATION | (Fault.MOTOR_TORQUE if motors else Fault.NONE)
+    return beside | (Fault.PEDAL_DISAGREE if pedals else Fault.NONE)
 
 
-def _look_at_motors(
-    m: Measured, trace: Trace, other: _Rows, first: int, seen: int | None, wheels: tuple[int, ...],
-    from_controller: bool,
-) -> None:  # fmt: skip
-    lost = other.motor_nm.sum(axis=1) - trace.motor_nm.sum(axis=1)
-    moving = other.speed_mps > STANDING_MPS
-    m.lost_nm = float(np.max(lost[first:] * moving[first:], initial=0.0))
-    if wheels and (other.motor_nm[first, list(wheels)] > NONE_NM).any():  # else there is nothing to end
-        asked = trace.followed_nm if from_controller else trace.asked_nm
-        zero = (np.abs(asked[first:][:, list(wheels)]) < NONE_NM).all(axis=1)
-        at = np.flatnonzero(zero)
-        at_s = (first + int(at[0]) + (0.0 if from_controller else 0.5)) * TICK_S if len(at) else math.inf
-        m.motor_zero_ms = 1e3 * (at_s - trace.befallen_s)
-    if seen is None or m.lost_nm < LITTLE_NM:
+def _look_at_motors(m: Measured, trace: Trace, other: _Rows, first: int, wheels: list[int], at_actuators: bool) -> None:
+    if not wheels or not (other.motor_nm[first, wheels] > NONE_NM).any():  # there is nothing to end
+        return
+    asked = trace.followed_nm if at_actuators else trace.asked_nm
+    zero = np.flatnonzero((np.abs(asked[first:][:, wheels]) < NONE_NM).all(axis=1))
+    at_s = (first + int(zero[0]) + (0.0 if at_actuators else 0.5)) * TICK_S if len(zero) else math.inf
+    m.motor_zero_ms = 1e3 * (at_s - trace.befallen_s)
+
+
+def _look_at_friction(m: Measured, trace: Trace, other: _Rows, first: int, seen: int | None, wheels: list[int]) -> None:
+    lost = (other.motor_nm - trace.motor_nm)[:, wheels].sum(axis=1)
+    m.lost_nm = float(np.max((lost * (other.speed_mps > STANDING_MPS))[first:], initial=0.0))
+    if seen is None:
         return
     window = slice(seen, seen + round(_HANDOVER_S / TICK_S))
     gone, extra = lost[window], (trace.friction_nm - other.friction_nm)[window]
     lost_rows = np.flatnonzero(gone >= LITTLE_NM)
     if not len(lost_rows):
         return
+    begin = int(lost_rows[0])  # where it is found before it is lost: from the loss
+    m.friction_bound_ms = 1e3 * (follows_s(gone, TICK_S, TAKEN, LITTLE_NM) - TICK_S * begin)
     taken = np.flatnonzero((gone >= LITTLE_NM) & (extra >= TAKEN * gone))
-    if len(taken):  # from when it is lost, where it is found before
-        m.friction_back_ms = 1e3 * TICK_S * int(taken[0] - lost_rows[0])
-    elif (gone[lost_rows[0] :] >= LITTLE_NM).all():  # else the motors came back before
+    if len(taken):
+        m.friction_back_ms = 1e3 * TICK_S * int(taken[0] - begin)
+    elif (gone[begin:] >= LITTLE_NM).all():  # else the motors came back before
         m.friction_back_ms = math.inf
 
 
-def _look_at_brakes(m: Measured, trace: Trace, other: _Rows, first: int, until_s: float) -> None:
+def _look_at_brakes(m: Measured, trace: Trace, other: _Rows, first: int) -> None:
     decel, due = (-np.diff(rows.speed_mps, append=rows.speed_mps[-1]) / TICK_S for rows in (trace, other))
-    moving = np.minimum(trace.speed_mps, other.speed_mps) > 0.5
+    moving = np.minimum(trace.speed_mps, other.speed_mps) > NEARLY_STANDING_MPS
     short = np.where(moving, due - decel, 0.0)[first:]
     m.dip_mps2 = float(max(short.max(initial=0.0), 0.0))
     m.dip_ms = 1e3 * TICK_S * int((short > SHORTFALL_MPS2).sum())
     let_go = moving & (due > SHORTFALL_MPS2) & (decel < HALF * due)
     m.release_ms = 1e3 * TICK_S * int(let_go[first:].sum())
-    lost = (other.motor_nm - trace.motor_nm).sum(axis=1)
-    total = other.motor_nm.sum(axis=1) + other.friction_nm
-    share = np.where(total > LITTLE_NM, lost / np.maximum(total, LITTLE_NM), 0.0)
-    m.lost_mps2 = float(np.max((share * due * moving)[first:], initial=0.0))

@@ -35,12 +35,13 @@ class Found:
     bound: str
     text: str
     where: str
+    bound_ms: float
 
     def as_json(self) -> dict[str, Any]:
         """As JSON values; a time that never came is null."""
         worst = _finite(self.worst)
         return {"budget": self.budget, "times": self.times, "worst": worst, "limit": self.limit, "bound": self.bound,
-                "text": self.text, "run": self.where}  # fmt: skip
+                "bound_ms": _finite(self.bound_ms), "text": self.text, "run": self.where}  # fmt: skip
 
 
 @dataclass(slots=True)
@@ -54,6 +55,7 @@ class Row:
     numbers : each run's, by column; NaN where there is nothing to measure, infinite where it never came.
     longest : the run that stopped last, m beyond its twin, and which it was.
     found : misses, those with a bound included.
+    parts : its rows by target, where it is all of them.
     """
 
     fault: str
@@ -67,6 +69,7 @@ class Row:
     exceptions: int = 0
     wrong_code: int = 0
     found: list[Found] = field(default_factory=list)
+    parts: list["Row"] = field(default_factory=list)
 
     def statistics(self, column: str) -> dict[str, float | None]:
         """Median, 99th percentile and maximum; None where nothing was measured, or it never came."""
@@ -94,7 +97,7 @@ class Row:
         """As JSON values."""
         return {
             "fault": self.fault,
-            "target": self.target,
+            **({"target": self.target} if self.target else {}),
             "row": self.heading,
             "runs": self.runs,
             **{column: self.statistics(column) for column in NUMBERS},
@@ -106,6 +109,7 @@ class Row:
             "wrong_code": self.wrong_code,
             "misses": [one.as_json() for one in self.misses],
             "bounded": [one.as_json() for one in self.bounded],
+            **({"targets": [part.as_json() for part in self.parts]} if self.parts else {}),
         }
 
 
@@ -127,7 +131,9 @@ def row_of(runs: Sequence[tuple[Case, Measured, Sequence[Miss]]], heading: str) 
             found.setdefault((miss.budget, miss.bound), []).append((miss, case))
     for (budget, bound), those in found.items():
         worst, case = max(those, key=lambda one: one[0].value / max(one[0].limit, 1e-9))
-        row.found.append(Found(budget, len(those), worst.value, worst.limit, bound, worst.text, described(case)))
+        row.found.append(
+            Found(budget, len(those), worst.value, worst.limit, bound, worst.text, described(case), worst.bound_ms)
+        )
     return row
 
 
@@ -145,6 +151,7 @@ def merged(rows: Iterable[Row]) -> list[Row]:
         whole.exceptions += row.exceptions
         whole.wrong_code += row.wrong_code
         whole.found += row.found
+        whole.parts.append(row)
     return list(found.values())
 
 

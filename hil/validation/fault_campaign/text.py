@@ -21,43 +21,49 @@ HEADS = (
     "miss",
     "bound",
 )
-"""Heads of the table; times and sizes as median and maximum."""
-_TIMES = {"detect_ms": 0, "motor_zero_ms": 0, "friction_back_ms": 0, "dip_mps2": 2, "stop_distance_ratio": 3,
-          "recovery_ms": 0}  # fmt: skip
+"""Heads of the table."""
+_TIMES = ("detect_ms", "motor_zero_ms", "friction_back_ms", "recovery_ms")
+_WORST = {"dip_mps2": 2, "stop_distance_ratio": 3}
 
 
 def legend() -> str:
     """What the columns are."""
     return (
-        "Median/maximum of all runs. found: first frame befallen to the controller's report; motor 0: to no torque "
-        "demand; friction: report to 90 % of the lost regeneration; dip: most deceleration lost; stop: distance over "
-        "that without the fault; back: end of the fault to the normal mode; stale: old or altered frames used; wrong: "
-        "runs with a trouble code or mode of something else; miss: budgets missed; bound: missed because physics "
-        "forbids them."
+        "Times in ms, median/maximum of all runs. found: first frame befallen to the controller's report; motor 0: to "
+        "no torque demand; friction: report to 90 % of the lost regeneration; back: end of the fault to the normal "
+        "mode; dip: most deceleration lost; stop: longest distance over that without the fault; stale: old or altered "
+        "frames used; wrong: runs with a trouble code or mode of something else; miss: budgets missed; bound: missed "
+        "where no controller could keep them."
     )
 
 
 def cells(row: Row, name: str) -> tuple[str, ...]:
     """One line of the table."""
-    numbers = tuple(_both(row, column, digits) for column, digits in _TIMES.items())
+    times = tuple(_both(row, column) for column in _TIMES)
+    worst = tuple(_largest(row, column, digits) for column, digits in _WORST.items())
     counts = (row.stale_used, row.exceptions + row.wrong_code)
     missed = (sum(one.times for one in row.misses), sum(one.times for one in row.bounded))
-    return (name, str(row.runs), *numbers, *(str(n) if n else "" for n in (*counts, *missed)))
+    return (name, str(row.runs), *times, *worst, *(str(n) if n else "" for n in (*counts, *missed)))
 
 
-def _both(row: Row, column: str, digits: int) -> str:
+def _both(row: Row, column: str) -> str:
     values = row.statistics(column)
     if all(math.isnan(value) for value in row.numbers[column]):
         return ""
-    median, most = ("never" if v is None else f"{v:.{digits}f}" for v in (values["p50"], values["max"]))
+    median, most = ("never" if v is None else f"{v:.0f}" for v in (values["p50"], values["max"]))
     return median if median == most else f"{median}/{most}"
+
+
+def _largest(row: Row, column: str, digits: int) -> str:
+    values = [value for value in row.numbers[column] if math.isfinite(value)]
+    return f"{max(values):.{digits}f}" if values else ""
 
 
 def at_timeouts(timeouts: dict[int, list[Row]]) -> tuple[list[str], list[tuple[str, ...]]]:
     """Heads and lines of the table at several time-outs: found, longest dip and longest stop at each."""
     first = next(iter(timeouts.values()))
     heads = ["", "runs"]
-    for column, name in (("detect_ms", "found"), ("dip_ms", "dip ms"), ("stop_distance_ratio", "stop")):
+    for name in ("found", "dip ms", "stop"):
         heads += [f"{name} {t}" if k == 0 else str(t) for k, t in enumerate(timeouts)]
     lines = []
     for k, row in enumerate(first):
@@ -68,17 +74,38 @@ def at_timeouts(timeouts: dict[int, list[Row]]) -> tuple[list[str], list[tuple[s
     return heads, lines
 
 
-def missed(found: Found, row: Row) -> str:
-    """A miss as one sentence."""
-    unit = {"stale_used": "frames", "wrong_code": "", "exceptions": ""}.get(found.budget, "ms")
-    what = found.text or (f"{_amount(found.worst)} {unit} where {_amount(found.limit)} are allowed")
-    label = "bound by physics" if found.bound else "MISS"
-    why = f": {found.bound}" if found.bound else ""
-    return f"{label}: {row.fault} {row.target}: {found.budget} {found.times} of {row.runs}: {what}{why} ({found.where})"
+def missed(rows: Sequence[Row]) -> list[str]:
+    """Each miss as one sentence, row by row."""
+    lines = []
+    for row in rows:
+        for found in row.misses:
+            what = found.text or f"{_amount(found, found.worst)} where {_amount(found, found.limit)} are allowed"
+            times = f"{found.times} of {row.runs}" if row.runs > 1 else ""
+            lines.append(f"MISS {row.fault} {row.target}: {found.budget} {times}: {what} ({found.where})")
+    return lines
 
 
-def _amount(value: float) -> str:
-    return "never" if math.isinf(value) else f"{value:.0f}"
+def bounded(rows: Sequence[Row]) -> list[str]:
+    """What no controller could keep: one sentence for each budget and bound, with the worst run."""
+    found: dict[tuple[str, str], list[tuple[Found, Row]]] = {}
+    for row in rows:
+        for one in row.bounded:
+            found.setdefault((one.budget, one.bound), []).append((one, row))
+    lines = []
+    for (budget, bound), those in sorted(found.items(), key=lambda item: item[0]):
+        worst, _ = max(those, key=lambda one: one[0].worst)
+        times, faults = sum(one.times for one, _ in those), sorted({row.fault for _, row in those})
+        least = "" if math.isnan(worst.bound_ms) else f", {worst.bound_ms:.0f} ms there"
+        lines.append(
+            f"BOUND {budget}: {bound}{least}: {times} runs, at most {_amount(worst, worst.worst)} where "
+            f"{_amount(worst, worst.limit)} are allowed ({worst.where}); of {', '.join(faults)}"
+        )
+    return lines
+
+
+def _amount(found: Found, value: float) -> str:
+    unit = "frames" if found.budget == "stale_used" else "ms"
+    return "never" if math.isinf(value) else f"{value:.0f} {unit}"
 
 
 def verdict(campaign: Campaign) -> list[str]:
