@@ -27,17 +27,18 @@ class Receiver:
     Parameters
     ----------
     types : the typed messages the node reads; all other frames are passed over.
+    own : messages of the vehicle bus that the node sends; nobody else may.
 
     Attributes
     ----------
     receptions : state of each message.
     values : last usable values of all fields, SI units, message after message in the order of ``types``; NaN where not
         available or not yet received.
-    link_events : those of the last tick.
+    link_events : those of the last tick.  own_heard : frames of the last tick with an identifier of ``own``.
     lost, corrupt : frames missing by their counters, and with wrong check value or length, over all messages.
     """
 
-    def __init__(self, types: Iterable[type[Message]]) -> None:
+    def __init__(self, types: Iterable[type[Message]], own: Iterable[type[Message]] = ()) -> None:
         kinds = tuple(types)
         self._intake = Intake([spec_of(kind) for kind in kinds])
         self.receptions = {kind: Reception(self._intake, index) for index, kind in enumerate(kinds)}
@@ -47,14 +48,17 @@ class Receiver:
             {r.spec.can_id: index for index, r in enumerate(self._all) if r.spec.bus is bus}
             for bus in (BusName.VEHICLE, BusName.BENCH)
         )
-        self._of_interest = {*self._vehicle, *self._bench, *LinkState}  # the second element of what comes
+        self._own = frozenset(spec_of(kind).can_id for kind in own)
+        self._of_interest = {*self._vehicle, *self._bench, *self._own, *LinkState}  # the second element of what comes
         self.values: Vector = self._intake.values
         self.link_events: list[LinkEvent] = []
+        self.own_heard = 0
         self.lost = self.corrupt = 0
 
     def accept(self, now_ns: int, inbox: Sequence[Received]) -> None:
         """Take the inbox of the tick ``now_ns``; ``link_events`` then holds the tick's link events."""
         self.link_events = []
+        self.own_heard = 0
         of_interest, vehicle, bench = self._of_interest, self._vehicle, self._bench
         indices: list[int] = []
         payloads: list[bytes] = []
@@ -67,6 +71,8 @@ class Receiver:
             if index is not None and not extended:
                 indices.append(index)
                 payloads.append(data)
+            elif bus is _VEHICLE and can_id in self._own and not extended:
+                self.own_heard += 1
         self._take(now_ns, indices, payloads)
 
     def _take(self, now_ns: int, indices: list[int], payloads: list[bytes]) -> None:

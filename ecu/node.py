@@ -48,6 +48,10 @@ SOURCES: tuple[type[tuple[Any, ...]], ...] = (  # in the order of law.types.Sour
     Steering,
     BatteryStatus,
 )
+SENT: tuple[type[tuple[Any, ...]], ...] = (
+    EhbDemandFront, EhbDemandRear, MotorDemandFront, MotorDemandRear, BrakeStatus, BrakeEstimateFront,
+    BrakeEstimateRear, BrakeTroubleCode,
+)  # fmt: skip
 _FAILED = float(MotorState.FAILED)
 _NO_TROUBLE = BrakeTroubleCode(0, TroubleStatus.NONE, 0, 0, 0)
 _MOST_CODES = 255
@@ -87,15 +91,9 @@ class EcuNode:
         self.period_ns = period_ns
         self.memory = initial_memory(parameters)
         self.outputs: Outputs | None = None
-        self._receiver = Receiver((*SOURCES, StimulusEcu))
+        self._receiver = Receiver((*SOURCES, StimulusEcu), own=SENT)
         self._receptions = [self._receiver.receptions[t] for t in SOURCES]
-        self._batch = Batch(
-            (
-                EhbDemandFront, EhbDemandRear, MotorDemandFront, MotorDemandRear, BrakeStatus, BrakeEstimateFront,
-                BrakeEstimateRear,
-                BrakeTroubleCode, EcuReception,
-            )
-        )  # fmt: skip
+        self._batch = Batch((*SENT, EcuReception))
         self._last_ns: int | None = None
         self._link_down = False
         self._next_code = 0
@@ -150,6 +148,7 @@ class EcuNode:
                 charge_power,
                 blending_factor,
                 self._link_down,
+                self._receiver.own_heard > 0,
                 tuple([WELL if well else _health(r, now_ns) for well, r in health]),
             ),
         )

@@ -57,6 +57,11 @@ def judge_streams(
     return ALL_CLEAN if judged == ALL_CLEAN else judged
 
 
+def judge_own(stream: Stream, another_sends: bool, p: SupervisionParameters, dt_s: float) -> Stream:
+    """Advance what is held against the controller's own messages; ``another_sends``: one of them was heard."""
+    return _judge(stream, Health(0.0, True, 0, foreign=int(another_sends)), False, p, dt_s)
+
+
 def _judge(stream: Stream, h: Health, timed_out: bool, p: SupervisionParameters, dt_s: float) -> Stream:
     odd = h.bad or h.foreign or h.doubled
     if stream is CLEAN and not odd:

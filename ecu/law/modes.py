@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from dbc.messages import BrakeMode, Fault
 from ecu.law.base_brake import PedalReading
-from ecu.law.communication import ALL_CLEAN, Streams
+from ecu.law.communication import ALL_CLEAN, CLEAN, Stream, Streams, judge_own
 from ecu.law.trouble_codes import BIT, bits, consequence
 from ecu.law.types import OTHERS_WELL, PLAUSIBLE, Brake, Inputs, Plausibility, Source
 from ecu.parameters.control import SupervisionParameters
@@ -28,13 +28,17 @@ _BRAKE_FAILED = (BIT["brake_front_failed"], BIT["brake_rear_failed"])
 class ModeMemory(NamedTuple):
     """State of the supervision.
 
-    ``valid_counts``: valid frames in sequence of each source (saturating); the rest are times since or during, s.
+    ``valid_counts``: valid frames in sequence of each source (saturating); ``since_upgrade_s``, ``own_map_s``: times
+    since or during, s; ``followed``: the brake has followed demands since they are sent; ``own``: what is held against
+    the controller's own messages.
     """
 
     mode: BrakeMode
     valid_counts: tuple[int, ...]
     since_upgrade_s: float
     own_map_s: float
+    followed: bool = False
+    own: Stream = CLEAN
 
 
 def initial_modes() -> ModeMemory:
@@ -180,12 +184,18 @@ def supervise(
         active |= _implausible(plausibility)
     if active or not whole or pedal.channel_1_lost or pedal.channel_2_lost:
         active = _together(inputs, lost, pedal, plausibility, active)
-    own_map = memory.mode != BrakeMode.INIT and memory.mode != BrakeMode.SAFE_STOP and Brake.OWN_MAP in inputs.brake
+    asked = memory.mode != BrakeMode.INIT and memory.mode != BrakeMode.SAFE_STOP
+    own_map = asked and Brake.OWN_MAP in inputs.brake
+    followed = asked and (memory.followed or not own_map)
     own_map_s = min(memory.own_map_s + dt_s, 2.0 * p.own_map_tolerated_s) if own_map else 0.0
-    if own_map_s > p.own_map_tolerated_s:
+    if own_map_s > (p.timeout_s if followed else p.own_map_tolerated_s):
         active |= BIT["brake_own_map"]
     if inputs.link_down:
         active |= BIT["link_down"]
+    own = memory.own
+    if inputs.another_sends or own is not CLEAN:
+        own = judge_own(own, inputs.another_sends, p, dt_s)
+        active |= BIT["own_second_sender"] if own.second_sender else 0
     allowed, faults = consequence(active) if active else (BrakeMode.NORMAL, Fault.NONE)
 
     valid_counts, most = memory.valid_counts, p.frames_to_upgrade
@@ -207,4 +217,4 @@ def supervise(
     elif allowed < mode and min(valid_counts) >= p.frames_to_upgrade and since_upgrade_s >= p.upgrade_interval_s:
         mode = BrakeMode(mode - 1)
         since_upgrade_s = 0.0
-    return ModeMemory(mode, valid_counts, since_upgrade_s, own_map_s), active, faults
+    return ModeMemory(mode, valid_counts, since_upgrade_s, own_map_s, followed, own), active, faults

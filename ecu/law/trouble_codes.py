@@ -145,10 +145,14 @@ _OTHERS = [
     TroubleCode(0x3022, "brake_rear_failed", "the brake reports failure of its rear axle", _DEGRADED, "none", _GONE,
                 Fault.EHB_PRESSURE_REAR),
     TroubleCode(0x3023, "brake_own_map", "the brake follows its own pedal map, or does not say what", _FRICTION,
-                "{own_map_tolerated_s}; not while it was asked to", _GONE, Fault.EHB_OWN_MAP),
+                "{timeout_s} where it has followed, else {own_map_tolerated_s}; not while it was asked to", _GONE,
+                Fault.EHB_OWN_MAP),
     TroubleCode(0x3031, "motors_none", "no motor can be used", _FRICTION, "none", _GONE, _MOTORS),
     TroubleCode(0x3041, "link_down", "the link to the vehicle bus is down (bus-off, unplugged)", _FRICTION, "none",
                 "when the link is back", Fault.LINK),
+    TroubleCode(0x3042, "own_second_sender", "another one sends messages of the controller, too", _FRICTION,
+                "{foreign_frames_to_downgrade} ticks in a row, or more than one in five for longer",
+                "no such frame for {communication_healing_s}", Fault.COMMUNICATION),
 ]  # fmt: skip
 
 CODES: tuple[TroubleCode, ...] = (*_of_sources(), *_of_wheels(), *_OTHERS)

@@ -74,6 +74,7 @@ class Inputs(NamedTuple):
     charge_power_w: float
     blending_factor: float
     link_down: bool
+    another_sends: bool
     health: tuple[Health, ...]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dbc.e2e import COUNTER_MODULUS
-from dbc.frame import BusName, Frame
+from dbc.frame import BusName, Frame, Received
 from dbc.messages import BrakeMode
 from dbc.raw import protected_again, raw_signals
 from hil.faults.act import Act, FrameAct, message_of
@@ -159,6 +159,12 @@ class SecondSender(FrameAct):
     def __init__(self, injection: Injection, armed_ns: int, real: bool = False) -> None:
         super().__init__(injection, armed_ns, real)
         self._counter: dict[int, int] = {}
+        self._sent: list[Frame] = []
+
+    def hear(self, now_ns: int, inbox: list[Received]) -> list[Received]:
+        """The node hears the other one, too."""
+        heard, self._sent = self._sent, []
+        return [*inbox, *heard] if heard else inbox
 
     def _next(self, can_id: int, theirs: int) -> int:
         begin = theirs + int(self.injection.number("offset")) - 1
@@ -174,7 +180,8 @@ class SecondSender(FrameAct):
             if target.signal in (index, 15):
                 payload = signal.write(payload, min(max(signal.raw_of(value), signal.first), signal.last))
         theirs = frame.data[1] & 0x0F
-        return frame, frame._replace(data=protected_again(spec, payload, self._next(frame.can_id, theirs)))
+        self._sent.append(frame._replace(data=protected_again(spec, payload, self._next(frame.can_id, theirs))))
+        return frame, self._sent[-1]
 
 
 class AnsweringSender(SecondSender):

@@ -55,6 +55,7 @@ def good_inputs() -> Inputs:
         charge_power_w=200e3,
         blending_factor=math.nan,
         link_down=False,
+        another_sends=False,
         health=(Health(0.0, True, 0),) * len(Source),
     )
 

@@ -46,6 +46,7 @@ inputs = st.builds(
     charge_power_w=values(0.0, 3e5),
     blending_factor=values(0.0, 1.0),
     link_down=st.booleans(),
+    another_sends=st.booleans(),
     health=st.tuples(
         *[
             st.builds(
@@ -203,6 +204,7 @@ broken_inputs = st.builds(
     charge_power_w=anything(0.0, 3e5),
     blending_factor=st.just(0.0),
     link_down=st.booleans(),
+    another_sends=st.booleans(),
     health=st.just((Health(0.0, True, 0),) * len(Source)),
 )
 

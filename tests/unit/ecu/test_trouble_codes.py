@@ -3,6 +3,7 @@
 import re
 
 import cantools
+import pytest
 
 from dbc.contract import contract, database_text, spec_of
 from dbc.frame import BusName, LinkEvent, LinkState
@@ -10,6 +11,9 @@ from dbc.messages import BrakeMode, BrakeStatus, BrakeTroubleCode, Fault, MotorS
 from ecu.law.trouble_codes import CODES
 from ecu.parameters.control import SupervisionParameters
 from ecu.parameters.plausibility import PlausibilityParameters
+from hil.bench.virtual import own_nodes, simulate
+from hil.faults.catalogue import injection
+from hil.scenario.scenario import load_scenario
 
 DATABASE = cantools.database.load_string(database_text(BusName.VEHICLE), database_format="dbc")
 
@@ -87,3 +91,25 @@ def test_the_link_has_its_code_and_the_database_its_message(normal_rig):
     frames = [f for _ in range(2) for f in normal_rig.step() if f.can_id == status.can_id]
     assert status.decode(frames[-1].data).active_faults == Fault.LINK
     assert contract(BusName.VEHICLE).by_id[320].cycle_ns == 100_000_000
+
+
+def found_ms(name, on, **values):
+    """Codes that a fault from 2.5 s on brings, and when BRAKE_STATUS, every 20 ms, first tells of a fault, ms."""
+    scenario = load_scenario("stop72_blend70")
+    _, ecu = own_nodes(scenario, 1)
+    signals = simulate(scenario, ecu=ecu, faults=[injection(name, on, at_s=2.5, **values)])
+    time_s, faults = signals.get("BRAKE_STATUS.ACTIVE_FAULTS")
+    return {t.code.name for t in ecu.trouble_codes}, 1e3 * (time_s[(faults != 0) & (time_s > 0.0)][0] - 2.5)
+
+
+@pytest.mark.parametrize(("message", "most_ms"), [("EHB_DEMAND_FRONT", 40), ("MOTOR_DEMAND_REAR", 40)])
+def test_another_sender_of_the_controllers_own_messages_is_found(message, most_ms):
+    codes, ms = found_ms("second_sender", message, for_s=0.5)
+    assert "own_second_sender" in codes
+    assert ms <= most_ms + 20.0  # three of them, and the cycle of the status
+
+
+def test_a_brake_that_followed_and_does_not_any_more_is_found_within_its_time_out_and_ours():
+    codes, ms = found_ms("silent", "EHB_DEMAND_REAR")
+    assert "brake_own_map" in codes
+    assert ms <= 50.0 + 30.0 + 20.0
