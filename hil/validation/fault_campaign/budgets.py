@@ -1,4 +1,4 @@
-"""The budgets, where each comes from, and what physics leaves of them.
+"""The budgets, where each comes from, and what physics and the design leave of them.
 
 What no controller could keep is no miss of the controller: it is told apart, with the bound.
 """
@@ -153,7 +153,8 @@ def _times(m: Measured, fault: Injection, ecu: EcuParameters) -> list[Miss]:
     elif m.friction_bound_ms + 2.0 * _CYCLE_MS >= m.friction_back_ms:
         bound = NO_FASTER
     if not right.braking or on_their_own(fault):
-        found.append(Miss("friction_back", m.friction_back_ms, FRICTION_BACK_MS, bound, bound_ms=m.friction_bound_ms))
+        bound_ms = m.friction_bound_ms if bound == NO_FASTER else math.nan
+        found.append(Miss("friction_back", m.friction_back_ms, FRICTION_BACK_MS, bound, bound_ms=bound_ms))
     if not right.braking:
         limit_ms = DIP_REPORTED_MS if fault.kind.name == "motor_dead" else DIP_SILENT_MS
         found.append(Miss("dip", m.dip_ms, limit_ms, _held(m, m.dip_ms, ecu)))

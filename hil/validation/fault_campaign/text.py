@@ -8,19 +8,8 @@ from hil.validation.fault_campaign.campaign import Campaign
 from hil.validation.fault_campaign.table import Found, Row
 
 HEADS = (
-    "",
-    "runs",
-    "found ms",
-    "motor 0",
-    "friction",
-    "dip m/s2",
-    "stop",
-    "back ms",
-    "stale",
-    "wrong",
-    "miss",
-    "bound",
-)
+    "", "runs", "found ms", "motor 0", "friction", "back ms", "dip m/s2", "stop", "stale", "wrong", "miss", "bound",
+)  # fmt: skip
 """Heads of the table."""
 _TIMES = ("detect_ms", "motor_zero_ms", "friction_back_ms", "recovery_ms")
 _WORST = {"dip_mps2": 2, "stop_distance_ratio": 3}
@@ -114,7 +103,7 @@ def verdict(campaign: Campaign) -> list[str]:
     runs = sum(row.runs for row in rows)
     misses = sum(one.times for row in rows for one in row.misses)
     bounded = sum(one.times for row in rows for one in row.bounded)
-    lines = [f"{runs} stops with a fault, {len(rows)} rows: {misses} misses, {bounded} bound by physics."]
+    lines = [f"{runs} stops with a fault, {len(rows)} rows: {misses} misses, {bounded} bound by physics or design."]
     broken = [row for row in rows if row.heading.startswith("motor")]
     others = [row for row in rows if row not in broken and row.heading != "two faults at once"]
     for what, those in (("Worst of the brake and motors themselves", broken), ("Worst of all others", others)):
@@ -126,7 +115,7 @@ def verdict(campaign: Campaign) -> list[str]:
             f"{what}: {longest.longest[1]}: the stop is {longest.longest[0]:.1f} m longer ({100 * (ratio - 1):+.0f} %)."
         )
     lines.append(_released([row for row in rows if not any(one.bound for one in row.found if one.budget == "release")]))
-    lines.append(_used(rows))
+    lines.append(_used(campaign.rows))
     exceptions = sum(row.exceptions for row in rows)
     lines.append("No run raised an exception." if not exceptions else f"{exceptions} runs raised an exception.")
     return lines

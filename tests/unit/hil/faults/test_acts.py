@@ -317,3 +317,11 @@ def test_armed_again_a_fault_begins_anew():
         if not flat([node.step(tick * TICK_NS, inbox)], PEDAL):
             gone.append(tick)
     assert gone == list(itertools.chain(range(10, 18), range(30, 35)))
+
+
+@pytest.mark.parametrize("name", ["signal_value", "crc_frozen", "counter_offset", "bits_altered"])
+def test_frames_of_another_length_are_left_to_the_fault_that_made_them(name):
+    takes = injection(name).kind.takes
+    target = "WHEEL_SPEED_FRONT.WHEEL_SPEED_FL" if takes is Takes.SIGNAL else "WHEEL_SPEED_FRONT"
+    sent = run(injection("length_wrong", "WHEEL_SPEED_FRONT", length=0, seed=1), injection(name, target, seed=1))
+    assert {frame.data for frame in flat(sent, SPEED, since=ARM_TICK)} == {b""}
