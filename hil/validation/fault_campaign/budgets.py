@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from dbc.messages import BrakeMode
+from dbc.reception import FORGOTTEN_IN, MOST_LATE_CYCLES
 from ecu.parameters.ecu import EcuParameters
 from hil.faults.bus import DETECT_MS, MOTOR_ZERO_MS
 from hil.faults.fault import Injection
@@ -34,7 +35,8 @@ ORIGINS = {
     f"where the motor reports its failure, {DIP_SILENT_MS:g} ms where it falls silent (design)",
     "release": f"less than half of the braking due for {DIP_SILENT_MS:g} ms at most: losing a demand never releases "
     "the brake (design)",
-    "recovery": "ten valid frames, a second for each mode (design), and the healing times of the trouble codes found",
+    "recovery": "ten valid frames, a second for each mode (design), the healing times of the trouble codes found, and 2.5 s until "
+    "the lateness of a foreign frame that was taken is forgotten",
     "stale_used": "1 or 2 bits turned: never; 3 to 16: 0.6 % (exact for the check value); old frames: never; of a "
     f"second sender: {FOREIGN_BEFORE_FOUND} until it is found, {FOREIGN_AT_ACTUATOR} where an actuator takes them",
     "wrong_code": "no trouble code of another part, no mode beside those of the fault library; of two faults the worse "
@@ -47,6 +49,7 @@ STANDS = "the car stands within 0.3 s"
 GONE = "the brake's own pressure is gone: nobody else can give it"
 LATE_ACTUATOR = f"the actuator itself shows nothing before {_TOLD_MS:g} ms (its own time-out and a cycle)"
 NO_FASTER = "a brake that is asked for exactly what is lost is no faster (6 Hz, 20 ms dead time)"
+JOLT = "a jolt of the road moves the sensor alike: only what lasts is a fault (acceleration_s of evidence)"
 HELD = "without a valid pedal the last demand is held 200 ms (design), and the foot moves on"
 OWN_MAP = "the actuators hear no controller: the brake's own pedal map knows neither pads nor driving resistances"
 FITS = "the first wrong counter may fit the sequence: found a cycle later"
@@ -100,10 +103,13 @@ def recovery_ms(m: Measured, ecu: EcuParameters) -> float:
     """Budget of the return to the mode without the fault."""
     s, healing_s = ecu.supervision, 0.0
     for text in m.healing:
-        if "communication_healing_s" in text:
+        if "{communication_healing_s}" in text:
             healing_s = max(healing_s, s.communication_healing_s)
-        elif "plausibility" in text:
+        elif "{heal_s}" in text:
             healing_s = max(healing_s, ecu.plausibility.heal_s)
+    if any(code.endswith(("_second_sender", "_out_of_time")) for code in m.codes):
+        # a foreign frame that was taken for a late one has to be forgotten before the own ones fit again
+        healing_s = max(healing_s, s.communication_healing_s + 1e-3 * _CYCLE_MS * MOST_LATE_CYCLES * FORGOTTEN_IN)
     modes = max(m.worst_mode - int(BrakeMode.NORMAL), 0)
     return 1e3 * (healing_s + modes * s.upgrade_interval_s) + (s.frames_to_upgrade + 1) * _CYCLE_MS
 
@@ -143,7 +149,7 @@ def _times(m: Measured, fault: Injection, ecu: EcuParameters) -> list[Miss]:
         if fault.kind.family == "link" and fault.target.name == "PLANT":
             limit_ms = max(limit_ms, DETECT_MS)  # who is off the bus knows at once, the others find its silence
         value = math.inf if math.isnan(m.detect_ms) else m.detect_ms
-        late = _found_late(fault, value, limit_ms)
+        late = _found_late(fault, value, limit_ms, ecu)
         found.append(Miss("detect", value, limit_ms, late, bound_ms=_TOLD_MS if late == LATE_ACTUATOR else math.nan))
     if right.motor_zero_ms is not None:
         found.append(Miss("motor_zero", m.motor_zero_ms, right.motor_zero_ms))
@@ -161,9 +167,11 @@ def _times(m: Measured, fault: Injection, ecu: EcuParameters) -> list[Miss]:
     return found
 
 
-def _found_late(fault: Injection, value_ms: float, limit_ms: float) -> str:
+def _found_late(fault: Injection, value_ms: float, limit_ms: float, ecu: EcuParameters) -> str:
     """Why it cannot be found in time; from when it shows, the budget holds (of a motor: that of a silent one)."""
     after_ms = DIP_SILENT_MS if fault.target.name.startswith("MOTOR_DEMAND") else limit_ms
     if of_demands(fault) and value_ms <= _TOLD_MS + after_ms:
         return LATE_ACTUATOR
+    if fault.target.name.startswith("BODY_MOTION.") and value_ms <= limit_ms + 1e3 * ecu.plausibility.acceleration_s:
+        return JOLT
     return FITS if fault.kind.name.startswith("counter_") and value_ms <= limit_ms + _CYCLE_MS else ""
