@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dbc import e2e
 from dbc.codec import CodecError, Field
-from dbc.compiled import CRC, PAYLOAD, compiled
+from dbc.compiled import CRC, PAYLOAD, compiled, writer
 from dbc.contract import Message, MessageSpec, spec_of
 from dbc.frame import Frame
 
@@ -95,6 +95,7 @@ class Batch:
     ----------
     values : SI values of all fields, message after message, NaN where not available; shape (fields,). The node writes
         them before `frames`.
+    write : writes all of them, each an argument.
     """
 
     def __init__(self, types: Iterable[type[Message]]) -> None:
@@ -102,6 +103,7 @@ class Batch:
         ends = list(accumulate((len(spec.fields) for spec in self._specs), initial=0))
         self._slices = {s.type: slice(*ends_of) for s, ends_of in zip(self._specs, pairwise(ends), strict=True)}
         self.values: Vector = np.full(ends[-1], np.nan)
+        self.write = writer(self.values)
         self._fields = np.array([_row(m, s, f) for m, s in enumerate(self._specs) for f in s.fields], _FIELD)
         self._messages = np.array([_sending(spec) for spec in self._specs], _SENDING)
         self._due, self._payloads = bytearray(len(self._specs)), bytearray(PAYLOAD * len(self._specs))

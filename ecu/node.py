@@ -33,7 +33,7 @@ from dbc.messages import (
 from dbc.reception import Reception
 from ecu.law.step import initial_memory, step
 from ecu.law.trouble_codes import Trouble
-from ecu.law.types import WELL, Brake, Health, Inputs, Outputs
+from ecu.law.types import OTHERS_WELL, WELL, Brake, Health, Inputs, Outputs
 from ecu.parameters.ecu import EcuParameters
 
 SOURCES: tuple[type[tuple[Any, ...]], ...] = (  # in the order of law.types.Source
@@ -52,7 +52,10 @@ SENT: tuple[type[tuple[Any, ...]], ...] = (
     EhbDemandFront, EhbDemandRear, MotorDemandFront, MotorDemandRear, BrakeStatus, BrakeEstimateFront,
     BrakeEstimateRear, BrakeTroubleCode,
 )  # fmt: skip
+_OTHERS = len(SOURCES) - 1  # all but the battery, the last
+_new = tuple.__new__  # without the Python-made one of a NamedTuple
 _FAILED = float(MotorState.FAILED)
+_OWN_MAP = Brake.OWN_MAP
 _NO_TROUBLE = BrakeTroubleCode(0, TroubleStatus.NONE, 0, 0, 0)
 _MOST_CODES = 255
 _LINK_DOWN = {LinkState.BUS_OFF: True, LinkState.DISCONNECTED: True, LinkState.RESTARTED: False}
@@ -70,7 +73,7 @@ def _health(reception: Reception, now_ns: int) -> Health:
     odd = (r.bad, r.foreign, r.doubled) if r.odd_ns == now_ns else (0, 0, 0)
     last_ns = r.last_valid_ns
     age_s = math.inf if last_ns is None else (now_ns - last_ns) * 1e-9
-    return Health(age_s, r.fresh, r.bad_in_row, *odd)
+    return _new(Health, (age_s, r.fresh, r.bad_in_row, *odd))
 
 
 class EcuNode:
@@ -128,8 +131,13 @@ class EcuNode:
             current_rl, able_rl, state_rl, current_rr, able_rr, state_rr,
             steering, _, charge_power, blending_factor,
         ) = self._receiver.values.tolist()  # fmt: skip
-        health = zip(self._receiver.well, self._receptions, strict=False)  # the last reception is no source
-        return tuple.__new__(
+        well = self._receiver.well
+        if 0 not in well[:_OTHERS]:  # mostly
+            health = (*OTHERS_WELL, WELL if well[_OTHERS] else _health(self._receptions[_OTHERS], now_ns))
+        else:
+            sources = zip(well, self._receptions, strict=False)  # the last reception is no source
+            health = tuple([WELL if one else _health(r, now_ns) for one, r in sources])
+        return _new(
             Inputs,
             (
                 pedal_1,
@@ -139,7 +147,7 @@ class EcuNode:
                 acceleration_y,
                 yaw_rate,
                 (pressure_fl, pressure_fr, pressure_rl, pressure_rr),
-                (_BRAKE.get(brake_front, Brake.OWN_MAP), _BRAKE.get(brake_rear, Brake.OWN_MAP)),
+                (_BRAKE.get(brake_front, _OWN_MAP), _BRAKE.get(brake_rear, _OWN_MAP)),
                 (current_fl, current_fr, current_rl, current_rr),
                 (able_fl, able_fr, able_rl, able_rr),
                 # a motor that does not say has failed
@@ -149,7 +157,7 @@ class EcuNode:
                 blending_factor,
                 self._link_down,
                 self._receiver.own_heard > 0,
-                tuple([WELL if well else _health(r, now_ns) for well, r in health]),
+                health,
             ),
         )
 
@@ -168,7 +176,7 @@ class EcuNode:
         """The law's outputs as frames, with the report of what was consumed."""
         p, m, t, mu, c = o.pressure_demand_pa, o.motor_demand_nm, o.wheel_torque_nm, o.pad_friction, o.confidence
         receiver = self._receiver
-        self._batch.values[:] = [
+        self._batch.write(
             *p,
             *m,
             *(o.mode, o.faults, o.blending_factor, o.demanded_deceleration_mps2),
@@ -177,5 +185,5 @@ class EcuNode:
             *self._trouble(now_ns),
             *receiver.counters[: len(SOURCES)],
             *(receiver.lost, receiver.corrupt),
-        ]
+        )
         return self._batch.frames(now_ns)

@@ -3,6 +3,7 @@
 from math import isnan
 
 from dbc.exchange import Receiver
+from dbc.intake import LAST_VALID_NS, RECEIVED
 from dbc.messages import EhbDemandFront, EhbDemandRear, EhbState, MotorDemandFront, MotorDemandRear
 from plant.hydraulics import pedal_map_pa
 from plant.parameters.brakes import EhbParameters
@@ -12,6 +13,8 @@ SEQUENCE = 10  # valid demands in a row before an actuator follows, and before t
 EHB_DEMANDS = (EhbDemandFront, EhbDemandRear)
 MOTOR_DEMANDS = (MotorDemandFront, MotorDemandRear)
 DEMANDS = (*EHB_DEMANDS, *MOTOR_DEMANDS)
+_NONE = (0.0, 0.0)
+_DEMAND = EhbState.DEMAND  # asked for every tick: an enum's attributes are slow
 Demand = EhbDemandFront | EhbDemandRear | MotorDemandFront | MotorDemandRear
 
 
@@ -23,23 +26,23 @@ class DemandStream:
     """
 
     def __init__(self, kind: type[Demand], receiver: Receiver) -> None:
-        self._reception, self._values = receiver.receptions[kind], receiver.of(kind)
+        self._reception, self._memory = receiver.receptions[kind], receiver.receptions[kind].memory
         self._valid_in_row = 0
         self.followed: tuple[float, float] | None = None
 
-    def update(self, now_ns: int) -> tuple[float, float] | None:
-        """Take the tick's frames; the values (left, right) to follow, or None."""
-        reception = self._reception
-        last_ns = reception.last_valid_ns
-        left, right = self._values.tolist()
-        if last_ns is None or now_ns - last_ns >= DEMAND_TIMEOUT_NS or isnan(left + right):
+    def update(self, now_ns: int, left: float, right: float) -> tuple[float, float] | None:
+        """Take the last values that came and whether they did now; the values (left, right) to follow, or None."""
+        memory = self._memory
+        if not memory[RECEIVED] or now_ns - memory[LAST_VALID_NS] >= DEMAND_TIMEOUT_NS or isnan(left + right):
             self._valid_in_row = 0
             self.followed = None
             return None
-        if self.followed is None and reception.fresh:
-            self._valid_in_row = min(self._valid_in_row + 1, reception.valid_in_row)
-        if self.followed is not None or self._valid_in_row >= SEQUENCE:
-            self.followed = left, right
+        if self.followed is None:
+            if self._reception.fresh:
+                self._valid_in_row = min(self._valid_in_row + 1, self._reception.valid_in_row)
+            if self._valid_in_row < SEQUENCE:
+                return None
+        self.followed = left, right
         return self.followed
 
 
@@ -66,36 +69,39 @@ class PressureDemand:
             travel, p.pedal_free_travel, p.pedal_map_linear_pa, p.pedal_map_square_pa, p.pedal_map_cubic_pa
         )
 
-    def update(self, now_ns: int, travel: float) -> tuple[float, float]:
-        """Pressures to follow from this tick on, Pa (left, right)."""
-        demand = self._stream.update(now_ns)
+    def update(self, now_ns: int, left: float, right: float, travel: float) -> tuple[float, float]:
+        """Pressures to follow from this tick on, Pa (left, right), out of the last demands."""
+        demand = self._stream.update(now_ns, left, right)
         if demand is not None:
-            self.state = EhbState.DEMAND
+            self.state = _DEMAND
             self._last = demand
             return demand
         own = self._map_pa(travel)
-        if self.state is EhbState.DEMAND:
+        if self.state is _DEMAND:
             self.state = EhbState.OWN_PEDAL_MAP
-            left, right = (max(1.0, last / own) if own > 0.0 else 1.0 for last in self._last)
-            self._scale = left, right
+            scale_left, scale_right = (max(1.0, last / own) if own > 0.0 else 1.0 for last in self._last)
+            self._scale = scale_left, scale_right
         return own * self._scale[0], own * self._scale[1]
 
 
 class Demands:
-    """All four demand messages of the controller."""
+    """All four demand messages of the controller: `DEMANDS`, the first that the receiver reads."""
 
     def __init__(self, receiver: Receiver, parameters: EhbParameters) -> None:
         self.pressure = [PressureDemand(kind, receiver, parameters) for kind in EHB_DEMANDS]
         self._motor = [DemandStream(kind, receiver) for kind in MOTOR_DEMANDS]
+        self._values = receiver.values[: 2 * len(DEMANDS)]  # the receiver's first messages
 
     def update(self, now_ns: int, travel: float) -> tuple[list[float], list[float]]:
         """Pressures, Pa, and motor torques, N m, to follow from this tick on; a lost motor demand is none."""
-        pressure = [value for demand in self.pressure for value in demand.update(now_ns, travel)]
-        torque = [value for stream in self._motor for value in stream.update(now_ns) or (0.0, 0.0)]
+        a, b, c, d, e, f, g, h = self._values.tolist()
+        (front, rear), (motor_front, motor_rear) = self.pressure, self._motor
+        pressure = [*front.update(now_ns, a, b, travel), *rear.update(now_ns, c, d, travel)]
+        torque = [*(motor_front.update(now_ns, e, f) or _NONE), *(motor_rear.update(now_ns, g, h) or _NONE)]
         return pressure, torque
 
     @property
     def followed(self) -> bool:
         """Whether every actuator follows the controller."""
-        pressed = all(demand.state is EhbState.DEMAND for demand in self.pressure)
+        pressed = all(demand.state is _DEMAND for demand in self.pressure)
         return pressed and all(stream.followed is not None for stream in self._motor)

@@ -31,6 +31,7 @@ class PhysicalFaults:
         self._switch = switch
         self._notice_ns = round(battery_notice_s * 1e9)
         self._notice_ends_ns = 0
+        self._announced = False  # and not yet enforced
         self._wheels = dict.fromkeys(PhysicalFault, 0)
         self._stuck_nm = [0.0] * 4
 
@@ -47,6 +48,7 @@ class PhysicalFaults:
             if self._switch[S.battery_announces] != well:
                 self._switch[S.battery_announces] = well
                 self._notice_ends_ns = now_ns + (self._notice_ns if command.active else 0)
+                self._announced = True
         else:
             new = wheels & ~self._wheels[fault]
             self._wheels[fault] = self._wheels[fault] | wheels if command.active else self._wheels[fault] & ~wheels
@@ -57,7 +59,8 @@ class PhysicalFaults:
 
     def keep_time(self, now_ns: int) -> None:
         """Let the battery enforce what it has announced."""
-        if now_ns >= self._notice_ends_ns:
+        if self._announced and now_ns >= self._notice_ends_ns:
+            self._announced = False
             self._switch[S.battery_accepts] = self._switch[S.battery_announces]
 
     def act(self, pressure_pa: list[float], motor_nm: list[float], x: Vector) -> tuple[list[float], list[float]]:
@@ -77,5 +80,7 @@ class PhysicalFaults:
 
     def told(self, states: Sequence[EhbState]) -> list[EhbState]:
         """What the brake says of its axles: that one with a failed circuit has failed."""
+        if not self.alters:
+            return list(states)
         failed = self._wheels[PhysicalFault.EHB_CIRCUIT_FAILED]
         return [EhbState.FAILED if failed & axle else state for state, axle in zip(states, _AXLES, strict=True)]

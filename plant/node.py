@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from dbc.bench_messages import FaultCommand, ManoeuvreState, StimulusDriver, StimulusRoad
 from dbc.commands import CommandReader
+from dbc.compiled import writer
 from dbc.contract import Message
 from dbc.exchange import Receiver
 from dbc.frame import Frame, Received
@@ -30,7 +31,8 @@ SENDERS = frozenset({"EHB", "IWM", "BATTERY", "SENSORS", "DRIVER"})
 STIMULUS_TIMEOUT_NS = 100_000_000
 STANDING_MPS = 0.02
 STEP_NS = round(STEP_S * 1e9)
-_DRIVEN = slice(U.pressure_demand_pa, U.steering_wheel_rad + 1)  # the first inputs: pressures, torques, steering
+_DRIVEN = U.pressure_demand_pa, U.steering_wheel_rad + 1  # the first inputs: pressures, torques, steering
+_SPEED, _FINISHED = X.speed_mps, ManoeuvreState.FINISHED  # asked for every tick
 RESET_AT_START = (  # what a manoeuvre starts with, however long its start was awaited
     "x_m", "y_m", "yaw_rad", "winding_temperature_k", "pad_friction", "pad_temperature_k", "disc_temperature_k",
     "state_of_charge", "recuperated_j", "friction_heat_j", "distance_m",
@@ -85,6 +87,7 @@ class PlantNode:
         self._start = self._x.copy()
         self._external_nodes = ExternalNodes(play, parameters.motor.torque_constant_nm_a)
         self._u, self._y, self._switch = INPUT.zeros(), OUTPUT.zeros(), healthy()
+        self._write_driven = writer(self._u, *_DRIVEN)
         self._own_road = road_table(manoeuvre.road)
         self._scene = Scene(self._external_nodes.cut(), self._switch, self._own_road, theta, terms, plugins)
         first_speed = manoeuvre.initial_speed_mps / parameters.wheel.rolling_radius_m
@@ -173,12 +176,12 @@ class PlantNode:
             if self._layout.timed(self._of_manoeuvre):
                 self.switch_effects(self._of_manoeuvre)
             self.state = ManoeuvreState.RUNNING
-        moving = abs(self._x[X.speed_mps]) > STANDING_MPS
+        moving = abs(self._x.item(_SPEED)) > STANDING_MPS
         self._standing_ns = 0 if moving else self._standing_ns + elapsed_ns
         limit_s = manoeuvre.end_after_standstill_s
         stood = limit_s is not None and self._standing_ns >= limit_s * 1e9
         if stood or now_ns - self.manoeuvre_start_ns >= manoeuvre.duration_s * 1e9:
-            self.state = ManoeuvreState.FINISHED
+            self.state = _FINISHED
 
     def _stimulus(self, reception: Reception, now_ns: int) -> Message | None:
         last_ns = reception.last_valid_ns
@@ -201,7 +204,7 @@ class PlantNode:
         self._steering_rad = steering if theirs[1] is None else theirs[1]
         self._override_road(now_ns)
 
-        u, direct = self._u, manoeuvre.direct
+        direct = manoeuvre.direct
         hold_nm = self._hold_torque_nm(target)
         motor = [hold_nm + value for value in motor]
         if start is not None and self._direct:
@@ -209,19 +212,22 @@ class PlantNode:
             motor = [value_at(t, time_s) if t else v for t, v in zip(direct.motor_nm, motor, strict=True)]
         if self._broken.alters:
             pressure, motor = self._broken.act(pressure, motor, self._x)
-        u[_DRIVEN] = [*pressure, *motor, self._steering_rad]
-        self._external_nodes.enter(now_ns, u)
+        self._write_driven(*pressure, *motor, self._steering_rad)
+        self._external_nodes.enter(now_ns, self._u)
 
     def _hold_torque_nm(self, target_mps: float | None) -> float:
         if target_mps is None or self._pedal > driver.PEDAL_FREE:
             return 0.0
         radius, y = self._parameters.wheel.rolling_radius_m, self._y
-        resistance = y[Y.drag_n] + y[Y.rolling_torque_nm : Y.rolling_torque_nm + 4].sum() / radius
+        fl, fr, rl, rr = y[Y.rolling_torque_nm : Y.rolling_torque_nm + 4].tolist()
+        resistance = y.item(Y.drag_n) + (fl + fr + rl + rr) / radius
         mass = self._parameters.vehicle.mass_kg
-        speed, grade = float(self._x[X.speed_mps]), float(y[Y.grade])
-        return driver.drive_force(target_mps, speed, mass, float(resistance), grade) * radius / 4.0
+        speed, grade = self._x.item(_SPEED), y.item(Y.grade)
+        return driver.drive_force(target_mps, speed, mass, resistance, grade) * radius / 4.0
 
     def _override_road(self, now_ns: int) -> None:
+        if self._live_road.last_valid_ns is None:  # mostly
+            return
         live = self._stimulus(self._live_road, now_ns)
         road = self._own_road
         if isinstance(live, StimulusRoad) and any(value is not None for value in live):

@@ -18,6 +18,7 @@ from dbc.bench_messages import (
     TruthWheelLoad,
     TruthWheelTorque,
 )
+from dbc.compiled import writer
 from dbc.contract import Message, spec_of
 from dbc.exchange import Receiver
 from dbc.frame import Frame
@@ -47,7 +48,6 @@ DERIVED = Layout(
 )
 """What a node says beside what is measured: of it follows the first half, the plant's nodes set the second."""
 D = DERIVED.at
-_SET_BY_NODES = slice(D.ehb_state, None)
 _FAILED, _OK, _DERATED = float(MotorState.FAILED), float(MotorState.OK), float(MotorState.DERATED)
 
 
@@ -146,6 +146,7 @@ class Reports:
         self._batch = Batch(messages)
         self._sources = np.array([place for places in messages.values() for place in places], np.int64)
         self._derived = DERIVED.zeros()
+        self._set_by_nodes = writer(self._derived, D.ehb_state)
         self._p = p
 
     def frames(
@@ -160,6 +161,6 @@ class Reports:
         brakes : what each axle follows.  manoeuvre : where it is.  receiver : of the demands first.
         """
         counters = receiver.counters[: len(DEMANDS)]
-        self._derived[_SET_BY_NODES] = [*brakes, manoeuvre, *counters, receiver.lost, receiver.corrupt]
+        self._set_by_nodes(*brakes, manoeuvre, *counters, receiver.lost, receiver.corrupt)
         gather(x, y, switch, self._p, sensed, self._derived, self._sources, self._batch.values)
         return self._batch.frames(now_ns)

@@ -6,15 +6,13 @@ helper or layout would leave a stale entry point behind; `entry` stamps the cach
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import fields
 from functools import cache
 from importlib import resources
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar, cast, get_type_hints
 
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
-from numpy.typing import NDArray
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -27,16 +25,19 @@ def helper(function: F) -> F:
 def shared(function: F) -> F:
     """Leave a function to Python as it is, and let compiled functions call it, too.
 
-    Parameters of it that are a parameter set are then a `record` of it.
+    Parameters of it that are a parameter set are then a record of it (`record_of`).
     """
     return register_jitable(error_model="numpy")(function)
 
 
-def record(parameters: Any) -> NDArray[np.void]:
-    """Plain numbers of a parameter set by name, as compiled functions take them; shape (1,)."""
-    values = {f.name: getattr(parameters, f.name) for f in fields(parameters)}
-    numbers = {name: float(value) for name, value in values.items() if isinstance(value, (bool, int, float))}
-    return np.array([tuple(numbers.values())], np.dtype((np.record, [(name, "f8") for name in numbers])))
+def record_of(kind: type[Any]) -> np.dtype[np.void]:
+    """How compiled functions see a parameter set: its plain numbers by name, in their order."""
+    return np.dtype((np.record, [(name, "f8") for name, t in get_type_hints(kind).items() if t in (float, int, bool)]))
+
+
+def numbers(parameters: Any) -> list[float]:
+    """Plain numbers of a parameter set, in the order of `record_of`."""
+    return [float(getattr(parameters, name)) for name in record_of(type(parameters)).names or ()]
 
 
 def entry(function: F) -> F:

@@ -10,15 +10,19 @@ from numpy.typing import NDArray
 
 from ecu.law import friction
 from ecu.law import paper_observer as paper
+from ecu.law.compiled import entry
+from ecu.law.gravity import GRAVITY_MPS2
 from ecu.law.joint import layout as joint
-from ecu.law.joint.estimates import read_estimates
-from ecu.law.joint.filter import joint_step
+from ecu.law.joint.estimates import TOLD, write_estimates
+from ecu.law.joint.filter import advance
+from ecu.law.plausibility.judge import judge, judge_parameters, judge_sample
 from ecu.law.types import UNKNOWN, ZERO, Four, Inputs, Source
 from ecu.parameters.ecu import EcuParameters
 
 Vector = NDArray[np.float64]
 PLAUSIBLE = (False, False, False, False)
 _PACK = Struct(f"{joint.INPUTS}d").pack
+_new = tuple.__new__  # without the Python-made one of a NamedTuple
 
 
 class Estimates(NamedTuple):
@@ -61,10 +65,17 @@ def measured(
     asked_pressure_pa, asked_motor_nm : what was asked of the actuators in the last step; NaN of one that does not
         follow.
     """
-    nan = math.nan
-    body = not lost[Source.BODY_MOTION]
+    nan, k = math.nan, torque_per_current_nm_a
     w, q, i = inputs.wheel_speed_rad_s, inputs.pressure_pa, inputs.motor_current_a
-    k = torque_per_current_nm_a
+    if True not in lost:
+        a, b, c, d = i
+        packed = _PACK(
+            inputs.acceleration_x_mps2, inputs.acceleration_y_mps2, inputs.yaw_rate_rad_s,
+            inputs.steering_wheel_angle_rad, demand_mps2, *w, *q, k * a, k * b, k * c, k * d,
+            *inputs.motor_available_nm, *asked_pressure_pa, *asked_motor_nm, 0.0,
+        )  # fmt: skip
+        return np.frombuffer(bytearray(packed))  # writable; half the time of np.array
+    body = not lost[Source.BODY_MOTION]
     front_w, rear_w = not lost[Source.WHEEL_SPEED_FRONT], not lost[Source.WHEEL_SPEED_REAR]
     front_q, rear_q = not lost[Source.EHB_PRESSURE_FRONT], not lost[Source.EHB_PRESSURE_REAR]
     front_i, rear_i = not lost[Source.MOTOR_FRONT], not lost[Source.MOTOR_REAR]
@@ -91,7 +102,7 @@ def measured(
         *asked_motor_nm,
         0.0,
     )
-    return np.frombuffer(bytearray(packed))  # writable; half the time of np.array
+    return np.frombuffer(bytearray(packed))
 
 
 @lru_cache(maxsize=16)
@@ -164,30 +175,57 @@ def initial_state(parameters: EcuParameters) -> Vector:
     return np.zeros(size)
 
 
-def estimate(state: Vector, z: Vector, parameters: EcuParameters, dt_s: float) -> tuple[Vector, Estimates]:
-    """Advance the chosen observer by one sample.
+@entry
+def _observe(
+    watch: Vector, state: Vector, z: Vector, checks: Vector, p: Vector, full: float, dt: float, told: Vector
+) -> None:
+    started = state[joint.STARTED] != 0.0
+    speed = state[joint.SPEED] if started else 0.0
+    expected = state[joint.EXPECTED] if started else np.nan
+    grade = state[joint.BIAS] + GRAVITY_MPS2 * state[joint.GRADE] if started else 0.0
+    bits, top = judge_sample(watch, z, checks, speed, expected, grade, dt)
+    advance(state, z, p, dt)
+    write_estimates(state, full, told)
+    told[TOLD], told[TOLD + 1] = bits, top
+
+
+def observe(
+    watch: Vector, state: Vector, known: Estimates, z: Vector, parameters: EcuParameters, dt_s: float
+) -> tuple[Vector, int, float, Vector, Estimates]:
+    """Judge one sample, and advance the chosen observer by what is left of it.
 
     Parameters
     ----------
-    state : of the last sample; not changed.  z : from `measured`.  dt_s : time since the last sample.
+    watch, state : of the checks and of the observer, after the last sample; not changed.  known : estimates then.
+    z : from `measured`; what is not believed is changed in place (see `plausibility.judge`).
+    dt_s : time since the last sample.
+
+    Returns
+    -------
+    new state of the checks; bits of what they found (`plausibility.layout`); speed of the fastest wheel that can be,
+    rad/s; new state of the observer; estimates.
     """
-    nominal = parameters.friction_brake.pad_friction
-    if parameters.compensation.method == "joint":
-        state = joint_step(state, z, joint_parameters(parameters), dt_s)
-        started, speed, torque, mu, confidence, mass, implausible, stuck, expected, level = read_estimates(
-            state, parameters.compensation.confidence_full
-        )
-        if not started:
-            return state, Estimates(0.0, UNKNOWN, (nominal, nominal, nominal, nominal), ZERO, 1.0)
-        return state, Estimates(speed, torque, mu, confidence, mass, implausible, stuck, expected, level)
-    state = paper.paper_step(state, z, paper_parameters(parameters), dt_s)
-    return state, Estimates(
-        float(state[paper.SPEED]),
-        _four(state, paper.WHEEL_TORQUE),
-        _four(state, paper.FRICTION),
-        _four(state, paper.CONFIDENCE),
-        1.0,
-    )
+    checks = judge_parameters(parameters)
+    if parameters.compensation.method != "joint":
+        watch, found, top = judge(watch, z, checks, known.speed_mps, known.expected_mps2, known.grade_mps2, dt_s)
+        state = paper.paper_step(state, z, paper_parameters(parameters), dt_s)
+        speed, mu = float(state[paper.SPEED]), _four(state, paper.FRICTION)
+        estimates = Estimates(speed, _four(state, paper.WHEEL_TORQUE), mu, _four(state, paper.CONFIDENCE), 1.0)
+        return watch, found, top, state, estimates
+    watch, state, told = watch.copy(), state.copy(), np.empty(TOLD + 2)  # arrays made by compiled code cost more
+    full = parameters.compensation.confidence_full
+    _observe(watch, state, z, checks, joint_parameters(parameters), full, dt_s, told)
+    (
+        started, speed, mass, stuck, expected, grade, t0, t1, t2, t3, m0, m1, m2, m3, c0, c1, c2, c3, o0, o1, o2, o3,
+        bits, top,
+    ) = told.tolist()  # fmt: skip
+    if not started:
+        nominal = parameters.friction_brake.pad_friction
+        return watch, int(bits), top, state, Estimates(0.0, UNKNOWN, (nominal,) * 4, ZERO, 1.0)
+    odd = (o0 > 0.0, o1 > 0.0, o2 > 0.0, o3 > 0.0) if o0 or o1 or o2 or o3 else PLAUSIBLE
+    torque, mu, confidence = (t0, t1, t2, t3), (m0, m1, m2, m3), (c0, c1, c2, c3)
+    estimates = _new(Estimates, (speed, torque, mu, confidence, mass, odd, stuck != 0.0, expected, grade))
+    return watch, int(bits), top, state, estimates
 
 
 @lru_cache(maxsize=16)

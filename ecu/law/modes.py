@@ -13,7 +13,7 @@ from dbc.messages import BrakeMode, Fault
 from ecu.law.base_brake import PedalReading
 from ecu.law.communication import ALL_CLEAN, CLEAN, Stream, Streams, judge_own
 from ecu.law.trouble_codes import BIT, bits, consequence
-from ecu.law.types import OTHERS_WELL, PLAUSIBLE, Brake, Inputs, Plausibility, Source
+from ecu.law.types import OTHERS_WELL, PLAUSIBLE, Brake, Health, Inputs, Plausibility, Source
 from ecu.parameters.control import SupervisionParameters
 
 _LOST, _NOT_AVAILABLE = bits("{}_lost"), bits("{}_not_available")
@@ -23,6 +23,11 @@ _MOTOR_FAILED, _MOTOR_TORQUE = bits("motor_{}_failed"), bits("motor_{}_torque")
 _NONE_OUT = (False,) * len(Source)
 _BATTERY_OUT = (*_NONE_OUT[1:], True)
 _BRAKE_FAILED = (BIT["brake_front_failed"], BIT["brake_rear_failed"])
+# every tick asks for these: an enum's attributes are slow
+_INIT, _NORMAL, _SAFE_STOP, _NO_FAULT = BrakeMode.INIT, BrakeMode.NORMAL, BrakeMode.SAFE_STOP, Fault.NONE
+_OWN_MAP, _FAILED = Brake.OWN_MAP, Brake.FAILED
+_OTHERS = len(Source) - 1  # all but the battery, the last
+_new = tuple.__new__  # without the Python-made one of a NamedTuple
 
 
 class ModeMemory(NamedTuple):
@@ -64,11 +69,16 @@ def lost_sources(timed_out: tuple[bool, ...], streams: Streams) -> tuple[bool, .
 
 def _all_there(inputs: Inputs) -> bool:
     """Whether every actuator works and every value is available: a sum is finite only where all its parts are."""
-    total = inputs.acceleration_x_mps2 + inputs.acceleration_y_mps2 + inputs.yaw_rate_rad_s
-    total += inputs.steering_wheel_angle_rad + inputs.charge_power_w
-    total += sum(inputs.wheel_speed_rad_s) + sum(inputs.pressure_pa)
-    total += sum(inputs.motor_current_a) + sum(inputs.motor_available_nm)
-    return math.isfinite(total) and True not in inputs.motor_failed and Brake.FAILED not in inputs.brake
+    i = inputs
+    if True in i.motor_failed or _FAILED in i.brake:
+        return False
+    a, b, c, d = i.wheel_speed_rad_s
+    e, f, g, h = i.pressure_pa
+    k, m, n, o = i.motor_current_a
+    p, q, r, s = i.motor_available_nm
+    total = a + b + c + d + e + f + g + h + k + m + n + o + p + q + r + s + i.acceleration_x_mps2
+    total += i.acceleration_y_mps2 + i.yaw_rate_rad_s + i.steering_wheel_angle_rad + i.charge_power_w
+    return math.isfinite(total)
 
 
 def _missing(inputs: Inputs, lost: tuple[bool, ...]) -> int:
@@ -184,37 +194,47 @@ def supervise(
         active |= _implausible(plausibility)
     if active or not whole or pedal.channel_1_lost or pedal.channel_2_lost:
         active = _together(inputs, lost, pedal, plausibility, active)
-    asked = memory.mode != BrakeMode.INIT and memory.mode != BrakeMode.SAFE_STOP
-    own_map = asked and Brake.OWN_MAP in inputs.brake
-    followed = asked and (memory.followed or not own_map)
-    own_map_s = min(memory.own_map_s + dt_s, 2.0 * p.own_map_tolerated_s) if own_map else 0.0
-    if own_map_s > (p.timeout_s if followed else p.own_map_tolerated_s):
+    mode, valid_counts, since_upgrade_s, own_map_s, followed, own = memory
+    asked = mode != _INIT and mode != _SAFE_STOP
+    own_map = asked and _OWN_MAP in inputs.brake
+    followed = asked and (followed or not own_map)
+    own_map_s = min(own_map_s + dt_s, 2.0 * p.own_map_tolerated_s) if own_map else 0.0
+    if own_map and own_map_s > (p.timeout_s if followed else p.own_map_tolerated_s):
         active |= BIT["brake_own_map"]
     if inputs.link_down:
         active |= BIT["link_down"]
-    own = memory.own
     if inputs.another_sends or own is not CLEAN:
         own = judge_own(own, inputs.another_sends, p, dt_s)
         active |= BIT["own_second_sender"] if own.second_sender else 0
-    allowed, faults = consequence(active) if active else (BrakeMode.NORMAL, Fault.NONE)
+    allowed, faults = consequence(active) if active else (_NORMAL, _NO_FAULT)
 
-    valid_counts, most = memory.valid_counts, p.frames_to_upgrade
-    health = inputs.health
-    bad = health[-1].bad_in_row or (health[:-1] != OTHERS_WELL and any(h.bad_in_row for h in health))
-    if bad or True in lost or min(valid_counts) < most:
-        valid_counts = tuple(
-            0 if gone or h.bad_in_row else min(run + h.fresh, most)
-            for run, h, gone in zip(valid_counts, health, lost, strict=True)
-        )
-    since_upgrade_s = memory.since_upgrade_s + dt_s
-    mode = memory.mode
-    if mode == BrakeMode.INIT:
-        if min(valid_counts) >= p.frames_to_upgrade:
+    most = p.frames_to_upgrade
+    valid_counts = _count_valid(valid_counts, inputs.health, lost, most)
+    since_upgrade_s += dt_s
+    if mode == _INIT:
+        if min(valid_counts) >= most:
             mode = allowed
             since_upgrade_s = 0.0
     elif allowed > mode:
         mode = allowed
-    elif allowed < mode and min(valid_counts) >= p.frames_to_upgrade and since_upgrade_s >= p.upgrade_interval_s:
+    elif allowed < mode and min(valid_counts) >= most and since_upgrade_s >= p.upgrade_interval_s:
         mode = BrakeMode(mode - 1)
         since_upgrade_s = 0.0
-    return ModeMemory(mode, valid_counts, since_upgrade_s, own_map_s, followed, own), active, faults
+    return _new(ModeMemory, (mode, valid_counts, since_upgrade_s, own_map_s, followed, own)), active, faults
+
+
+def _count_valid(
+    counts: tuple[int, ...], health: tuple[Health, ...], lost: tuple[bool, ...], most: int
+) -> tuple[int, ...]:
+    """Valid frames in sequence of each source after a tick; from ``most`` on they are counted no further."""
+    if True not in lost and min(counts[:_OTHERS]) >= most and health[:_OTHERS] == OTHERS_WELL:  # mostly
+        battery = health[_OTHERS]
+        if counts[_OTHERS] >= most and not battery.bad_in_row:
+            return counts
+        return (*counts[:_OTHERS], 0 if battery.bad_in_row else min(counts[_OTHERS] + battery.fresh, most))
+    return tuple(
+        [
+            0 if gone or h.bad_in_row else min(run + h.fresh, most)
+            for run, h, gone in zip(counts, health, lost, strict=True)
+        ]
+    )

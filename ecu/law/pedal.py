@@ -26,6 +26,7 @@ class PedalMemory(NamedTuple):
 
 _new = tuple.__new__  # without the Python-made one of a NamedTuple
 _NO_LEVELS = (0.0, 0.0, 0.0)
+_NOTHING_WRONG = (False, False, False, (False, False))
 INITIAL = PedalMemory(math.nan, (math.nan, math.nan), 0, _NO_LEVELS)
 
 
@@ -61,7 +62,7 @@ def read_pedal(
     if abs(one - two) <= s.pedal_disagreement:
         travel = 0.5 * (one + two)
         if levels == _NO_LEVELS:  # mostly
-            return _new(PedalMemory, (travel, (one, two), 0, levels)), PedalReading(travel, False, False, False)
+            return _new(PedalMemory, (travel, (one, two), 0, levels)), _new(PedalReading, (travel, *_NOTHING_WRONG))
         suspect, levels = 0, _rest(levels, s, p, dt_s)
         named = _named(levels, s.pedal_disagreement_s)
         travel = two if named == 1 else one if named == 2 else travel

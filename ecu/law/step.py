@@ -21,6 +21,10 @@ SAMPLE_S = 0.01  # the sensors' cycle: the observer steps once for each, however
 CONFIDENCE_STEPS = 7
 _BOTH_FOLLOW = (Brake.DEMAND, Brake.DEMAND)
 _NONE = (False, False, False, False)
+# every tick asks for these: an enum's attributes are slow, and so is the Python-made __new__ of a NamedTuple
+_INIT, _SAFE_STOP, _WITH_MOTORS = BrakeMode.INIT, BrakeMode.SAFE_STOP, (BrakeMode.NORMAL, BrakeMode.DEGRADED)
+_PEDAL, _OWN_MAP = Source.PEDAL, Brake.OWN_MAP
+_new = tuple.__new__
 
 
 class Memory(NamedTuple):
@@ -98,12 +102,12 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     streams = judge_streams(memory.streams, inputs.health, timed_out, p.supervision, dt_s)
     lost = modes.lost_sources(timed_out, streams)
     pedal_memory, pedal = pedal_travel.read_pedal(
-        memory.pedal, inputs, lost[Source.PEDAL], p.supervision, p.plausibility, dt_s
+        memory.pedal, inputs, lost[_PEDAL], p.supervision, p.plausibility, dt_s
     )
     if math.isfinite(pedal.travel):
         deceleration = base_brake.reference_deceleration(pedal.travel, p.pedal)
         # frames of another's: the driver's may be the larger
-        if streams is not ALL_CLEAN and streams[Source.PEDAL].suspect:
+        if streams is not ALL_CLEAN and streams[_PEDAL].suspect:
             deceleration = max(deceleration, *memory.recent_mps2)
         without_pedal_s = 0.0
     else:
@@ -121,10 +125,7 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
         if inputs.brake != _BOTH_FOLLOW:
             asked_pa = _asked_of_followers(asked_pa, inputs.brake)
         z = estimator.measured(inputs, lost, deceleration, asked_pa, memory.asked_nm, p.motor.torque_per_current_nm_a)
-        watch, bits, wheel_speed = judge.judge(
-            watch, z, judge.judge_parameters(p), known.speed_mps, known.expected_mps2, known.grade_mps2, since_sample_s
-        )
-        observer, known = estimator.estimate(observer, z, p, since_sample_s)
+        watch, bits, wheel_speed, observer, known = estimator.observe(watch, observer, known, z, p, since_sample_s)
         since_sample_s = 0.0
     plausibility = PLAUSIBLE
     if bits or stuck or slow != estimator.PLAUSIBLE or pedal.channels_disagree or True in pedal.implausible:
@@ -134,9 +135,9 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     )
     mode = mode_memory.mode
     troubles = memory.troubles
-    if active != troubles.active and (mode != BrakeMode.INIT or time_s > p.supervision.start_tolerated_s):
+    if active != troubles.active and (mode != _INIT or time_s > p.supervision.start_tolerated_s):
         troubles = trouble_codes.remember(troubles, active, time_s, _freeze_frame(memory, inputs))
-    handed_over = mode == BrakeMode.SAFE_STOP and (
+    handed_over = mode == _SAFE_STOP and (
         memory.handed_over or without_pedal_s > p.supervision.demand_hold_s + 0.5 * dt_s
     )
 
@@ -150,19 +151,19 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     )  # fmt: skip
     m0, m1, m2, m3 = motor_nm
     c0, c1, c2, c3 = known.confidence
-    silent = mode == BrakeMode.INIT or handed_over
+    silent = mode == _INIT or handed_over
     pressure_demand = UNKNOWN if silent else pressure
-    motor_demand = UNKNOWN if mode == BrakeMode.INIT else (-m0, -m1, -m2, -m3)
-    outputs = Outputs(
-        pressure_demand_pa=pressure_demand,
-        motor_demand_nm=motor_demand,
-        mode=mode,
-        faults=faults,
-        blending_factor=sum(motor_nm) / torque if torque > 0.0 else 0.0,
-        demanded_deceleration_mps2=math.nan if silent else deceleration,
-        wheel_torque_nm=known.wheel_torque_nm,
-        pad_friction=known.pad_friction,
-        confidence=(
+    motor_demand = UNKNOWN if mode == _INIT else (-m0, -m1, -m2, -m3)
+    outputs = (
+        pressure_demand,
+        motor_demand,
+        mode,
+        faults,
+        sum(motor_nm) / torque if torque > 0.0 else 0.0,
+        math.nan if silent else deceleration,
+        known.wheel_torque_nm,
+        known.pad_friction,
+        (
             round(CONFIDENCE_STEPS * c0),
             round(CONFIDENCE_STEPS * c1),
             round(CONFIDENCE_STEPS * c2),
@@ -170,11 +171,11 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
         ),
     )
     recent = (deceleration, memory.recent_mps2[0], memory.recent_mps2[1])
-    memory = Memory(
+    state = (
         time_s, streams, mode_memory, troubles, pedal_memory, deceleration, recent, without_pedal_s, handed_over,
         factor, charge, watch, bits, wheel_speed, observer, since_sample_s, known, mu, pressure_demand, motor_demand,
     )  # fmt: skip
-    return memory, outputs
+    return _new(Memory, state), _new(Outputs, outputs)
 
 
 def _freeze_frame(memory: Memory, inputs: Inputs) -> trouble_codes.FreezeFrame:
@@ -208,7 +209,7 @@ def _usable_torque(
     inputs: Inputs, lost: tuple[bool, ...], mode: BrakeMode, excluded: tuple[bool, bool, bool, bool]
 ) -> Four:
     """Torque that may be asked of each motor, Nm, positive: none beside a brake that follows its own pedal map."""
-    if mode not in (BrakeMode.NORMAL, BrakeMode.DEGRADED) or Brake.OWN_MAP in inputs.brake:
+    if mode not in _WITH_MOTORS or _OWN_MAP in inputs.brake:
         return ZERO
     values = inputs.motor_available_nm
     well = True not in lost and True not in inputs.motor_failed and excluded == _NONE and min(values) >= 0.0

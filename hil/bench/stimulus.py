@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from enum import StrEnum
 from threading import Lock
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from dbc.bench_messages import (
     FaultCommand,
@@ -43,8 +43,12 @@ class Channel(StrEnum):
     __hash__ = str.__hash__  # that of an enum is slow, and asked several times a tick
 
 
-_DRIVER = (Channel.PEDAL, Channel.SPEED, Channel.STEERING)
-_ROAD = (Channel.FRICTION_LEFT, Channel.FRICTION_RIGHT, Channel.GRADE)
+_CHANNELS: tuple[tuple[type[Any], tuple[Channel, ...]], ...] = (
+    (StimulusEcu, (Channel.BLENDING,)),
+    (StimulusDriver, (Channel.PEDAL, Channel.SPEED, Channel.STEERING)),
+    (StimulusRoad, (Channel.FRICTION_LEFT, Channel.FRICTION_RIGHT, Channel.GRADE)),
+)
+"""What each message of the stimulus carries, in the order of its fields."""
 
 
 class _Planned(NamedTuple):
@@ -84,6 +88,7 @@ class StimulusNode:
         self.sent: Sequence[Frame] = ()
         self.time_s: float | None = None
         self._traces: dict[Channel, Trace] = {Channel.BLENDING: blending} if blending else {}
+        self._stimulated = self._of_traces()
         self._waiting: list[_Planned] = []
         self._seed = seed
         self._seeded = 0
@@ -120,11 +125,17 @@ class StimulusNode:
             past = tuple(point for point in self._traces.get(channel, ()) if point[0] < now)
             ramp = ((now, value if begin is None or within_s == 0.0 else begin), (now + within_s, value))
             self._traces[channel] = (*past[-1:], *ramp)
+            self._stimulated = self._of_traces()
 
     def leave(self, channel: Channel) -> None:
         """Stimulate a channel no longer: scenario and parameters decide again."""
         with self._lock:
             self._traces.pop(channel, None)
+            self._stimulated = self._of_traces()
+
+    def _of_traces(self) -> list[tuple[type[Any], tuple[Channel, ...]]]:
+        """Messages with a channel that is stimulated, and all their channels."""
+        return [(kind, channels) for kind, channels in _CHANNELS if not self._traces.keys().isdisjoint(channels)]
 
     def value(self, channel: Channel) -> float | None:
         """Value of a channel that acts next; None where it is not stimulated."""
@@ -181,12 +192,11 @@ class StimulusNode:
 
     def _outgoing(self) -> list[Message]:
         out: list[Message] = []
-        if Channel.BLENDING in self._traces:
-            out.append(StimulusEcu(self.value(Channel.BLENDING)))
-        if not self._traces.keys().isdisjoint(_DRIVER):
-            out.append(StimulusDriver(*map(self.value, _DRIVER)))
-        if not self._traces.keys().isdisjoint(_ROAD):
-            out.append(StimulusRoad(*map(self.value, _ROAD)))
+        if self._traces:
+            next_s = self.next_s
+            for kind, channels in self._stimulated:
+                traces = [self._traces.get(channel) for channel in channels]
+                out.append(kind(*[value_at(trace, next_s) if trace else None for trace in traces]))
         opens = self._opening > 0 and self.motion is not None
         if opens:
             self._opening -= 1

@@ -5,7 +5,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ecu.law.compiled import entry, helper
+from ecu.law.compiled import helper
 from ecu.law.gravity import GRAVITY_MPS2
 from ecu.law.joint.layout import (
     BIAS,
@@ -21,7 +21,6 @@ from ecu.law.joint.layout import (
     TORQUE,
     N,
 )
-from ecu.law.types import Four
 
 Vector = NDArray[np.float64]
 
@@ -35,33 +34,25 @@ def confidence_of(s: Vector, i: int, full: float) -> float:
     return float(1.0 - min(sqrt(max(variance, 0.0)) / (full * s[FRICTION + i]), 1.0))
 
 
-@entry
-def read_estimates(
-    s: Vector, full: float
-) -> tuple[bool, float, Four, Four, Four, float, tuple[bool, bool, bool, bool], bool, float, float]:
-    """Whether it has started, speed, wheel torques, pad friction and its confidence, mass, wheels that do not turn as
-    the car moves, whether the accelerometer is stuck, what the accelerometer should show by the torques,
-    and what it shows of offset and grade, m/s2.
+@helper
+def write_estimates(s: Vector, full: float, told: Vector) -> None:
+    """Write what the controller reads into ``told``, shape (`TOLD`,).
+
+    Whether it has started, speed, mass, whether the accelerometer is stuck, what the accelerometer should show by the
+    torques, and what it shows of offset and grade, m/s2; then of each wheel the torque, pad friction and its
+    confidence, and whether it does not turn as the car moves.
 
     Parameters
     ----------
     s : state (`layout`).  full : relative uncertainty of the pad friction that counts as no confidence.
     """
-    t, m = TORQUE, FRICTION
-    return (
-        s[STARTED] != 0.0,
-        s[SPEED],
-        (s[t], s[t + 1], s[t + 2], s[t + 3]),
-        (s[m], s[m + 1], s[m + 2], s[m + 3]),
-        (confidence_of(s, 0, full), confidence_of(s, 1, full), confidence_of(s, 2, full), confidence_of(s, 3, full)),
-        s[MASS],
-        (
-            s[ODD_S] > IMPLAUSIBLE_S,
-            s[ODD_S + 1] > IMPLAUSIBLE_S,
-            s[ODD_S + 2] > IMPLAUSIBLE_S,
-            s[ODD_S + 3] > IMPLAUSIBLE_S,
-        ),
-        s[STUCK] != 0.0,
-        s[EXPECTED],
-        s[BIAS] + GRAVITY_MPS2 * s[GRADE],
-    )
+    told[0], told[1], told[2], told[3] = s[STARTED], s[SPEED], s[MASS], s[STUCK]
+    told[4], told[5] = s[EXPECTED], s[BIAS] + GRAVITY_MPS2 * s[GRADE]
+    for i in range(4):
+        told[6 + i] = s[TORQUE + i]
+        told[10 + i] = s[FRICTION + i]
+        told[14 + i] = confidence_of(s, i, full)
+        told[18 + i] = 1.0 if s[ODD_S + i] > IMPLAUSIBLE_S else 0.0
+
+
+TOLD = 22

@@ -130,28 +130,13 @@ def compare_wheels(
         )  # fmt: skip
 
 
-@entry
-def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
-    """Advance the filter by one sample.
-
-    Parameters
-    ----------
-    s : state of the last step (`layout`); not changed.  z : inputs, NaN where not available; pressures Pa,
-        motor torques Nm negative braking, ``DEMAND`` the demanded deceleration.  p : parameters,
-        `estimator.joint_parameters`.  dt : time since the last sample, s.
-
-    Returns
-    -------
-    new state; ``TORQUE`` holds the wheel torques, Nm, negative braking.
-
-    Without a believable acceleration the speed comes from the wheels and the force balance, and nothing is learned; nor
-    is anything while a pressure or a motor torque is missing.
-    """
-    s = s.copy()
+@helper
+def advance(s: Vector, z: Vector, p: Vector, dt: float) -> None:
+    """As `joint_step`, in place."""
     fastest = fastest_wheel(z)
     if s[STARTED] == 0.0:
         if fastest < 0.0 or isnan(z[AX]):
-            return s
+            return
         start(s, p, median_wheel(z) * p[P_RADIUS])
         for i in range(4):
             s[MOTOR_LAG + i] = 0.0 if isnan(z[MOTOR + i]) else z[MOTOR + i]
@@ -166,7 +151,7 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     s[FORCE_LAG] = force
     if fastest <= 0.0 and s[SPEED] < 1.0:
         apply_standstill(s, p)
-        return s
+        return
 
     # predict
     side_n = ((p[P_BASE] - p[P_FRONT]) / p[P_BASE]) * p[P_MASS] * s[MASS] * ay * np.sin(steer)
@@ -189,4 +174,25 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     s[EXPECTED] = expected_acceleration(s, p, force, side_n) + s[BIAS]
     if body and s[LOCKED] + s[LOCKED + 1] + s[LOCKED + 2] + s[LOCKED + 3] > 0.0:
         torque_of_standing_wheels(s, p, ax, acceleration, loads, spin)
+
+
+@entry
+def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
+    """Advance the filter by one sample.
+
+    Parameters
+    ----------
+    s : state of the last step (`layout`); not changed.  z : inputs, NaN where not available; pressures Pa,
+        motor torques Nm negative braking, ``DEMAND`` the demanded deceleration.  p : parameters,
+        `estimator.joint_parameters`.  dt : time since the last sample, s.
+
+    Returns
+    -------
+    new state; ``TORQUE`` holds the wheel torques, Nm, negative braking.
+
+    Without a believable acceleration the speed comes from the wheels and the force balance, and nothing is learned; nor
+    is anything while a pressure or a motor torque is missing.
+    """
+    s = s.copy()
+    advance(s, z, p, dt)
     return s

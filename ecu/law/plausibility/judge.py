@@ -54,6 +54,27 @@ def drop_unlimited(z: Vector) -> None:
             z[k] = np.nan
 
 
+@helper
+def judge_sample(
+    s: Vector, z: Vector, p: Vector, speed: float, expected: float, grade: float, dt: float
+) -> tuple[int, float]:
+    """Judge one sample; the state ``s`` is advanced in place, for the rest see `judge`."""
+    begun = s[BEGUN] > 0.0
+    drop_unlimited(z)
+    ax = z[AX]
+    excluded = s[EXCLUDED_S] + s[EXCLUDED_S + 1] + s[EXCLUDED_S + 2] + s[EXCLUDED_S + 3] > 0.0
+    if excluded:
+        believe_reports(s, z, p, ax, expected, dt)
+    else:
+        s[REPORTED] = 0.0
+    bits, top = judge_wheels(s, z, p, 0.0 if isnan(speed) else speed, begun, dt)
+    bits |= judge_pressures(s, z, p, dt)
+    bits |= judge_motors(s, z, p, dt)
+    bits |= judge_acceleration(s, z, p, expected, grade, begun, dt)
+    s[BEGUN] = 1.0
+    return bits, top
+
+
 @entry
 def judge(
     s: Vector, z: Vector, p: Vector, speed: float, expected: float, grade: float, dt: float
@@ -75,19 +96,7 @@ def judge(
     new state; bits of what has been wrong for long enough (`layout`); speed of the fastest wheel that can be, rad/s.
     """
     s = s.copy()
-    begun = s[BEGUN] > 0.0
-    drop_unlimited(z)
-    ax = z[AX]
-    excluded = s[EXCLUDED_S] + s[EXCLUDED_S + 1] + s[EXCLUDED_S + 2] + s[EXCLUDED_S + 3] > 0.0
-    if excluded:
-        believe_reports(s, z, p, ax, expected, dt)
-    else:
-        s[REPORTED] = 0.0
-    bits, top = judge_wheels(s, z, p, 0.0 if isnan(speed) else speed, begun, dt)
-    bits |= judge_pressures(s, z, p, dt)
-    bits |= judge_motors(s, z, p, dt)
-    bits |= judge_acceleration(s, z, p, expected, grade, begun, dt)
-    s[BEGUN] = 1.0
+    bits, top = judge_sample(s, z, p, speed, expected, grade, dt)
     return s, bits, top
 
 

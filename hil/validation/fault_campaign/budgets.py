@@ -35,8 +35,8 @@ ORIGINS = {
     f"where the motor reports its failure, {DIP_SILENT_MS:g} ms where it falls silent (design)",
     "release": f"less than half of the braking due for {DIP_SILENT_MS:g} ms at most: losing a demand never releases "
     "the brake (design)",
-    "recovery": "ten valid frames, a second for each mode (design), the healing times of the trouble codes found, and 2.5 s until "
-    "the lateness of a foreign frame that was taken is forgotten",
+    "recovery": "ten valid frames, a second for each mode (design), the healing times of the trouble codes found, and "
+    "2.5 s until the lateness of a foreign frame that was taken is forgotten",
     "stale_used": "1 or 2 bits turned: never; 3 to 16: 0.6 % (exact for the check value); old frames: never; of a "
     f"second sender: {FOREIGN_BEFORE_FOUND} until it is found, {FOREIGN_AT_ACTUATOR} where an actuator takes them",
     "wrong_code": "no trouble code of another part, no mode beside those of the fault library; of two faults the worse "
