@@ -18,6 +18,18 @@ class PhysicalFault(IntEnum):
     NONE = 0
     MOTOR_DEAD = 1
     BATTERY_REFUSES_CHARGE = 2
+    MOTOR_DEAF = 3
+    MOTOR_WEAK = 4
+    MOTOR_STUCK_ON = 5
+    EHB_CIRCUIT_FAILED = 6
+    ACCUMULATOR_EMPTY = 7
+
+
+class FaultAction(IntEnum):
+    """What FAULT_SELECT does with the fault that it names."""
+
+    STOP = 0
+    START = 1
 
 
 class StimulusDriver(NamedTuple):
@@ -48,6 +60,25 @@ class FaultCommand(NamedTuple):
     fault: PhysicalFault | None
     active: int | None
     wheels: int | None
+
+
+class FaultParameter(NamedTuple):
+    """One parameter of the fault that the next FAULT_SELECT of its number starts: mantissa times 10 to the exponent."""
+
+    fault: int | None
+    parameter: int | None
+    mantissa: int | None
+    exponent: int | None
+
+
+class FaultSelect(NamedTuple):
+    """Starts or stops one fault of the catalogue in the process that plays its target; sent on change."""
+
+    fault: int | None
+    action: FaultAction | None
+    target: int | None
+    signal: int | None
+    seed: int | None
 
 
 class TruthMotion(NamedTuple):
@@ -169,6 +200,8 @@ BENCH_MESSAGES = (
     StimulusRoad,
     StimulusEcu,
     FaultCommand,
+    FaultParameter,
+    FaultSelect,
     TruthMotion,
     TruthWheelTorque,
     TruthFrictionTorque,

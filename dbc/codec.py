@@ -57,6 +57,7 @@ class Field:
     minimum, maximum : range in the DBC's unit that the raw value can hold too.
     sna : raw value that means signal not available, or None.
     enum : type of the value where the signal is a choice.
+    start, length, signed, little_endian, factor, offset : as in the DBC.
     """
 
     name: str
@@ -66,6 +67,12 @@ class Field:
     maximum: float
     sna: int | None
     enum: type[IntEnum] | None
+    start: int
+    length: int
+    signed: bool
+    little_endian: bool
+    factor: float
+    offset: float
 
 
 def payload_signals(message: DbcMessage) -> list[DbcSignal]:
@@ -78,10 +85,10 @@ def sna_of(signal: DbcSignal) -> int | None:
     return next((int(raw) for raw, name in (signal.choices or {}).items() if str(name) == SNA), None)
 
 
-def _raw_range(signal: DbcSignal) -> tuple[int, int]:
-    if signal.is_signed:
-        return -(1 << (signal.length - 1)), (1 << (signal.length - 1)) - 1
-    return 0, (1 << signal.length) - 1
+def _raw_range(length: int, signed: bool) -> tuple[int, int]:
+    if signed:
+        return -(1 << (length - 1)), (1 << (length - 1)) - 1
+    return 0, (1 << length) - 1
 
 
 def field_of(signal: DbcSignal, enum: type[IntEnum] | None = None) -> Field:
@@ -94,9 +101,23 @@ def field_of(signal: DbcSignal, enum: type[IntEnum] | None = None) -> Field:
     if signal.minimum is None or signal.maximum is None or not signal.minimum < signal.maximum or not signal.scale:
         raise CodecError(f"signal {signal.name}: needs a range [min|max] with min < max and a factor other than 0")
     suffix, si = SI_UNITS[unit]
-    low, high = sorted(raw * signal.scale + signal.offset for raw in _raw_range(signal))
+    low, high = sorted(raw * signal.scale + signal.offset for raw in _raw_range(signal.length, signal.is_signed))
     name = signal.name.lower() + (f"_{suffix}" if suffix else "")
-    return Field(name, signal.name, si, max(signal.minimum, low), min(signal.maximum, high), sna_of(signal), enum)
+    return Field(
+        name=name,
+        signal=signal.name,
+        si_per_unit=si,
+        minimum=max(signal.minimum, low),
+        maximum=min(signal.maximum, high),
+        sna=sna_of(signal),
+        enum=enum,
+        start=signal.start,
+        length=signal.length,
+        signed=signal.is_signed,
+        little_endian=signal.byte_order == "little_endian",
+        factor=float(signal.scale),
+        offset=float(signal.offset),
+    )
 
 
 def _position(signal: DbcSignal, length_bytes: int) -> int:
@@ -210,7 +231,7 @@ def compile_decoder(message: DbcMessage, fields: list[Field], make: Callable[...
         value += "" if signal.offset == 0 else f" + {_number(signal.offset, signal)}"
         if field.si_per_unit != 1.0:
             value = f"({value}) * {field.si_per_unit!r}" if signal.offset else f"{value} * {field.si_per_unit!r}"
-        test = _raw_test(f"v{i}", signal, field)
+        test = _raw_test(f"v{i}", field)
         if test or value != f"v{i}":
             lines.append(f" v{i} = {value}" + (f" if {test} else None" if test else ""))
     values = ", ".join(f"v{i}" for i in range(len(fields)))
@@ -222,12 +243,18 @@ def compile_decoder(message: DbcMessage, fields: list[Field], make: Callable[...
     return _compile("\n".join(lines), "decode", namespace)
 
 
-def _raw_test(raw: str, signal: DbcSignal, field: Field) -> str:
+def usable_raw(field: Field) -> tuple[int, int]:
+    """First and last raw value within the range of a field; SNA may be one of them."""
+    lowest, highest = _raw_range(field.length, field.signed)
+    slack = abs(field.factor) * 1e-6  # the clamped end of a range must survive its own rounding
+    ends = sorted((end - field.offset) / field.factor for end in (field.minimum - slack, field.maximum + slack))
+    return max(lowest, ceil(ends[0])), min(highest, floor(ends[1]))
+
+
+def _raw_test(raw: str, field: Field) -> str:
     """Condition on the raw value, by name, for a usable value; empty where every raw value is one."""
-    lowest, highest = _raw_range(signal)
-    slack = abs(signal.scale) * 1e-6  # the clamped end of a range must survive its own rounding
-    ends = sorted((end - signal.offset) / signal.scale for end in (field.minimum - slack, field.maximum + slack))
-    first, last = max(lowest, ceil(ends[0])), min(highest, floor(ends[1]))
+    lowest, highest = _raw_range(field.length, field.signed)
+    first, last = usable_raw(field)
     parts = [str(first), "<="] if first > lowest else []
     parts += [raw] + (["<=", str(last)] if last < highest else [])
     test = [" ".join(parts)] if len(parts) > 1 else []

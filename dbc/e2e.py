@@ -117,6 +117,11 @@ class Checker:
         self.corrupt = 0
         self._to_sync = 0
 
+    @property
+    def in_sequence(self) -> bool:
+        """Whether a payload with the next counter is usable."""
+        return self.counter is not None and self._to_sync == 0
+
     def check(self, payload: bytes) -> Status:
         """Check one received payload and remember its counter.
 

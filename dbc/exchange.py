@@ -3,58 +3,22 @@
 from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from dbc.compiled import PAYLOAD
 from dbc.contract import Message, MessageSpec, spec_of
-from dbc.e2e import COUNTER_MODULUS, Checker, Status
-from dbc.frame import BusName, Frame, LinkEvent, Received
+from dbc.e2e import COUNTER_MODULUS
+from dbc.frame import BusName, Frame, LinkEvent, LinkState, Received
+from dbc.intake import JUDGED_ALONE, Intake, Vector
+from dbc.reception import Reception
 
 M = TypeVar("M", bound=Message)
 LAST_COUNTER = COUNTER_MODULUS - 1
 # on the way of every frame: without the Python-made __new__ of a NamedTuple and the slow look-up of an enum's member
 _new = tuple.__new__
-_VEHICLE, _OK, _OK_SOME_LOST, _NO_NEW_DATA = (
-    BusName.VEHICLE, Status.OK, Status.OK_SOME_LOST, Status.NO_NEW_DATA,
-)  # fmt: skip
-
-
-class Reception:
-    """State of one received message.
-
-    Attributes
-    ----------
-    message : the last usable message, None before the first.
-    fresh : whether the last call of `Receiver.accept` brought a usable one.
-    valid_in_row : usable frames since the last unusable one.
-    bad_in_row : unusable frames since the last usable one.
-    last_valid_ns : tick of the last usable frame, None before the first.
-    """
-
-    def __init__(self, spec: MessageSpec) -> None:
-        self.spec = spec
-        self.checker = None if spec.data_id is None else Checker(spec.data_id, spec.length)
-        self._check = self._check_length if self.checker is None else self.checker.check
-        self._decode = spec.decode
-        self.message: Message | None = None
-        self.status = Status.NO_NEW_DATA
-        self.fresh = False
-        self.valid_in_row = 0
-        self.bad_in_row = 0
-        self.last_valid_ns: int | None = None
-
-    def accept(self, now_ns: int, data: bytes) -> None:
-        """Check one payload and keep its message when it is usable."""
-        status = self.status = self._check(data)
-        if status is _OK or status is _OK_SOME_LOST:
-            self.message = self._decode(data)
-            self.fresh = True
-            self.valid_in_row += 1
-            self.bad_in_row = 0
-            self.last_valid_ns = now_ns
-        else:
-            self.valid_in_row = 0
-            self.bad_in_row += 1
-
-    def _check_length(self, data: bytes) -> Status:
-        return Status.OK if len(data) == self.spec.length else Status.WRONG_CRC
+_VEHICLE = BusName.VEHICLE
+_WHOLE = frozenset({PAYLOAD})
 
 
 class Receiver:
@@ -63,33 +27,71 @@ class Receiver:
     Parameters
     ----------
     types : the typed messages the node reads; all other frames are passed over.
+
+    Attributes
+    ----------
+    receptions : state of each message.
+    values : last usable values of all fields, SI units, message after message in the order of ``types``; NaN where not
+        available or not yet received.
+    link_events : those of the last tick.
+    lost, corrupt : frames missing by their counters, and with wrong check value or length, over all messages.
     """
 
     def __init__(self, types: Iterable[type[Message]]) -> None:
-        self.receptions = {t: Reception(spec_of(t)) for t in types}
+        kinds = tuple(types)
+        self._intake = Intake([spec_of(kind) for kind in kinds])
+        self.receptions = {kind: Reception(self._intake, index) for index, kind in enumerate(kinds)}
         self._all = list(self.receptions.values())
-        self._checkers = [reception.checker for reception in self._all if reception.checker is not None]
         # by bus and identifier, in two steps: hashing the name of a bus for each frame is slow
         self._vehicle, self._bench = (
-            {r.spec.can_id: r for r in self._all if r.spec.bus is bus} for bus in (BusName.VEHICLE, BusName.BENCH)
+            {r.spec.can_id: index for index, r in enumerate(self._all) if r.spec.bus is bus}
+            for bus in (BusName.VEHICLE, BusName.BENCH)
         )
+        self._of_interest = {*self._vehicle, *self._bench, *LinkState}  # the second element of what comes
+        self.values: Vector = self._intake.values
         self.link_events: list[LinkEvent] = []
+        self.lost = self.corrupt = 0
 
     def accept(self, now_ns: int, inbox: Sequence[Received]) -> None:
         """Take the inbox of the tick ``now_ns``; ``link_events`` then holds the tick's link events."""
-        for reception in self._all:
-            reception.fresh = False
-            reception.status = _NO_NEW_DATA
         self.link_events = []
-        vehicle, bench = self._vehicle, self._bench
-        for item in inbox:
+        of_interest, vehicle, bench = self._of_interest, self._vehicle, self._bench
+        indices: list[int] = []
+        payloads: list[bytes] = []
+        for item in [item for item in inbox if item[1] in of_interest]:
             if isinstance(item, LinkEvent):
                 self.link_events.append(item)
                 continue
             bus, can_id, data, _, extended = item
-            known = (vehicle if bus is _VEHICLE else bench).get(can_id)
-            if known is not None and not extended:
-                known.accept(now_ns, data)
+            index = (vehicle if bus is _VEHICLE else bench).get(can_id)
+            if index is not None and not extended:
+                indices.append(index)
+                payloads.append(data)
+        self._take(now_ns, indices, payloads)
+
+    def _take(self, now_ns: int, indices: list[int], payloads: list[bytes]) -> None:
+        """Take the usual frames together, up to each that is to be judged alone."""
+        if _WHOLE.issuperset(map(len, payloads)):
+            frames = np.frombuffer(bytes(indices) + b"".join(payloads), np.uint8)
+        else:
+            frames = _with_odd_lengths(indices, payloads)
+        unusual = self._intake.take(now_ns, 0, frames)
+        if unusual == len(payloads):
+            return
+        judged = []
+        while unusual < len(payloads):
+            judged.append(self._all[indices[unusual]])
+            judged[-1].accept(now_ns, payloads[unusual])
+            unusual = self._intake.take(now_ns, unusual + 1, frames)
+        for reception in judged:
+            reception.finish(now_ns)
+        checkers = [reception.checker for reception in self._all if reception.checker is not None]
+        self.lost = sum([checker.lost for checker in checkers])
+        self.corrupt = sum([checker.corrupt for checker in checkers])
+
+    def of(self, message_type: type[Message]) -> Vector:
+        """Where the values of a message lie in `values`; shape (fields,)."""
+        return self._intake.of(self.receptions[message_type].index)
 
     def latest(self, message_type: type[M]) -> M | None:
         """Last usable message of a type, however old."""
@@ -100,20 +102,25 @@ class Receiver:
         last = self.receptions[message_type].last_valid_ns
         return None if last is None else now_ns - last
 
+    @property
+    def well(self) -> list[int]:
+        """Of each message 1 where the last tick brought a usable frame and nothing odd."""
+        return self._intake.well
+
+    @property
+    def counters(self) -> list[int]:
+        """Last alive counter consumed of each message; `dbc.intake.NO_COUNTER` before the first."""
+        return self._intake.counters
+
     def counter(self, message_type: type[Message]) -> int | None:
         """Last alive counter consumed of a message."""
-        checker = self.receptions[message_type].checker
-        return None if checker is None else checker.counter
+        return self.receptions[message_type].counter
 
-    @property
-    def lost(self) -> int:
-        """Frames missing by their counters, over all messages."""
-        return sum([checker.lost for checker in self._checkers])
 
-    @property
-    def corrupt(self) -> int:
-        """Frames with wrong check value or length, over all messages."""
-        return sum([checker.corrupt for checker in self._checkers])
+def _with_odd_lengths(indices: list[int], payloads: list[bytes]) -> NDArray[np.uint8]:
+    whole = [len(data) == PAYLOAD for data in payloads]
+    which = [index if right else JUDGED_ALONE for index, right in zip(indices, whole, strict=True)]
+    return np.frombuffer(bytes(which) + b"".join([data[:PAYLOAD].ljust(PAYLOAD, b"\0") for data in payloads]), np.uint8)
 
 
 class Transmitter:

@@ -36,6 +36,8 @@ class Fault(IntFlag):
     STEERING = 2048
     LINK = 4096
     EHB_OWN_MAP = 8192
+    MOTOR_TORQUE = 16384
+    COMMUNICATION = 32768
 
 
 class EhbState(IntEnum):
@@ -44,6 +46,14 @@ class EhbState(IntEnum):
     DEMAND = 0
     OWN_PEDAL_MAP = 1
     FAILED = 2
+
+
+class TroubleStatus(IntEnum):
+    """State of a trouble code in the controller's memory."""
+
+    NONE = 0
+    STORED = 1
+    ACTIVE = 2
 
 
 class MotorState(IntEnum):
@@ -193,6 +203,16 @@ class BrakeEstimateRear(NamedTuple):
     confidence_rr: int | None
 
 
+class BrakeTroubleCode(NamedTuple):
+    """One of the controller's trouble codes after the other; code 0 where there is none."""
+
+    trouble_code: int | None
+    status: TroubleStatus | None
+    occurrences: int | None
+    stored_codes: int | None
+    code_index: int | None
+
+
 BRAKE_MESSAGES = (
     BrakePedal,
     EhbDemandFront,
@@ -211,4 +231,5 @@ BRAKE_MESSAGES = (
     BrakeStatus,
     BrakeEstimateFront,
     BrakeEstimateRear,
+    BrakeTroubleCode,
 )

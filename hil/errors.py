@@ -1,4 +1,39 @@
-"""What the bench says when it cannot go on."""
+"""What the bench says when it cannot go on, and how every command judges: verdicts and exit codes."""
+
+from enum import StrEnum
+
+INTERRUPTED_EXIT_CODE = 130
+"""Ctrl-C: 128 + SIGINT, as a shell reports it. The verdict of an interrupted run is *incomplete*."""
+
+
+class Verdict(StrEnum):
+    """How a command judges, the same in every command, in JSON, in reports and in pytest; the worst one last."""
+
+    PASSED = "passed"
+    FAILED = "failed"  # what was tested did not do what was asked
+    INCONCLUSIVE = "inconclusive"  # it ran to its end, but under conditions that allow no judgement
+    INCOMPLETE = "incomplete"  # interrupted, or a recording or a file that was asked for is missing
+    BROKEN = "broken"  # a node or the bench fell over, or never came to life
+
+    @property
+    def exit_code(self) -> int:
+        """What the command line returns; 2 is wrong use or input, before anything was started."""
+        return _EXIT_CODES[self]
+
+    @property
+    def rank(self) -> int:
+        """0 for passed, larger for worse."""
+        return _ORDER.index(self)
+
+
+_ORDER = tuple(Verdict)
+_EXIT_CODES = {
+    Verdict.PASSED: 0,
+    Verdict.FAILED: 1,
+    Verdict.BROKEN: 3,
+    Verdict.INCONCLUSIVE: 4,
+    Verdict.INCOMPLETE: 5,
+}
 
 
 class BrakebenchError(Exception):
@@ -6,7 +41,7 @@ class BrakebenchError(Exception):
 
     Attributes
     ----------
-    exit_code : what the command line returns: 2 wrong use or input, 3 the bench broke.
+    exit_code : what the command line returns: 2 wrong use or input, or the exit code of a `Verdict`.
     """
 
     exit_code = 2

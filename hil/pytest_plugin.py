@@ -13,7 +13,7 @@
 Everything heavy is imported when a test first asks for a bench: every pytest run of the environment loads this file.
 """
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,6 +30,7 @@ STOPPED_MPS = 0.05
 _SESSION: "pytest.StashKey[Session]" = pytest.StashKey()
 _OPEN: "pytest.StashKey[list[Session]]" = pytest.StashKey()
 _REQUIREMENT = "requirement"
+_VERDICT, _PUNCTUALITY = "brakebench verdict", "brakebench real time"
 _SHOWN = (("log", "recording"), ("figure", "figure"), ("page", "report"))
 
 
@@ -83,9 +84,9 @@ class FaultAccess:
     @property
     def names(self) -> tuple[str, ...]:
         """Faults by name."""
-        from hil.faults.physical import FAULT_NAMES
+        from hil.faults.catalogue import names
 
-        return FAULT_NAMES
+        return names()
 
 
 class RecordingAccess:
@@ -120,7 +121,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--brakebench-realtime",
         action="store_true",
-        help="run benches in real time on a bus that is free (vcan0, else a loopback) instead of in virtual time",
+        help="run benches in real time on a bus that is free (vcan0, else a loopback) instead of in virtual time, and "
+        "ask for real-time scheduling; the summary says what was granted",
     )
     group.addoption(
         "--brakebench-no-ecu",
@@ -147,6 +149,15 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[_OPEN] = []
 
 
+def pytest_report_header(config: pytest.Config) -> str | None:
+    """Say what benches run on where they do not run in virtual time."""
+    options = config.option
+    if not (options.brakebench_bus or options.brakebench_realtime or options.brakebench_no_ecu):
+        return None
+    asked = "asked for, see the summary" if options.brakebench_realtime else "not asked for (--brakebench-realtime)"
+    return f"brakebench: real time on {options.brakebench_bus or 'a free bus'}; real-time scheduling {asked}"
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Requirement ids go into the reports (JUnit XML: properties of the test case)."""
     for item in items:
@@ -162,7 +173,8 @@ def bench(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     options = request.config.option
     bus, no_ecu = options.brakebench_bus, options.brakebench_no_ecu
     real = bool(bus or options.brakebench_realtime or no_ecu)
-    make = real_run(bus or "auto", ("ecu",) if no_ecu else ()) if real else virtual_run
+    others = ("ecu",) if no_ecu else ()
+    make = real_run(bus or "auto", others, options.brakebench_realtime) if real else virtual_run
     session = Session(make, _folder(request, tmp_path_factory), f"Test {request.node.nodeid}", options.brakebench_limit)
     request.node.stash[_SESSION] = session
     running = request.config.stash[_OPEN]
@@ -217,28 +229,48 @@ def recording(bench: "Session") -> RecordingAccess:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Any:
-    """On failure write recording, figure and report, and name them in the output."""
+    """Give the test its verdict; on all but *passed* write recording, figure and report, and name them in the output.
+
+    A test that passes in real time is looked at as a run is: with a node that fell silent, too many overruns or another
+    sender it has not passed.
+    """
     report = yield
     session = item.stash.get(_SESSION, None)
-    if session is not None and report.failed and report.when == "call":
-        reason = str(call.excinfo.value).strip().partition("\n")[0] if call.excinfo else ""
-        report.sections.append(("brakebench", _conclude(session, item, reason or "the test failed")))
+    if session is None or report.when != "call" or report.skipped:
+        return report
+    reason = str(call.excinfo.value).strip().partition("\n")[0] if call.excinfo else ""
+    verdict = "passed"
+    if report.failed:
+        verdict, shown = _conclude(session, item, reason or "the test failed")
+        report.sections.append(("brakebench", shown))
+    elif session.findings:
+        verdict, shown = _conclude(session, item, "")
+        report.outcome = "failed"
+        report.longrepr = f"brakebench: the test's own checks hold, but its run is {verdict}\n{shown}"
+    properties = [(_VERDICT, verdict)] + [(_PUNCTUALITY, session.punctuality)] * bool(session.punctuality)
+    item.user_properties += properties
+    report.user_properties += properties
     return report
 
 
-def _conclude(session: "Session", item: pytest.Item, reason: str) -> str:
-    """What to look at after a failure."""
+def _conclude(session: "Session", item: pytest.Item, reason: str) -> tuple[str, str]:
+    """The verdict of a test that did not pass, and what to look at."""
     ids = [value for name, value in item.user_properties if name == _REQUIREMENT]
     try:
         outcome = session.conclude({"test": item.nodeid, "requirements": ids}, reason)
     except Exception as error:  # the test's own failure must still be shown
-        return f"no report: {type(error).__name__}: {error}\nfiles: {session.folder}"
+        return "failed", f"no report: {type(error).__name__}: {error}\nfiles: {session.folder}"
     if outcome is None:
-        return "the bench was not started"
+        return "failed", "the bench was not started"
+    lines = [f"verdict: {outcome.verdict}"]
+    lines += [f"{found['verdict']}: {found['text']}" for found in outcome.facts["findings"] if found["text"] != reason]
     late = outcome.result.overruns
-    busy = f"overruns: {late} ticks skipped, the machine was too busy for real time\n" if late else ""
-    names = busy + "".join(f"{shown}: {Path(str(outcome.facts[key])).resolve()}\n" for key, shown in _SHOWN)
-    return f"{names}requirements: {', '.join(map(str, ids))}" if ids else names.rstrip()
+    lines += [f"overruns: {late} ticks skipped, the machine was too busy for real time"] if late else []
+    lines += [session.punctuality] if session.punctuality else []
+    lines += [f"{shown}: {Path(str(outcome.facts[key])).resolve()}" for key, shown in _SHOWN if outcome.facts[key]]
+    lines += [f"missing: {line}" for line in outcome.facts["missing"]]
+    lines += [f"requirements: {', '.join(map(str, ids))}"] if ids else []
+    return outcome.verdict.value, "\n".join(lines)
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -253,13 +285,22 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Say of each requirement how its tests went."""
+    """Say of each requirement how its tests went, of all benches how they are judged, and what was granted."""
     outcomes: dict[str, list[str]] = defaultdict(list)
+    benches: dict[str, Counter[str]] = {_VERDICT: Counter(), _PUNCTUALITY: Counter()}
     for outcome in ("passed", "failed", "error", "skipped"):
         for report in terminalreporter.stats.get(outcome, []):
             for name, value in getattr(report, "user_properties", []):
                 if name == _REQUIREMENT:
                     outcomes[value].append(outcome)
+                elif name in benches and report.when == "call":
+                    benches[name][value] += 1
+    verdicts, granted = benches[_VERDICT], benches[_PUNCTUALITY]
+    if granted or verdicts.keys() - {"passed"}:
+        terminalreporter.section("brakebench")
+        terminalreporter.line(", ".join(f"{number} {verdict}" for verdict, number in sorted(verdicts.items())))
+        for words, number in granted.items():
+            terminalreporter.line(f"{words} ({number} bench{'es' if number > 1 else ''})")
     if outcomes:
         terminalreporter.section("requirements")
         for name, found in sorted(outcomes.items()):

@@ -78,7 +78,16 @@ def block(function: F) -> F:
 
 def entry(function: F) -> F:
     """Compile a function that Python calls: cached on disk, without the global interpreter lock."""
-    compiled = _nb.njit(cache=True, nogil=True, **_OPTIONS)(function)
+    return _entry(function, _OPTIONS)
+
+
+def exact_entry(function: F) -> F:
+    """As `entry`, but nothing is fused: every product and sum is rounded as Python does it."""
+    return _entry(function, _OPTIONS | {"fastmath": False})
+
+
+def _entry(function: F, options: dict[str, Any]) -> F:
+    compiled = _nb.njit(cache=True, nogil=True, **options)(function)
     disk_cache = getattr(compiled, "_cache", None)  # absent when numba is switched off
     if disk_cache is not None:
         disk_cache._cache_file._source_stamp = _source_stamp()

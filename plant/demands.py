@@ -1,5 +1,7 @@
 """The controller's demands as the actuators see them: checked, timed out, replaced by what is safe."""
 
+from math import isnan
+
 from dbc.exchange import Receiver
 from dbc.messages import EhbDemandFront, EhbDemandRear, EhbState, MotorDemandFront, MotorDemandRear
 from plant.hydraulics import pedal_map_pa
@@ -20,24 +22,23 @@ class DemandStream:
     demands in a row, until one is not available or none has come for `DEMAND_TIMEOUT_NS`.
     """
 
-    def __init__(self, kind: type[Demand]) -> None:
-        self._kind = kind
+    def __init__(self, kind: type[Demand], receiver: Receiver) -> None:
+        self._reception, self._values = receiver.receptions[kind], receiver.of(kind)
         self._valid_in_row = 0
         self.followed: tuple[float, float] | None = None
 
-    def update(self, receiver: Receiver, now_ns: int) -> tuple[float, float] | None:
+    def update(self, now_ns: int) -> tuple[float, float] | None:
         """Take the tick's frames; the values (left, right) to follow, or None."""
-        reception = receiver.receptions[self._kind]
-        age = receiver.age_ns(self._kind, now_ns)
-        message = receiver.latest(self._kind)
-        left, right = (None, None) if message is None else message
-        if left is None or right is None or age is None or age >= DEMAND_TIMEOUT_NS:
+        reception = self._reception
+        last_ns = reception.last_valid_ns
+        left, right = self._values.tolist()
+        if last_ns is None or now_ns - last_ns >= DEMAND_TIMEOUT_NS or isnan(left + right):
             self._valid_in_row = 0
             self.followed = None
             return None
-        if reception.fresh:
+        if self.followed is None and reception.fresh:
             self._valid_in_row = min(self._valid_in_row + 1, reception.valid_in_row)
-        if self._valid_in_row >= SEQUENCE or self.followed is not None:
+        if self.followed is not None or self._valid_in_row >= SEQUENCE:
             self.followed = left, right
         return self.followed
 
@@ -50,8 +51,10 @@ class PressureDemand:
     brake.
     """
 
-    def __init__(self, kind: type[EhbDemandFront] | type[EhbDemandRear], parameters: EhbParameters) -> None:
-        self._stream = DemandStream(kind)
+    def __init__(
+        self, kind: type[EhbDemandFront] | type[EhbDemandRear], receiver: Receiver, parameters: EhbParameters
+    ) -> None:
+        self._stream = DemandStream(kind, receiver)
         self._p = parameters
         self._last = (0.0, 0.0)
         self._scale = (1.0, 1.0)
@@ -63,9 +66,9 @@ class PressureDemand:
             travel, p.pedal_free_travel, p.pedal_map_linear_pa, p.pedal_map_square_pa, p.pedal_map_cubic_pa
         )
 
-    def update(self, receiver: Receiver, now_ns: int, travel: float) -> tuple[float, float]:
+    def update(self, now_ns: int, travel: float) -> tuple[float, float]:
         """Pressures to follow from this tick on, Pa (left, right)."""
-        demand = self._stream.update(receiver, now_ns)
+        demand = self._stream.update(now_ns)
         if demand is not None:
             self.state = EhbState.DEMAND
             self._last = demand
@@ -81,14 +84,14 @@ class PressureDemand:
 class Demands:
     """All four demand messages of the controller."""
 
-    def __init__(self, parameters: EhbParameters) -> None:
-        self.pressure = [PressureDemand(kind, parameters) for kind in EHB_DEMANDS]
-        self._motor = [DemandStream(kind) for kind in MOTOR_DEMANDS]
+    def __init__(self, receiver: Receiver, parameters: EhbParameters) -> None:
+        self.pressure = [PressureDemand(kind, receiver, parameters) for kind in EHB_DEMANDS]
+        self._motor = [DemandStream(kind, receiver) for kind in MOTOR_DEMANDS]
 
-    def update(self, receiver: Receiver, now_ns: int, travel: float) -> tuple[list[float], list[float]]:
+    def update(self, now_ns: int, travel: float) -> tuple[list[float], list[float]]:
         """Pressures, Pa, and motor torques, N m, to follow from this tick on; a lost motor demand is none."""
-        pressure = [value for demand in self.pressure for value in demand.update(receiver, now_ns, travel)]
-        torque = [value for stream in self._motor for value in stream.update(receiver, now_ns) or (0.0, 0.0)]
+        pressure = [value for demand in self.pressure for value in demand.update(now_ns, travel)]
+        torque = [value for stream in self._motor for value in stream.update(now_ns) or (0.0, 0.0)]
         return pressure, torque
 
     @property

@@ -3,30 +3,34 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dbc.bench_messages import FaultCommand, ManoeuvreState, PhysicalFault, StimulusDriver, StimulusRoad
-from dbc.contract import Message, spec_of
-from dbc.exchange import Receiver, Transmitter
+from dbc.bench_messages import FaultCommand, ManoeuvreState, StimulusDriver, StimulusRoad
+from dbc.commands import CommandReader
+from dbc.contract import Message
+from dbc.exchange import Receiver
 from dbc.frame import Frame, Received
-from dbc.messages import BatteryStatus
-from plant import driver, reports
+from dbc.reception import Reception
+from plant import driver
 from plant.demands import DEMANDS, Demands
 from plant.external_nodes import ExternalNodes
+from plant.faults import PhysicalFaults
 from plant.injection.bank import NO_TERMS
 from plant.injection.plugin import NO_PLUGINS
 from plant.injection.sensing_chain import Chain
 from plant.injection.theta import THETA, Theta
 from plant.layout import Vector
-from plant.manoeuvre import Manoeuvre, value_at
+from plant.manoeuvre import DirectDemands, Manoeuvre, value_at
 from plant.model import NEUTRAL, STEP_S, Scene, advance, healthy, initial_state, pack
 from plant.parameters.plant import PlantParameters
+from plant.reports import Reports
 from plant.road import road_table
 from plant.sensors import Sensors
-from plant.vectors import INPUT, OUTPUT, STATE, S, U, X, Y
+from plant.vectors import INPUT, OUTPUT, STATE, U, X, Y
 
 SENDERS = frozenset({"EHB", "IWM", "BATTERY", "SENSORS", "DRIVER"})
 STIMULUS_TIMEOUT_NS = 100_000_000
 STANDING_MPS = 0.02
 STEP_NS = round(STEP_S * 1e9)
+_DRIVEN = slice(U.pressure_demand_pa, U.steering_wheel_rad + 1)  # the first inputs: pressures, torques, steering
 RESET_AT_START = (  # what a manoeuvre starts with, however long its start was awaited
     "x_m", "y_m", "yaw_rad", "winding_temperature_k", "pad_friction", "pad_temperature_k", "disc_temperature_k",
     "state_of_charge", "recuperated_j", "friction_heat_j", "distance_m",
@@ -70,7 +74,6 @@ class PlantNode:
             raise ValueError(f"period_ns: expected a positive multiple of {STEP_NS} ns, got {period_ns}")
         self._parameters = parameters
         self._manoeuvre = manoeuvre
-        self._play = play
         self._p = pack(parameters)
         self._x = initial_state(
             parameters,
@@ -85,17 +88,18 @@ class PlantNode:
         self._own_road = road_table(manoeuvre.road)
         self._scene = Scene(self._external_nodes.cut(), self._switch, self._own_road, theta, terms, plugins)
         first_speed = manoeuvre.initial_speed_mps / parameters.wheel.rolling_radius_m
-        self._sensors = Sensors(parameters.sensor, parameters.motor.torque_constant_nm_a, seed, self._x, first_speed)
+        self._sensors = Sensors(self._p, seed, self._x, first_speed)
+        self._reports = Reports(play, self._p)
         self.manoeuvre_start_ns: int | None = None
         self._last_ns: int | None = None
-        self._notice_ends_ns = 0
         self._layout, self._of_manoeuvre = layout, theta
         self.switch_effects(theta)
         self._receiver = Receiver((*DEMANDS, StimulusDriver, StimulusRoad))
-        self._faults = Receiver((FaultCommand,))
-        self._fault_id = spec_of(FaultCommand).can_id
-        self._transmitter = Transmitter()
-        self._demands = Demands(parameters.ehb)
+        self._live_driver, self._live_road = (self._receiver.receptions[k] for k in (StimulusDriver, StimulusRoad))
+        self._broken = PhysicalFaults(self._switch, parameters.battery.notice_s)
+        self._commands = CommandReader((FaultCommand,))
+        self._demands = Demands(self._receiver, parameters.ehb)
+        self._direct = manoeuvre.direct != DirectDemands()
         self._pedal = 0.0
         self._steering_rad = 0.0
         self._standing_ns = 0
@@ -110,12 +114,18 @@ class PlantNode:
         self._receiver.accept(now_ns, inbox)
         self._external_nodes.accept(now_ns, inbox)
         self._take_faults(now_ns, inbox)
-        if now_ns >= self._notice_ends_ns:
-            self._switch[S.battery_accepts] = self._switch[S.battery_announces]
-        pressure_pa, motor_nm = self._demands.update(self._receiver, now_ns, self._pedal)
+        self._broken.keep_time(now_ns)
+        pressure_pa, motor_nm = self._demands.update(now_ns, self._pedal)
         self._follow_manoeuvre(now_ns, elapsed_ns)
         self._drive(now_ns, pressure_pa, motor_nm)
-        return self._transmitter.frames(now_ns, self._tell(now_ns))
+        sensed = self._sensors.sample(self._x, self._y, self._pedal, self._steering_rad)
+        brakes = self._broken.told([demand.state for demand in self._demands.pressure])
+        return self._reports.frames(now_ns, self._x, self._y, self._switch, sensed, brakes, self.state, self._receiver)
+
+    @property
+    def receiver(self) -> Receiver:
+        """What it has taken of what was sent to it, for who watches."""
+        return self._receiver
 
     @property
     def model_state(self) -> Vector:
@@ -141,30 +151,15 @@ class PlantNode:
             begun_s = ((self._last_ns or 0) - self.manoeuvre_start_ns) * 1e-9
             shifted = self._layout.shifted(theta, float(self._x[X.time_s]) - begun_s)
         self._scene = replace(self._scene, theta=shifted)
-        self._sensors.chain = Chain(shifted, self._layout)
+        self._sensors.distort(Chain(shifted, self._layout))
 
     def _advance(self, elapsed_ns: int) -> None:
         steps = elapsed_ns // STEP_NS
         advance(self._x, self._u, self._p, self._y, steps, self._scene)
 
     def _take_faults(self, now_ns: int, inbox: Sequence[Received]) -> None:
-        """Fault commands one by one: two may come in one tick."""
-        for item in inbox:
-            if item[1] != self._fault_id:  # of few frames
-                continue
-            self._faults.accept(now_ns, [item])
-            command = self._faults.latest(FaultCommand)
-            if command is None or not self._faults.receptions[FaultCommand].fresh:
-                continue
-            well = 0.0 if command.active else 1.0
-            if command.fault is PhysicalFault.MOTOR_DEAD:
-                for i in range(4):
-                    if (command.wheels or 0) >> i & 1:
-                        self._switch[S.motor_alive + i] = well
-            elif command.fault is PhysicalFault.BATTERY_REFUSES_CHARGE and self._switch[S.battery_announces] != well:
-                self._switch[S.battery_announces] = well
-                notice_s = self._parameters.battery.notice_s if command.active else 0.0
-                self._notice_ends_ns = now_ns + round(notice_s * 1e9)
+        for command in self._commands.read(inbox):
+            self._broken.take(now_ns, FaultCommand(*command), self._x)
 
     def _follow_manoeuvre(self, now_ns: int, elapsed_ns: int) -> None:
         manoeuvre = self._manoeuvre
@@ -185,9 +180,9 @@ class PlantNode:
         if stood or now_ns - self.manoeuvre_start_ns >= manoeuvre.duration_s * 1e9:
             self.state = ManoeuvreState.FINISHED
 
-    def _stimulus(self, kind: type[Message], now_ns: int) -> Message | None:
-        age = self._receiver.age_ns(kind, now_ns)
-        return None if age is None or age > STIMULUS_TIMEOUT_NS else self._receiver.latest(kind)
+    def _stimulus(self, reception: Reception, now_ns: int) -> Message | None:
+        last_ns = reception.last_valid_ns
+        return None if last_ns is None or now_ns - last_ns > STIMULUS_TIMEOUT_NS else reception.message
 
     def _drive(self, now_ns: int, pressure: list[float], motor: list[float]) -> None:
         """Driver, road and demands (Pa, N m) from this tick on."""
@@ -196,7 +191,7 @@ class PlantNode:
         pedal = 0.0 if start is None else driver.pedal_travel(manoeuvre, time_s)
         steering = 0.0 if start is None else value_at(manoeuvre.steering_wheel_rad, time_s)
         target = manoeuvre.initial_speed_mps if start is None else driver.target_speed(manoeuvre, time_s)
-        live = self._stimulus(StimulusDriver, now_ns)
+        live = self._stimulus(self._live_driver, now_ns)
         if isinstance(live, StimulusDriver):
             pedal = pedal if live.pedal_travel is None else live.pedal_travel
             target = target if live.target_speed_mps is None else live.target_speed_mps
@@ -207,14 +202,14 @@ class PlantNode:
         self._override_road(now_ns)
 
         u, direct = self._u, manoeuvre.direct
-        u[U.steering_wheel_rad] = self._steering_rad
         hold_nm = self._hold_torque_nm(target)
         motor = [hold_nm + value for value in motor]
-        if start is not None:
+        if start is not None and self._direct:
             pressure = [value_at(t, time_s) if t else v for t, v in zip(direct.pressure_pa, pressure, strict=True)]
             motor = [value_at(t, time_s) if t else v for t, v in zip(direct.motor_nm, motor, strict=True)]
-        u[U.pressure_demand_pa : U.pressure_demand_pa + 4] = pressure
-        u[U.motor_demand_nm : U.motor_demand_nm + 4] = motor
+        if self._broken.alters:
+            pressure, motor = self._broken.act(pressure, motor, self._x)
+        u[_DRIVEN] = [*pressure, *motor, self._steering_rad]
         self._external_nodes.enter(now_ns, u)
 
     def _hold_torque_nm(self, target_mps: float | None) -> float:
@@ -227,7 +222,7 @@ class PlantNode:
         return driver.drive_force(target_mps, speed, mass, float(resistance), grade) * radius / 4.0
 
     def _override_road(self, now_ns: int) -> None:
-        live = self._stimulus(StimulusRoad, now_ns)
+        live = self._stimulus(self._live_road, now_ns)
         road = self._own_road
         if isinstance(live, StimulusRoad) and any(value is not None for value in live):
             road = self._own_road.copy()
@@ -236,22 +231,3 @@ class PlantNode:
                     road[:, column] = value
         if road is not self._scene.road:
             self._scene = replace(self._scene, road=road)
-
-    def _tell(self, now_ns: int) -> list[Message]:
-        """Frames of the played nodes, and the truth."""
-        x, y, sensors, play = self._x, self._y, self._sensors, self._play
-        out: list[Message] = []
-        sensors.tick(float(x[X.time_s]))
-        if "DRIVER" in play:
-            out += reports.driver_messages(sensors, self._pedal, self._steering_rad)
-        if "SENSORS" in play:
-            out += reports.sensor_messages(sensors, x, y)
-        if "EHB" in play:
-            out += reports.ehb_messages(sensors, y, *[demand.state for demand in self._demands.pressure])
-        if "IWM" in play:
-            out += reports.motor_messages(sensors, y, self._switch[S.motor_alive : S.motor_alive + 4].tolist())
-        if "BATTERY" in play and self._transmitter.due(BatteryStatus, now_ns):
-            out.append(reports.battery_message(x, y))
-        out += reports.truth_messages(x, y, self.state)
-        out.append(reports.reception_message(self._receiver))
-        return out

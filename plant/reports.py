@@ -1,7 +1,11 @@
 """What the plant tells: the frames of the car's nodes, and the truth."""
 
-import numpy as np
+from collections.abc import Callable
 
+import numpy as np
+from numpy.typing import NDArray
+
+from dbc.batch import Batch
 from dbc.bench_messages import (
     ManoeuvreState,
     PlantReception,
@@ -14,8 +18,9 @@ from dbc.bench_messages import (
     TruthWheelLoad,
     TruthWheelTorque,
 )
-from dbc.contract import Message
+from dbc.contract import Message, spec_of
 from dbc.exchange import Receiver
+from dbc.frame import Frame
 from dbc.messages import (
     BatteryStatus,
     BodyMotion,
@@ -30,84 +35,131 @@ from dbc.messages import (
     WheelSpeedFront,
     WheelSpeedRear,
 )
+from plant.compiled import exact_entry
 from plant.demands import DEMANDS
-from plant.layout import Vector
-from plant.sensors import Sensors
-from plant.vectors import OUTPUT, STATE, X, Y
+from plant.layout import Layout, Vector
+from plant.sensors import SENSED, N
+from plant.vectors import OUTPUT, STATE, P, S, Y
 
-NO_COUNTER = 15  # none yet
-COUNT_LIMIT = 4095
-_FAILED, _OK, _DERATED = MotorState.FAILED, MotorState.OK, MotorState.DERATED
-_TRUE_STATES = np.r_[
-    STATE.slice("speed_mps"), STATE.slice("distance_m"), STATE.slice("recuperated_j"), STATE.slice("friction_heat_j"),
-    STATE.slice("pad_friction"), STATE.slice("disc_temperature_k"),
-]  # fmt: skip
-_TRUE_OUTPUTS = np.r_[
-    OUTPUT.slice("acceleration_mps2"), OUTPUT.slice("wheel_torque_nm"), OUTPUT.slice("friction_torque_nm"),
-    OUTPUT.slice("longitudinal_force_n"), OUTPUT.slice("wheel_load_n"),
-]  # fmt: skip
+DERIVED = Layout(
+    "Derived",
+    {"current_a": 4, "motor_state": 4, "ehb_state": 2, "manoeuvre": 1, "demand_counter": 4, "lost": 1, "corrupt": 1},
+)
+"""What a node says beside what is measured: of it follows the first half, the plant's nodes set the second."""
+D = DERIVED.at
+_SET_BY_NODES = slice(D.ehb_state, None)
+_FAILED, _OK, _DERATED = float(MotorState.FAILED), float(MotorState.OK), float(MotorState.DERATED)
 
 
-def _motor_state(alive: float, derating: float) -> MotorState:
-    if alive == 0.0:
-        return _FAILED
-    return _OK if derating >= 1.0 else _DERATED
+def _indices(layout: Layout, start: int) -> Callable[..., list[int]]:
+    def of(part: str, first: int = 0, last: int | None = None) -> list[int]:
+        return [start + k for k in range(layout.size)[layout.slice(part)][first:last]]
+
+    return of
 
 
-def driver_messages(sensors: Sensors, travel: float, steering_wheel_rad: float) -> list[Message]:
-    """Frames of DRIVER."""
-    return [BrakePedal(*sensors.pedal(travel)), Steering(sensors.steering_wheel_rad(steering_wheel_rad))]
+# a value's place in state, outputs, what is measured, and what is derived, one after the other
+_X = _indices(STATE, 0)
+_Y = _indices(OUTPUT, STATE.size)
+_N = _indices(SENSED, STATE.size + OUTPUT.size)
+_D = _indices(DERIVED, STATE.size + OUTPUT.size + SENSED.size)
 
 
-def sensor_messages(sensors: Sensors, x: Vector, y: Vector) -> list[Message]:
-    """Frames of SENSORS."""
-    fl, fr, rl, rr = sensors.wheel_speed_rad_s(x, y)
-    return [WheelSpeedFront(fl, fr), WheelSpeedRear(rl, rr), BodyMotion(*sensors.body_motion(x))]
+def _motors(first: int, last: int) -> list[int]:
+    able = zip(_D("current_a"), _Y("motor_available_nm"), _D("motor_state"), strict=True)
+    return [k for motor in list(able)[first:last] for k in motor]
 
 
-def ehb_messages(sensors: Sensors, y: Vector, front: EhbState, rear: EhbState) -> list[Message]:
-    """Frames of EHB."""
-    fl, fr, rl, rr = sensors.pressure_pa(y)
-    return [EhbPressureFront(fl, fr, front), EhbPressureRear(rl, rr, rear)]
+OF_NODES: dict[str, dict[type[Message], list[int]]] = {
+    "DRIVER": {BrakePedal: _N("pedal"), Steering: _N("steering_wheel_rad")},
+    "SENSORS": {
+        WheelSpeedFront: _N("wheel_speed_rad_s", 0, 2),
+        WheelSpeedRear: _N("wheel_speed_rad_s", 2, 4),
+        BodyMotion: _N("body_motion"),
+    },
+    "EHB": {
+        EhbPressureFront: _N("pressure_pa", 0, 2) + _D("ehb_state", 0, 1),
+        EhbPressureRear: _N("pressure_pa", 2, 4) + _D("ehb_state", 1, 2),
+    },
+    "IWM": {MotorStatusFront: _motors(0, 2), MotorStatusRear: _motors(2, 4)},
+    "BATTERY": {BatteryStatus: _X("state_of_charge") + _Y("charge_power_limit_w")},
+}
+"""Frames of the car's nodes in the order of sending, and where their values come from."""
+TRUTH: dict[type[Message], list[int]] = {
+    TruthMotion: _X("speed_mps") + _Y("acceleration_mps2") + _X("distance_m") + _D("manoeuvre"),
+    TruthWheelTorque: _Y("wheel_torque_nm"),
+    TruthFrictionTorque: _Y("friction_torque_nm"),
+    TruthPadFriction: _X("pad_friction"),
+    TruthDiscTemperature: _X("disc_temperature_k"),
+    TruthLongitudinalForce: _Y("longitudinal_force_n"),
+    TruthWheelLoad: _Y("wheel_load_n"),
+    TruthEnergy: _X("recuperated_j") + _X("friction_heat_j"),
+    PlantReception: _D("demand_counter") + _D("lost") + _D("corrupt"),
+}
+"""What no car can measure, and which demands this tick was computed from, for the bench."""
 
 
-def motor_messages(sensors: Sensors, y: Vector, alive: list[float]) -> list[Message]:
-    """Frames of IWM."""
-    current = sensors.current_a(y)
-    able = y[Y.motor_available_nm : Y.motor_available_nm + 4].tolist()
-    derating = y[Y.motor_derating : Y.motor_derating + 4].tolist()
-    state = list(map(_motor_state, alive, derating))
-    return [
-        MotorStatusFront(current[0], able[0], state[0], current[1], able[1], state[1]),
-        MotorStatusRear(current[2], able[2], state[2], current[3], able[3], state[3]),
-    ]
+@exact_entry
+def gather(
+    x: Vector, y: Vector, switch: Vector, p: Vector, sensed: Vector, derived: Vector, sources: NDArray[np.int64],
+    values: Vector,
+) -> None:  # fmt: skip
+    """Derive what follows from the measured, and put the values of all messages side by side.
+
+    Parameters
+    ----------
+    x, y, switch, p, sensed : vectors ``STATE``, ``OUTPUT``, ``SWITCH``, ``PARAMETER``, ``SENSED``.
+    derived : vector ``DERIVED``, its first half written.
+    sources : place of each value, as in `OF_NODES`.  values : written.
+    """
+    for i in range(4):
+        derived[D.current_a + i] = sensed[N.motor_nm + i] / p[P.motor_torque_constant_nm_a]
+        running = _OK if y[Y.motor_derating + i] >= 1.0 else _DERATED
+        derived[D.motor_state + i] = _FAILED if switch[S.motor_alive + i] == 0.0 else running
+    measured = x.size + y.size
+    for k in range(sources.size):
+        place = sources[k]
+        if place < x.size:
+            values[k] = x[place]
+        elif place < measured:
+            values[k] = y[place - x.size]
+        elif place < measured + sensed.size:
+            values[k] = sensed[place - measured]
+        else:
+            values[k] = derived[place - measured - sensed.size]
 
 
-def battery_message(x: Vector, y: Vector) -> BatteryStatus:
-    """Frame of BATTERY."""
-    return BatteryStatus(float(x[X.state_of_charge]), float(y[Y.charge_power_limit_w]))
+class Reports:
+    """The frames of the played nodes, and the truth.
 
+    Parameters
+    ----------
+    play : nodes of brake.dbc whose frames are sent.
+    p : vector ``PARAMETER``.
+    """
 
-def truth_messages(x: Vector, y: Vector, state: ManoeuvreState) -> list[Message]:
-    """What no car can measure, for the bench."""
-    states: list[float] = x[_TRUE_STATES].tolist()
-    outputs: list[float] = y[_TRUE_OUTPUTS].tolist()
-    speed, distance, recuperated, heat, *wheels = states
-    acceleration, *forces = outputs
-    return [
-        TruthMotion(speed, acceleration, distance, state),
-        TruthWheelTorque(*forces[:4]),
-        TruthFrictionTorque(*forces[4:8]),
-        TruthPadFriction(*wheels[:4]),
-        TruthDiscTemperature(*wheels[4:]),
-        TruthLongitudinalForce(*forces[8:12]),
-        TruthWheelLoad(*forces[12:]),
-        TruthEnergy(recuperated, heat),
-    ]
+    def __init__(self, play: frozenset[str], p: Vector) -> None:
+        messages = {kind: places for node, of in OF_NODES.items() if node in play for kind, places in of.items()}
+        messages |= TRUTH
+        for kind, places in messages.items():
+            assert len(places) == len(spec_of(kind).fields), kind
+        self._batch = Batch(messages)
+        self._sources = np.array([place for places in messages.values() for place in places], np.int64)
+        self._derived = DERIVED.zeros()
+        self._p = p
 
+    def frames(
+        self, now_ns: int, x: Vector, y: Vector, switch: Vector, sensed: Vector, brakes: list[EhbState],
+        manoeuvre: ManoeuvreState, receiver: Receiver,
+    ) -> list[Frame]:  # fmt: skip
+        """Frames of this tick.
 
-def reception_message(receiver: Receiver) -> PlantReception:
-    """Which demands this tick was computed from."""
-    front_p, rear_p, front_m, rear_m = [NO_COUNTER if (n := receiver.counter(kind)) is None else n for kind in DEMANDS]
-    lost, corrupt = min(receiver.lost, COUNT_LIMIT), min(receiver.corrupt, COUNT_LIMIT)
-    return PlantReception(front_p, rear_p, front_m, rear_m, lost, corrupt)
+        Parameters
+        ----------
+        x, y, switch, sensed : vectors ``STATE``, ``OUTPUT``, ``SWITCH``, ``SENSED``.
+        brakes : what each axle follows.  manoeuvre : where it is.  receiver : of the demands first.
+        """
+        counters = receiver.counters[: len(DEMANDS)]
+        self._derived[_SET_BY_NODES] = [*brakes, manoeuvre, *counters, receiver.lost, receiver.corrupt]
+        gather(x, y, switch, self._p, sensed, self._derived, self._sources, self._batch.values)
+        return self._batch.frames(now_ns)

@@ -1,43 +1,22 @@
 """Base brake: pedal travel to demanded deceleration and wheel torques (paper Fig. 2, eq. 1)."""
 
-import math
 from typing import NamedTuple
 
+from ecu.law.compiled import shared
 from ecu.law.gravity import GRAVITY_MPS2
-from ecu.law.types import Four, Inputs
+from ecu.law.types import Four
 from ecu.parameters.control import PedalParameters
 from ecu.parameters.vehicle import VehicleParameters
 
 
 class PedalReading(NamedTuple):
-    """Travel 0..1 to act on (NaN: none), and what is wrong with the channels."""
+    """Travel 0..1 to act on (NaN: none), and what is wrong with the channels, debounced where they only disagree."""
 
     travel: float
     channel_1_lost: bool
     channel_2_lost: bool
     channels_disagree: bool
-
-
-def read_pedal(inputs: Inputs, lost: bool, disagreement: float) -> PedalReading:
-    """Travel from two redundant channels.
-
-    The mean of both; the larger where they disagree, because braking too much is noticed and corrected by the driver
-    and braking too little may not be; the remaining one where the other is lost.
-
-    Parameters
-    ----------
-    lost : the message that carries both channels has timed out.
-    disagreement : difference of travel that counts as disagreement, 1.
-    """
-    one, two = inputs.pedal_1, inputs.pedal_2
-    lost_1 = lost or not math.isfinite(one)
-    lost_2 = lost or not math.isfinite(two)
-    if lost_1 and lost_2:
-        return PedalReading(math.nan, True, True, False)
-    if lost_1 or lost_2:
-        return PedalReading(two if lost_1 else one, lost_1, lost_2, False)
-    channels_disagree = abs(one - two) > disagreement
-    return PedalReading(max(one, two) if channels_disagree else 0.5 * (one + two), False, False, channels_disagree)
+    implausible: tuple[bool, bool] = (False, False)
 
 
 def reference_deceleration(travel: float, p: PedalParameters) -> float:
@@ -49,12 +28,14 @@ def reference_deceleration(travel: float, p: PedalParameters) -> float:
     return GRAVITY_MPS2 * x * (p.map_linear + x * (p.map_quadratic + x * p.map_cubic))
 
 
+@shared
 def driving_resistance(speed_mps: float, mass_kg: float, p: VehicleParameters) -> float:
     """Air drag and rolling resistance, N (the force F_R of paper eq. 9); zero at standstill."""
     rolling = mass_kg * GRAVITY_MPS2 * p.rolling_resistance * min(speed_mps, 1.0)
     return 0.5 * p.air_density_kg_m3 * p.drag_area_m2 * speed_mps**2 + rolling
 
 
+@shared
 def brake_torque(deceleration_mps2: float, resistance_n: float, mass_kg: float, p: VehicleParameters) -> float:
     """Brake torque of all wheels together for a deceleration, Nm, positive (paper eq. 1).
 
@@ -66,6 +47,7 @@ def brake_torque(deceleration_mps2: float, resistance_n: float, mass_kg: float, 
     return max(force, 0.0) * p.force_arm_m
 
 
+@shared
 def distribute(torque_nm: float, front_share: float) -> Four:
     """Torque of each wheel from the torque of all: a fixed front share, left and right alike."""
     front = 0.5 * front_share * torque_nm

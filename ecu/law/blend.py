@@ -3,6 +3,7 @@
 import math
 from typing import NamedTuple
 
+from ecu.law.compiled import shared
 from ecu.law.types import ZERO, Four
 from ecu.parameters.control import BlendParameters
 from ecu.parameters.vehicle import MotorParameters
@@ -26,11 +27,13 @@ class Blend(NamedTuple):
     friction_nm: Four
 
 
+@shared
 def fade(speed_mps: float, p: BlendParameters) -> float:
     """Share of the motors' work that is left at low speed: 1 above ``fade_start``, 0 below ``fade_end``."""
     return min(max((speed_mps - p.fade_end_mps) / (p.fade_start_mps - p.fade_end_mps), 0.0), 1.0)
 
 
+@shared
 def wanted_torque(demand_nm: Four, factor: float, available_nm: Four, motor: MotorParameters) -> Four:
     """Torque asked of each motor, Nm: alpha T_dem (paper eq. 2) as far as it is available."""
     if factor <= 0.0:
@@ -44,6 +47,7 @@ def wanted_torque(demand_nm: Four, factor: float, available_nm: Four, motor: Mot
     )
 
 
+@shared
 def ramp_charge_limit(
     held: ChargePower, announced_w: float, power_w: float, p: BlendParameters, dt_s: float
 ) -> ChargePower:
@@ -61,7 +65,7 @@ def ramp_charge_limit(
     target = announced_w if math.isfinite(announced_w) else 0.0
     if power_w <= min(held) and power_w <= target:
         return ChargePower(target, target, target)
-    soon, built, now = (min(w, power_w) for w in held)
+    soon, built, now = min(held.soon_w, power_w), min(held.built_w, power_w), min(held.now_w, power_w)
     most = power_w * dt_s / p.charge_handover_s
     soon += min(max(min(target, power_w) - soon, -most), most)
     share = dt_s / (0.5 * p.friction_lead_s + dt_s)
@@ -69,6 +73,7 @@ def ramp_charge_limit(
     return ChargePower(soon, built, now + share * (built - now))
 
 
+@shared
 def blend(
     demand_nm: Four,
     wanted_nm: Four,

@@ -5,10 +5,12 @@ an authority round the nominal value. At no confidence it holds: what was learne
 for the next, and an estimate nobody trusts moves nothing.
 """
 
+from ecu.law.compiled import shared
 from ecu.law.types import Four
 from ecu.parameters.observer import CompensationParameters
 
 
+@shared
 def friction_in_use(
     used: Four, estimate: Four, confidence: Four, nominal: float, p: CompensationParameters, dt_s: float
 ) -> Four:
@@ -35,11 +37,13 @@ def friction_in_use(
     )
 
 
+@shared
 def _toward(value: float, target: float, most: float) -> float:
     change = target - value
     return value + (most if change > most else -most if change < -most else change)
 
 
+@shared
 def motor_factor(factor: float, friction: Four, nominal: float, p: CompensationParameters) -> float:
     """Blending factor with work moved to the motors where the pads are weak, 0..1.
 

@@ -6,11 +6,15 @@ helper or layout would leave a stale entry point behind; `entry` stamps the cach
 
 import hashlib
 from collections.abc import Callable
+from dataclasses import fields
 from functools import cache
 from importlib import resources
 from typing import Any, TypeVar, cast
 
+import numpy as np
 from numba import njit
+from numba.extending import register_jitable
+from numpy.typing import NDArray
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -18,6 +22,21 @@ F = TypeVar("F", bound=Callable[..., Any])
 def helper(function: F) -> F:
     """Compile a function of scalars and arrays into whatever calls it, when an entry point first needs it."""
     return cast(F, njit(nogil=True, error_model="numpy")(function))
+
+
+def shared(function: F) -> F:
+    """Leave a function to Python as it is, and let compiled functions call it, too.
+
+    Parameters of it that are a parameter set are then a `record` of it.
+    """
+    return register_jitable(error_model="numpy")(function)
+
+
+def record(parameters: Any) -> NDArray[np.void]:
+    """Plain numbers of a parameter set by name, as compiled functions take them; shape (1,)."""
+    values = {f.name: getattr(parameters, f.name) for f in fields(parameters)}
+    numbers = {name: float(value) for name, value in values.items() if isinstance(value, (bool, int, float))}
+    return np.array([tuple(numbers.values())], np.dtype((np.record, [(name, "f8") for name in numbers])))
 
 
 def entry(function: F) -> F:
@@ -33,7 +52,7 @@ def entry(function: F) -> F:
 def _source_stamp() -> str:
     """Digest of every source file of the control law."""
     digest = hashlib.sha256()
-    for folder in ("ecu.law", "ecu.law.joint"):
+    for folder in ("ecu.law", "ecu.law.joint", "ecu.law.plausibility"):
         for file in sorted(resources.files(folder).iterdir(), key=lambda f: f.name):
             if file.name.endswith(".py"):
                 digest.update(file.read_bytes())

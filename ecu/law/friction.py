@@ -1,5 +1,6 @@
 """Friction brake: torque and pressure through the pad friction (paper eq. 16)."""
 
+from ecu.law.compiled import shared
 from ecu.law.types import Four
 from ecu.parameters.vehicle import FrictionBrakeParameters
 
@@ -13,6 +14,7 @@ def gains(p: FrictionBrakeParameters) -> Four:
     return (front, front, rear, rear)
 
 
+@shared
 def pressure_demands(torque_nm: Four, pad_friction: Four, gain_m3: Four, p: FrictionBrakeParameters) -> Four:
     """`pressure_demand` of each wheel."""
     (t0, t1, t2, t3), (m0, m1, m2, m3), (g0, g1, g2, g3) = torque_nm, pad_friction, gain_m3
@@ -24,6 +26,7 @@ def pressure_demands(torque_nm: Four, pad_friction: Four, gain_m3: Four, p: Fric
     )
 
 
+@shared
 def pressure_demand(torque_nm: float, pad_friction: float, gain_m3: float, p: FrictionBrakeParameters) -> float:
     """Pressure for a friction torque, Pa (paper eq. 16 solved for p): p = T / (2 mu r_b A_cyl) + p_0.
 

@@ -6,59 +6,81 @@ brake, and without any pedal the last demand stands until the brake is asked to 
 """
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 from dbc.messages import BrakeMode
-from ecu.law import base_brake, blend, compensation, estimator, friction, modes
-from ecu.law.types import UNKNOWN, ZERO, Brake, Four, Inputs, Outputs, Source
+from ecu.law import base_brake, blend, estimator, modes, trouble_codes
+from ecu.law import pedal as pedal_travel
+from ecu.law.actuation import actuate
+from ecu.law.communication import ALL_CLEAN, Streams, judge_streams
+from ecu.law.plausibility import judge
+from ecu.law.types import PLAUSIBLE, UNKNOWN, ZERO, Brake, Four, Inputs, Outputs, Source
 from ecu.parameters.ecu import EcuParameters
 
 SAMPLE_S = 0.01  # the sensors' cycle: the observer steps once for each, however fast the task
 CONFIDENCE_STEPS = 7
+_BOTH_FOLLOW = (Brake.DEMAND, Brake.DEMAND)
+_NONE = (False, False, False, False)
 
 
 class Memory(NamedTuple):
     """State of the law between two steps.
 
-    ``deceleration_mps2``: last valid demand; ``without_pedal_s``: time since there was one; ``handed_over``: the brake
-    has been asked to follow its own pedal map. ``charge``: what the shares of motors and friction count on;
-    ``observer``: state of the chosen observer; ``friction``: pad friction in use.
+    ``time_s``: since the start; ``streams``, ``troubles``: what is held against the received frames, what was found.
+    ``deceleration_mps2``: last valid demand, ``recent_mps2``: those of the last ticks; ``without_pedal_s``: time since
+    there was one; ``handed_over``: the brake has been asked to follow its own pedal map. ``charge``: what the shares of
+    motors and friction count on; ``watch``, ``bits``, ``wheel_speed_rad_s``: state of the plausibility checks, what
+    they found, and the fastest wheel that they believe; ``observer``: state of the chosen observer; ``friction``: pad
+    friction in use; ``asked_pa``, ``asked_nm``: demands of the last step.
     """
 
+    time_s: float
+    streams: Streams
     modes: modes.ModeMemory
+    troubles: trouble_codes.TroubleMemory
+    pedal: pedal_travel.PedalMemory
     deceleration_mps2: float
+    recent_mps2: tuple[float, float, float]
     without_pedal_s: float
     handed_over: bool
     blending_factor: float
     charge: blend.ChargePower
+    watch: estimator.Vector
+    bits: int
+    wheel_speed_rad_s: float
     observer: estimator.Vector
     since_sample_s: float
     estimates: estimator.Estimates
     friction: Four
+    asked_pa: Four
+    asked_nm: Four
 
 
 def initial_memory(parameters: EcuParameters) -> Memory:
     """State before the first step."""
     mu = parameters.friction_brake.pad_friction
     return Memory(
+        time_s=0.0,
+        streams=ALL_CLEAN,
         modes=modes.initial_modes(),
+        troubles=trouble_codes.NO_TROUBLE,
+        pedal=pedal_travel.INITIAL,
         deceleration_mps2=0.0,
+        recent_mps2=(0.0, 0.0, 0.0),
         without_pedal_s=0.0,
         handed_over=False,
         blending_factor=parameters.blend.blending_factor,
         charge=blend.ChargePower(0.0, 0.0, 0.0),
+        watch=judge.initial_state(),
+        bits=0,
+        wheel_speed_rad_s=0.0,
         observer=estimator.initial_state(parameters),
         since_sample_s=0.0,
         estimates=estimator.Estimates(0.0, UNKNOWN, (mu, mu, mu, mu), ZERO, 1.0),
         friction=(mu, mu, mu, mu),
+        asked_pa=UNKNOWN,
+        asked_nm=UNKNOWN,
     )
-
-
-@lru_cache(maxsize=16)
-def brake_gains(parameters: EcuParameters) -> Four:
-    """`friction.gains`, kept beside the parameter set."""
-    return friction.gains(parameters.friction_brake)
 
 
 def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float) -> tuple[Memory, Outputs]:
@@ -71,59 +93,72 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     dt_s : time since the last step.
     """
     p = parameters
-    lost = modes.lost_sources(inputs, p.supervision)
-    pedal = base_brake.read_pedal(inputs, lost[Source.PEDAL], p.supervision.pedal_disagreement)
-    known = memory.estimates
-    mode_memory, faults = modes.supervise(
-        memory.modes, inputs, lost, pedal, known.implausible, known.stuck, p.supervision, dt_s
+    time_s = memory.time_s + dt_s
+    timed_out = modes.timed_out_sources(inputs, p.supervision)
+    streams = judge_streams(memory.streams, inputs.health, timed_out, p.supervision, dt_s)
+    lost = modes.lost_sources(timed_out, streams)
+    pedal_memory, pedal = pedal_travel.read_pedal(
+        memory.pedal, inputs, lost[Source.PEDAL], p.supervision, p.plausibility, dt_s
     )
-    mode = mode_memory.mode
-
     if math.isfinite(pedal.travel):
         deceleration = base_brake.reference_deceleration(pedal.travel, p.pedal)
+        # frames of another's: the driver's may be the larger
+        if streams is not ALL_CLEAN and streams[Source.PEDAL].suspect:
+            deceleration = max(deceleration, *memory.recent_mps2)
         without_pedal_s = 0.0
     else:
         deceleration = memory.deceleration_mps2
         without_pedal_s = memory.without_pedal_s + dt_s
+    factor = memory.blending_factor
+    if math.isfinite(inputs.blending_factor):
+        factor = min(max(inputs.blending_factor, 0.0), 1.0)
+
+    known, observer, since_sample_s = memory.estimates, memory.observer, memory.since_sample_s + dt_s
+    watch, bits, wheel_speed = memory.watch, memory.bits, memory.wheel_speed_rad_s
+    slow, stuck = known.implausible, known.stuck
+    if since_sample_s > 0.95 * SAMPLE_S:
+        asked_pa = memory.asked_pa
+        if inputs.brake != _BOTH_FOLLOW:
+            asked_pa = _asked_of_followers(asked_pa, inputs.brake)
+        z = estimator.measured(inputs, lost, deceleration, asked_pa, memory.asked_nm, p.motor.torque_per_current_nm_a)
+        watch, bits, wheel_speed = judge.judge(
+            watch, z, judge.judge_parameters(p), known.speed_mps, known.expected_mps2, known.grade_mps2, since_sample_s
+        )
+        observer, known = estimator.estimate(observer, z, p, since_sample_s)
+        since_sample_s = 0.0
+    plausibility = PLAUSIBLE
+    if bits or stuck or slow != estimator.PLAUSIBLE or pedal.channels_disagree or True in pedal.implausible:
+        plausibility = judge.plausibility_of(bits, slow, stuck, pedal.implausible, pedal.channels_disagree)
+    mode_memory, active, faults = modes.supervise(
+        memory.modes, inputs, timed_out, lost, streams, pedal, plausibility, p.supervision, dt_s
+    )
+    mode = mode_memory.mode
+    troubles = memory.troubles
+    if active != troubles.active and (mode != BrakeMode.INIT or time_s > p.supervision.start_tolerated_s):
+        troubles = trouble_codes.remember(troubles, active, time_s, _freeze_frame(memory, inputs))
     handed_over = mode == BrakeMode.SAFE_STOP and (
         memory.handed_over or without_pedal_s > p.supervision.demand_hold_s + 0.5 * dt_s
     )
-    factor = inputs.blending_factor if math.isfinite(inputs.blending_factor) else memory.blending_factor
 
-    observer, since_sample_s = memory.observer, memory.since_sample_s + dt_s
-    if since_sample_s > 0.95 * SAMPLE_S:
-        z = estimator.measured(inputs, lost, deceleration, p.motor.torque_per_current_nm_a)
-        observer, known = estimator.estimate(observer, z, p, since_sample_s)
-        since_sample_s = 0.0
-    nominal = p.friction_brake.pad_friction
-    mu = compensation.friction_in_use(
-        memory.friction, known.pad_friction, known.confidence, nominal, p.compensation, dt_s
-    )
-    factor_now = compensation.motor_factor(factor, mu, nominal, p.compensation)
-    mass = p.vehicle.mass_kg * known.mass_factor
-
-    speeds = _usable_wheel_speeds(inputs, lost, known.implausible)
-    wheel_speed = max(speeds) if speeds else 0.0
-    speed = max(wheel_speed * p.vehicle.rolling_radius_m, 0.0)
-    resistance = base_brake.driving_resistance(speed, mass, p.vehicle)
-    resistance *= min(deceleration / p.pedal.resistance_full_mps2, 1.0)
-    torque = base_brake.brake_torque(deceleration, resistance, mass, p.vehicle)
-    demand = base_brake.distribute(torque, p.friction_brake.front_share)
-    wanted = blend.wanted_torque(demand, factor_now, _usable_torque(inputs, lost, mode), p.motor)
-    power = sum(wanted) * max(wheel_speed, 0.0) * p.motor.charge_efficiency
-    charge = blend.ramp_charge_limit(memory.charge, inputs.charge_power_w, power, p.blend, dt_s)
-    shares = blend.blend(demand, wanted, power, charge, speed, deceleration, p.blend)
-
-    pressure = friction.pressure_demands(shares.friction_nm, mu, brake_gains(p), p.friction_brake)
-    m0, m1, m2, m3 = shares.motor_nm
+    if slow != estimator.PLAUSIBLE:
+        wheel_speed = _fastest_of(inputs, slow, wheel_speed)
+    opposing_nm = ZERO if plausibility.motor_torque == _NONE else judge.opposing_torque(watch)
+    mu, charge, torque, motor_nm, pressure = actuate(
+        memory.friction, memory.charge, known.pad_friction, known.confidence, known.mass_factor, deceleration, factor,
+        wheel_speed, _usable_torque(inputs, lost, mode, plausibility.motor_torque), opposing_nm,
+        inputs.charge_power_w, dt_s, p,
+    )  # fmt: skip
+    m0, m1, m2, m3 = motor_nm
     c0, c1, c2, c3 = known.confidence
     silent = mode == BrakeMode.INIT or handed_over
+    pressure_demand = UNKNOWN if silent else pressure
+    motor_demand = UNKNOWN if mode == BrakeMode.INIT else (-m0, -m1, -m2, -m3)
     outputs = Outputs(
-        pressure_demand_pa=UNKNOWN if silent else pressure,
-        motor_demand_nm=UNKNOWN if mode == BrakeMode.INIT else (-m0, -m1, -m2, -m3),
+        pressure_demand_pa=pressure_demand,
+        motor_demand_nm=motor_demand,
         mode=mode,
         faults=faults,
-        blending_factor=sum(shares.motor_nm) / torque if torque > 0.0 else 0.0,
+        blending_factor=sum(motor_nm) / torque if torque > 0.0 else 0.0,
         demanded_deceleration_mps2=math.nan if silent else deceleration,
         wheel_torque_nm=known.wheel_torque_nm,
         pad_friction=known.pad_friction,
@@ -134,37 +169,56 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
             round(CONFIDENCE_STEPS * c3),
         ),
     )
+    recent = (deceleration, memory.recent_mps2[0], memory.recent_mps2[1])
     memory = Memory(
-        mode_memory, deceleration, without_pedal_s, handed_over, factor, charge, observer, since_sample_s, known, mu
-    )
+        time_s, streams, mode_memory, troubles, pedal_memory, deceleration, recent, without_pedal_s, handed_over,
+        factor, charge, watch, bits, wheel_speed, observer, since_sample_s, known, mu, pressure_demand, motor_demand,
+    )  # fmt: skip
     return memory, outputs
 
 
-def _usable_wheel_speeds(
-    inputs: Inputs, lost: tuple[bool, ...], implausible: tuple[bool, bool, bool, bool]
-) -> list[float]:
-    """Wheel speeds that are present, not timed out and plausible (or all that are there where none is), rad/s."""
-    if True not in lost and implausible == estimator.PLAUSIBLE and math.isfinite(sum(inputs.wheel_speed_rad_s)):
-        return list(inputs.wheel_speed_rad_s)
-    gone = (lost[Source.WHEEL_SPEED_FRONT],) * 2 + (lost[Source.WHEEL_SPEED_REAR],) * 2
-    wheels = zip(inputs.wheel_speed_rad_s, gone, implausible, strict=True)
-    present = [(w, odd) for w, missing, odd in wheels if math.isfinite(w) and not missing]
-    return [w for w, odd in present if not odd] or [w for w, _ in present]
+def _freeze_frame(memory: Memory, inputs: Inputs) -> trouble_codes.FreezeFrame:
+    """The car as it is now, with mode, speed and demand of the tick before."""
+    return trouble_codes.FreezeFrame(
+        memory.modes.mode,
+        memory.estimates.speed_mps,
+        memory.deceleration_mps2,
+        (inputs.pedal_1, inputs.pedal_2),
+        inputs.pressure_pa,
+        inputs.motor_current_a,
+    )
 
 
-def _usable_torque(inputs: Inputs, lost: tuple[bool, ...], mode: BrakeMode) -> Four:
+def _asked_of_followers(asked_pa: Four, brake: tuple[Brake, Brake]) -> Four:
+    """Pressures that were asked, NaN of an axle that does not follow."""
+    front, rear = brake[0] == Brake.DEMAND, brake[1] == Brake.DEMAND
+    a, b, c, d = asked_pa
+    nan = math.nan
+    return (a if front else nan, b if front else nan, c if rear else nan, d if rear else nan)
+
+
+def _fastest_of(inputs: Inputs, implausible: tuple[bool, bool, bool, bool], most: float) -> float:
+    """Speed of the fastest wheel, rad/s, without those that are implausible, at most what was believed with them."""
+    wheels = zip(inputs.wheel_speed_rad_s, implausible, strict=True)
+    speeds = [w for w, odd in wheels if not odd and 0.0 <= w <= most]
+    return max(speeds) if speeds else most
+
+
+def _usable_torque(
+    inputs: Inputs, lost: tuple[bool, ...], mode: BrakeMode, excluded: tuple[bool, bool, bool, bool]
+) -> Four:
     """Torque that may be asked of each motor, Nm, positive: none beside a brake that follows its own pedal map."""
     if mode not in (BrakeMode.NORMAL, BrakeMode.DEGRADED) or Brake.OWN_MAP in inputs.brake:
         return ZERO
-    if True not in lost and True not in inputs.motor_failed:
-        values = inputs.motor_available_nm
-        if math.isfinite(sum(values) + sum(inputs.motor_current_a)):
-            return values
+    values = inputs.motor_available_nm
+    well = True not in lost and True not in inputs.motor_failed and excluded == _NONE and min(values) >= 0.0
+    if well and math.isfinite(sum(values) + sum(inputs.motor_current_a)):
+        return values
     gone = (lost[Source.MOTOR_FRONT], lost[Source.MOTOR_FRONT], lost[Source.MOTOR_REAR], lost[Source.MOTOR_REAR])
     a, b, c, d = (
-        0.0 if missing or failed or not (math.isfinite(t) and math.isfinite(i)) else t
-        for t, i, missing, failed in zip(
-            inputs.motor_available_nm, inputs.motor_current_a, gone, inputs.motor_failed, strict=True
+        0.0 if missing or failed or out or not (math.isfinite(t) and math.isfinite(i)) else max(t, 0.0)
+        for t, i, missing, failed, out in zip(
+            values, inputs.motor_current_a, gone, inputs.motor_failed, excluded, strict=True
         )
     )
     return (a, b, c, d)

@@ -28,11 +28,24 @@ class Source(IntEnum):
 
 
 class Health(NamedTuple):
-    """Supply of one source: time since its last usable values, whether some came now, unusable ones in a row."""
+    """Supply of one source at a tick.
+
+    ``age_s``: time since its last usable values; ``fresh``: some came now; ``bad_in_row``: unusable frames in a row.
+    Frames of this tick: ``bad`` with a wrong check value or old bytes, ``foreign`` that the source cannot have sent,
+    ``doubled``.
+    """
 
     age_s: float
     fresh: bool
     bad_in_row: int
+    bad: int = 0
+    foreign: int = 0
+    doubled: int = 0
+
+
+WELL = Health(0.0, True, 0)
+OTHERS_WELL = (WELL,) * (len(Source) - 1)
+"""Health of all sources but the slow one, the battery, which is the last: compared at once, it is mostly this."""
 
 
 class Brake(IntEnum):
@@ -62,6 +75,20 @@ class Inputs(NamedTuple):
     blending_factor: float
     link_down: bool
     health: tuple[Health, ...]
+
+
+class Plausibility(NamedTuple):
+    """What does not agree with the rest, debounced: each wheel, each pedal channel, the acceleration sensor."""
+
+    wheel_speed: tuple[bool, bool, bool, bool]
+    pressure: tuple[bool, bool, bool, bool]
+    motor_torque: tuple[bool, bool, bool, bool]  # demanded against reported torque
+    pedal: tuple[bool, bool]
+    pedal_disagree: bool
+    acceleration: bool
+
+
+PLAUSIBLE = Plausibility((False,) * 4, (False,) * 4, (False,) * 4, (False, False), False, False)
 
 
 class Outputs(NamedTuple):

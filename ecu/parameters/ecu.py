@@ -10,6 +10,7 @@ from ecu.parameters.observer import (
     SignalParameters,
     TyreParameters,
 )
+from ecu.parameters.plausibility import PlausibilityParameters
 from ecu.parameters.vehicle import FrictionBrakeParameters, MotorParameters, VehicleParameters
 
 
@@ -26,6 +27,7 @@ class EcuParameters:
     pedal: PedalParameters
     blend: BlendParameters
     supervision: SupervisionParameters
+    plausibility: PlausibilityParameters
     tyre: TyreParameters
     signal: SignalParameters
     joint_filter: JointFilterParameters

@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,14 @@ from dbc.bench_messages import EcuReception, PlantReception
 from dbc.contract import contract, spec_of
 from dbc.e2e import COUNTER_MODULUS
 from dbc.frame import BusName
+from hil.bench.bench_run import RECORDING, prepare_folder
 from hil.bench.result import Floats, Signals
-from hil.bench.run import Outcome, new_folder, run_scenario
+from hil.bench.run import Outcome, judge, new_folder, run_scenario, write_files
+from hil.bench.watch import Finding
+from hil.errors import Verdict
 from hil.report.figure import write_figure
 from hil.report.html import write_html
-from hil.report.report import Number, Panel, Report, Section, Table, Trace, Verdict
+from hil.report.report import Number, Panel, Report, Section, Table, Trace
 from hil.report.units import BAR, KMH, Unit
 from hil.scenario.scenario import load_scenario
 
@@ -91,26 +94,40 @@ def compare_scenario(
     """Run a scenario twice, in virtual and in real time, and report the difference."""
     scenario = load_scenario(name)
     folder = Path(out) if out else new_folder(f"{scenario.name}-compare")
+    prepare_folder(folder)
     one = partial(run_scenario, name, seed=seed, command_line=command_line, say=say)
     virtual = one("auto", out=str(folder / "virtual"), realtime=False, virtual=True)
-    if virtual.facts["verdict"] == Verdict.INCOMPLETE.value:
-        return _incomplete(virtual)
+    if _ended_early(virtual):
+        return _without_difference(virtual)
     real = one(bus, out=str(folder / "real"), realtime=realtime)
-    if real.facts["verdict"] == Verdict.INCOMPLETE.value:
-        return _incomplete(real)
-    logs = {"virtual": folder / "virtual" / "recording.log", "real": folder / "real" / "recording.log"}
+    if _ended_early(real):
+        return _without_difference(real)
+    logs = {"virtual": folder / "virtual" / RECORDING, "real": folder / "real" / RECORDING}
     signals = {kind: Signals(log) for kind, log in logs.items()}
     differences = signal_differences(signals["virtual"], signals["real"])
     latencies = message_latencies(signals["virtual"], signals["real"])
+    runs = {"virtual": virtual, "real": real}
+    findings = [
+        Finding(run.verdict, f"{kind}: {run.facts['reason']}")
+        for kind, run in runs.items()
+        if run.verdict.rank > Verdict.FAILED.rank  # a comparison asks for the difference, not for the expectations
+    ]
+    verdict, reason = judge(findings)
     report = Report(
         f"Virtual against real time: {scenario.title}",
+        verdict,
+        reason,
         numbers=_numbers(virtual, real, latencies),
         sections=(_section(signals["virtual"], signals["real"], differences, latencies),),
         provenance={"virtual": dict(virtual.report.provenance), "real": dict(real.report.provenance)},
     )
-    figure, page = folder / "figure.png", folder / "report.html"
-    write_figure(report, figure)
-    write_html(report, page)
+    missing = [
+        f"{kind}/{line}" for kind, run in (("virtual", virtual), ("real", real)) for line in run.facts["missing"]
+    ]
+    paths = {"figure": folder / "figure.png", "page": folder / "report.html"}
+    written = write_files(
+        {"figure": partial(write_figure, report), "page": partial(write_html, report)}, paths, missing
+    )
     numbers = {key: (virtual.result.as_json()[key], real.result.as_json()[key]) for key in _NUMBERS}
     facts: dict[str, Any] = {
         key: {"virtual": v, "real": r, "difference": None if None in (v, r) else r - v}
@@ -118,6 +135,9 @@ def compare_scenario(
     }
     facts |= {
         "scenario": scenario.name,
+        "verdict": verdict.value,
+        "reason": reason,
+        "missing": missing,
         "seed": seed,
         "bus": real.facts["bus"],
         "overruns": real.result.overruns,
@@ -127,11 +147,16 @@ def compare_scenario(
         "latency": [asdict(latency) for latency in latencies],
         "log_virtual": os.path.relpath(logs["virtual"]),
         "log_real": os.path.relpath(logs["real"]),
-        "figure": os.path.relpath(figure),
-        "page": os.path.relpath(page),
     }
-    (folder / "result.json").write_text(json.dumps(facts, indent=2) + "\n")
-    return Comparison(report, facts, 0)
+    facts |= written
+    try:
+        (folder / "result.json").write_text(json.dumps(facts, indent=2) + "\n")
+    except OSError as error:
+        missing.append(f"result.json: {error.strerror}")
+    if missing and verdict.rank < Verdict.INCOMPLETE.rank:
+        verdict, reason = Verdict.INCOMPLETE, f"missing: {'; '.join(missing)}"
+        facts |= {"verdict": verdict.value, "reason": reason}
+    return Comparison(replace(report, verdict=verdict, reason=reason), facts, verdict.exit_code)
 
 
 _NUMBERS = {
@@ -142,7 +167,12 @@ _NUMBERS = {
 }
 
 
-def _incomplete(run: Outcome) -> Comparison:
+def _ended_early(run: Outcome) -> bool:
+    """Whether there is no whole recording to compare."""
+    return run.facts["log"] is None or run.facts["ended_early"]
+
+
+def _without_difference(run: Outcome) -> Comparison:
     return Comparison(run.report, run.result.as_json() | run.facts, run.exit_code)
 
 
@@ -267,8 +297,10 @@ def _section(virtual: Signals, real: Signals, differences: list[SignalDifference
         panels.append(Panel(title, unit, tuple(traces)))
     t_s, values = virtual.get("TRUTH_MOTION.ACCELERATION")
     shown = t_s >= -0.5
-    delta = np.interp(t_s[shown], *real.get("TRUTH_MOTION.ACCELERATION")) - values[shown]
-    panels.append(Panel("Deceleration, real - virtual", "m/s²", (Trace("difference", t_s[shown], -delta),)))
+    t_real, values_real = real.get("TRUTH_MOTION.ACCELERATION")
+    if len(t_real):
+        delta = np.interp(t_s[shown], t_real, values_real) - values[shown]
+        panels.append(Panel("Deceleration, real - virtual", "m/s²", (Trace("difference", t_s[shown], -delta),)))
     ordered = sorted(differences, key=lambda d: -d.rms / d.lsb)
     signals_table = Table(
         "Signals: real minus virtual, largest first",

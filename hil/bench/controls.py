@@ -1,13 +1,17 @@
 """What a person or a test can ask of a run: driver, road, blending, faults, frames of anybody."""
 
+import math
 import re
 from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Self
 
-from dbc.bench_messages import PhysicalFault
 from dbc.frame import Frame
 from hil.bench.stimulus import Channel, StimulusNode
 from hil.errors import BrakebenchError
-from hil.faults.physical import ALL_WHEELS, FAULT_NAMES, WHEELS, FaultEvent
+from hil.faults.catalogue import fault_named
+from hil.faults.fault import Expected, Injection
+from hil.faults.targets import Takes
 
 SPEED_UNITS = {"km/h": 1.0 / 3.6, "m/s": 1.0}
 
@@ -26,15 +30,34 @@ def speed_of(speed: str | float) -> float:
     return float(speed)
 
 
-def wheels_of(wheel: str | Iterable[str] | None) -> int:
-    """Bits of one wheel, some, or (None) all."""
-    if wheel is None:
-        return ALL_WHEELS
-    names = [wheel] if isinstance(wheel, str) else list(wheel)
-    odd = [name for name in names if name not in WHEELS]
-    if odd:
-        raise SessionError(f"wheel {odd[0]!r}: expected {', '.join(WHEELS)}, a list of them, or None for all")
-    return sum(1 << WHEELS.index(name) for name in set(names))
+def wheels_named(wheel: str | Iterable[str] | None) -> str:
+    """Name of the target of one wheel, some, or (None) all."""
+    if wheel is None or isinstance(wheel, str):
+        return wheel or "all"
+    return ",".join(wheel)
+
+
+class Injected:
+    """A fault that was armed; as a context it is ended at the block's end."""
+
+    def __init__(self, controls: "RunControls", injection: Injection) -> None:
+        self._controls = controls
+        self.injection = injection
+
+    @property
+    def expected(self) -> Expected:
+        """What is right for a controller to do about it."""
+        return self.injection.expected
+
+    def clear(self, after: float = 0.0) -> None:
+        """End it ``after`` seconds from now."""
+        self._controls.clear(self.injection, after=after)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.clear()
 
 
 class RunControls:
@@ -100,21 +123,68 @@ class RunControls:
             raise SessionError(f"blend: expected a factor from 0 to 1, got {factor!r}")
         self._command(lambda d: d.move(Channel.BLENDING, factor))
 
-    def inject(self, fault: str, wheel: str | Iterable[str] | None = None, after: float = 0.0) -> None:
-        """Break something of the car ``after`` seconds from now."""
-        self.fault_s = self._plan(fault, wheel, after, active=True)
+    def inject(
+        self,
+        fault: str | Injection,
+        on: str | None = None,
+        *,
+        wheel: str | Iterable[str] | None = None,
+        after: float = 0.0,
+        seed: int | None = None,
+        **values: float,
+    ) -> "Injected":
+        """Arm a fault of the library (`hil.faults.catalogue`) ``after`` seconds from now.
 
-    def clear(self, fault: str, wheel: str | Iterable[str] | None = None, after: float = 0.0) -> None:
-        """Mend what `inject` broke."""
-        self._plan(fault, wheel, after, active=False)
+        Parameters
+        ----------
+        fault : name, or an armed fault as it is; then its ``at_s`` counts from now.
+        on : what it acts on: ``MESSAGE``, ``MESSAGE.SIGNAL``, a node, ``ALL``; for the car see ``wheel``.
+        wheel : wheels of a fault of the car: one, some, or None for all.
+        seed : of what is random; by default from the run's.
+        values : parameters by name, ``for_s`` and ``count`` among them.
 
-    def _plan(self, fault: str, wheel: str | Iterable[str] | None, after: float, active: bool) -> float:
-        if fault not in FAULT_NAMES:
-            raise SessionError(f"fault {fault!r}: expected one of {', '.join(FAULT_NAMES)}")
-        kind, wheels = PhysicalFault[fault.upper()], wheels_of(wheel)
-        at_s = (0.0 if self._stimulus_node is None else self._stimulus_node.next_s) + after
-        self._command(lambda d: d.plan(FaultEvent(at_s, kind, wheels, active)))
-        return at_s
+        Returns
+        -------
+        A handle: its ``clear()`` ends the fault, as the end of a ``with`` block does.
+
+        Raises
+        ------
+        hil.faults.fault.FaultError, hil.faults.targets.TargetError
+            No such fault, target or parameter; the message names the nearest.
+        """
+        now_s = self._now_s
+        if isinstance(fault, Injection):
+            armed = replace(fault, at_s=now_s + after + (fault.at_s if math.isfinite(fault.at_s) else 0.0))
+        else:
+            kind = fault_named(fault)
+            if kind.takes is Takes.WHEELS and on is None:
+                on = wheels_named(wheel)
+            armed = kind.on(on, at_s=now_s + after, seed=seed, values=values)
+        self.fault_s = armed.at_s
+        self._command(lambda d: d.plan(armed))
+        return Injected(self, armed)
+
+    def clear(
+        self,
+        fault: str | Injection,
+        on: str | None = None,
+        *,
+        wheel: str | Iterable[str] | None = None,
+        after: float = 0.0,
+    ) -> None:
+        """End what `inject` began, ``after`` seconds from now."""
+        if not isinstance(fault, Injection):
+            kind = fault_named(fault)
+            if kind.takes is Takes.WHEELS and on is None:
+                on = wheels_named(wheel)
+            fault = kind.on(on)
+        ended, at_s = fault, self._now_s + after
+        self._command(lambda d: d.plan_end(ended, at_s))
+
+    @property
+    def _now_s(self) -> float:
+        """Manoeuvre time at which a command given now acts."""
+        return 0.0 if self._stimulus_node is None else self._stimulus_node.next_s
 
     def send(self, *frames: Frame) -> None:
         """Send frames of anybody, as they are, on the bus they name."""

@@ -5,11 +5,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from dbc.contract import Message, spec_of
+from dbc.bench_messages import BENCH_MESSAGES
+from dbc.contract import Message, MessageSpec, spec_of
 from dbc.frame import BusName, Frame
+from dbc.messages import BRAKE_MESSAGES
 from hil.bench.bench_run import BenchRun
 from hil.bench.controls import RunControls, SessionError
-from hil.bench.result import RunResult, Signals, measure
+from hil.bench.result import RunResult, Signals, measure, nearest
 
 M = TypeVar("M", bound=Message)
 CRAWL_MPS = 1.0  # below it a stop ends: motors fade out, the car comes to rest
@@ -54,13 +56,13 @@ class RunMonitor(RunControls):
 
     def latest(self, message_type: type[M]) -> M | None:
         """Last frame of a message, decoded; None where none was seen. Its protection is not checked."""
-        spec = spec_of(message_type)
+        spec = _known(message_type)
         data = self._last.get((spec.bus, spec.can_id))
         return None if data is None or len(data) != spec.length else spec.decode(data)
 
     def count(self, message_type: type[Message]) -> int:
         """How many frames of a message were seen."""
-        spec = spec_of(message_type)
+        spec = _known(message_type)
         return self._counts.get((spec.bus, spec.can_id), 0)
 
     def deceleration_dip(self, after: float = 0.0) -> float:
@@ -93,3 +95,15 @@ class RunMonitor(RunControls):
         if self._bench_run is None:
             raise SessionError("the bench has not run yet; call run() or run_until() first")
         return self._bench_run
+
+
+def _known(message_type: type[Message]) -> MessageSpec:
+    """Contract entry of what a test asks for."""
+    known = {t.__name__: t for t in (*BRAKE_MESSAGES, *BENCH_MESSAGES)}
+    if isinstance(message_type, type) and message_type in known.values():
+        return spec_of(message_type)
+    name = message_type.__name__ if isinstance(message_type, type) else str(message_type)
+    raise SessionError(
+        f"expected a message type of dbc.messages or dbc.bench_messages, such as BrakeStatus, got {message_type!r}; "
+        f"{nearest(name, known)}"
+    )

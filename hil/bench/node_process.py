@@ -1,5 +1,6 @@
 """One node as one process: joins its buses, runs at a fixed rate until told to stop."""
 
+import contextlib
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -7,8 +8,9 @@ from dataclasses import dataclass
 from dbc.bench_messages import EcuTiming, PlantTiming
 from dbc.exchange import Transmitter
 from dbc.frame import Node
-from hil.bench.port import Port
+from hil.bench.port import OwnedNode, Port
 from hil.bus.channel import resolve
+from hil.faults.line import FaultyNode
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop, run_node
 from hil.rt.process import StopSignal, end_with_parent, say_ready
@@ -65,13 +67,16 @@ def serve(
         end_with_parent()
     stop = StopSignal()
     bus = resolve(bus)
-    node = make_node()
-    with Port.open(bus, role.senders if senders is None else senders) as port:
-        say(f"{role.name}: on {bus}, every {NODE_PERIOD_NS / 1e6:g} ms")
-        for grant in request_realtime() if realtime else [request_timer_slack()]:
-            if realtime or not grant.granted:
-                say(f"{role.name}: {grant.what}: {GRANTED if grant.granted else NOT_GRANTED}, {grant.detail}")
-        say_ready(ready_fd)
+    plays = tuple(role.senders if senders is None else senders)
+    with contextlib.ExitStack() as stack:
+        with stop.at_once():
+            node = FaultyNode(OwnedNode(make_node(), plays), plays, real=True)
+            port = stack.enter_context(Port.open(bus))
+            say(f"{role.name}: on {bus}, every {NODE_PERIOD_NS / 1e6:g} ms")
+            for grant in request_realtime() if realtime else [request_timer_slack()]:
+                if realtime or not grant.granted:
+                    say(f"{role.name}: {grant.what}: {GRANTED if grant.granted else NOT_GRANTED}, {grant.detail}")
+            say_ready(ready_fd)
         health = Transmitter()
         loop = Loop(WallClock(), NODE_PERIOD_NS, role.phase_ns)
         for tick in run_node(node, port, loop):

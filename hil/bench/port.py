@@ -5,7 +5,7 @@ from types import TracebackType
 from typing import Self
 
 from dbc.contract import contract
-from dbc.frame import BusName, Frame, Received
+from dbc.frame import BusName, Frame, Node, Received
 from hil.bus.bus import Bus
 from hil.bus.channel import bench_channel
 from hil.bus.open import open_bus
@@ -28,21 +28,33 @@ def check_owned(frames: Sequence[Frame], owned: Owned) -> None:
             )
 
 
+class OwnedNode:
+    """A node that may send what its role owns in the DBC, and nothing else; faults act behind it."""
+
+    def __init__(self, node: Node, senders: Iterable[str]) -> None:
+        self._node = node
+        self._owned = owned_by(senders)
+
+    def step(self, now_ns: int, inbox: list[Received]) -> list[Frame]:
+        """Step the node; ValueError where it sends what is not its own: a mistake of the node."""
+        frames = self._node.step(now_ns, inbox)
+        check_owned(frames, self._owned)
+        return frames
+
+
 class Port:
-    """Joins a node to the vehicle bus and the bench bus; refuses to send what its role does not own.
+    """Joins a node to the vehicle bus and the bench bus.
 
     Parameters
     ----------
     vehicle, bench : the two buses, open; the port closes them.
-    senders : DBC nodes the role plays; empty for one that only listens.
     """
 
-    def __init__(self, vehicle: Bus, bench: Bus, senders: Iterable[str]) -> None:
+    def __init__(self, vehicle: Bus, bench: Bus) -> None:
         self._buses = {BusName.VEHICLE: vehicle, BusName.BENCH: bench}
-        self._owned = owned_by(senders)
 
     @classmethod
-    def open(cls, vehicle_spec: str, senders: Iterable[str]) -> Self:
+    def open(cls, vehicle_spec: str) -> Self:
         """Join a vehicle bus and the bench bus that belongs to it."""
         vehicle = open_bus(vehicle_spec, BusName.VEHICLE)
         try:
@@ -50,21 +62,14 @@ class Port:
         except BaseException:
             vehicle.close()
             raise
-        return cls(vehicle, bench, senders)
+        return cls(vehicle, bench)
 
     def receive(self) -> list[Received]:
         """Everything that arrived since the last call: the vehicle bus first, each bus in its order."""
         return self._buses[BusName.VEHICLE].receive(0.0) + self._buses[BusName.BENCH].receive(0.0)
 
     def send(self, frames: Sequence[Frame]) -> None:
-        """Send the frames of one tick.
-
-        Raises
-        ------
-        ValueError
-            A frame whose identifier or length the role does not own in the DBC: a mistake of the node.
-        """
-        check_owned(frames, self._owned)
+        """Send the frames of one tick."""
         for bus, out in self._buses.items():
             mine = [frame for frame in frames if frame.bus is bus]
             if mine:

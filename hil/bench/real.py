@@ -4,22 +4,34 @@ import contextlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from dbc.contract import contract
 from dbc.frame import BusName, Frame, Received
-from hil.bench.bench_run import BenchError, BenchRun, BenchState, Say, silent
-from hil.bench.node_process import NODE_PERIOD_NS, grants_in
+from hil.bench.bench_run import BenchError, BenchRun, BenchState, RecordingError, Say, silent
+from hil.bench.node_process import ECU, NODE_PERIOD_NS, PLANT, grants_in
+from hil.bench.port import owned_by
 from hil.bench.stimulus import BENCH_PHASE_NS
 from hil.bus.bus import Bus
 from hil.bus.channel import bench_channel, claim_channel
 from hil.bus.open import open_bus
+from hil.errors import BrakebenchError
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop, Tick
 from hil.rt.process import Child, StopSignal, interrupts_held, wait_for_end
 from hil.scenario.scenario import Scenario
 
-READY_TIMEOUT_S = 120.0  # a first start compiles the plant
+READY_TIMEOUT_NS = 120_000_000_000  # a first start compiles the plant
+LISTEN_NS = 300_000_000  # before the start, for other senders: three cycles of the slowest message
+_LOOK_NS = 50_000_000  # how often a stop is looked at meanwhile
+_MOST_NAMED = 6
+_TRACEBACK = "Traceback (most recent call last)"
+RECORDER = "recorder"
 OTHERS_TIMEOUT_NS = 120_000_000_000  # how long we wait for a node that somebody else starts
 SETTLE_NS = 500_000_000  # how long a bench keeps recording after a process died, so that the reaction is on record
 NODES = ("plant", "ecu")
+
+
+class OtherSenderError(BrakebenchError):
+    """Somebody sends what the run would send; said before anything is started."""
 
 
 class RealBench(BenchRun):
@@ -31,7 +43,14 @@ class RealBench(BenchRun):
     bus : vehicle bus, or ``auto``.
     realtime : as of the commands ``plant`` and ``ecu``.
     without : nodes that somebody else puts on the bus: ``plant``, ``ecu``.
-    whole : the stimulus node hears the vehicle bus too, and may send there.
+
+    Attributes
+    ----------
+    punctuality : what the nodes run with, for people; empty before they are started.
+
+    Raises
+    ------
+    BrakebenchError : the channel is taken, the folder cannot be written.
     """
 
     def __init__(
@@ -44,16 +63,16 @@ class RealBench(BenchRun):
         say: Say = silent,
         stop: StopSignal | None = None,
         without: Sequence[str] = (),
-        whole: bool = False,
     ) -> None:
-        self._stack = contextlib.ExitStack()
-        claim = self._stack.enter_context(claim_channel(bus))
-        super().__init__(scenario, out, seed, say, stop)
+        with contextlib.ExitStack() as stack:
+            claim = stack.enter_context(claim_channel(bus))
+            super().__init__(scenario, out, seed, say, stop)
+            self._stack = stack.pop_all()
         self.spec, self.note = claim.spec, claim.note
         self.state = BenchState.CLAIMED
         self._node_options = ["--realtime"] if realtime else []
         self._without = frozenset(without)
-        self._whole = whole
+        self.punctuality = ""
         self._children: list[Child] = []
         self._buses: dict[BusName, Bus] = {}
         self._ticks: Iterator[Tick] = iter(())
@@ -69,10 +88,11 @@ class RealBench(BenchRun):
 
     def _begin(self) -> None:
         self._join(BusName.BENCH, bench_channel(self.spec))
-        if self._whole:
-            self._join(BusName.VEHICLE, self.spec)
-        self._spawn("recorder", ["record", str(self.log)])
-        self._await_ready(self._children)
+        self._join(BusName.VEHICLE, self.spec)
+        self._listen()
+        self._spawn(RECORDER, ["record", str(self.log)])
+        if not self._await_ready(self._children):
+            return
         self._children[0].release()
         self.state = BenchState.RECORDING
         self._say("starting plant and ECU (the first start on a machine compiles the plant: some 15 s)")
@@ -83,12 +103,38 @@ class RealBench(BenchRun):
                 continue
             self._spawn(name, [name, self.scenario.source, "--seed", str(self._seed), *self._node_options])
             self._waiting.append((round(order[name] * 1e9), self._children[-1]))
-        self._await_ready(self._children[1:])
-        self._say(self._punctuality())
+        if not self._await_ready(self._children[1:]):
+            return
+        self.punctuality = self._granted()
+        self._say(self.punctuality)
         self._release(0)
         self._ticks = Loop(WallClock(), NODE_PERIOD_NS, BENCH_PHASE_NS).ticks()
 
-    def _punctuality(self) -> str:
+    def _listen(self) -> None:
+        """Refuse a bus on which somebody sends what is ours to send."""
+        senders = [sender for role in (PLANT, ECU) if role.name not in self._without for sender in role.senders]
+        ours = owned_by([*senders, "BENCH"])
+        heard: set[tuple[BusName, int]] = set()
+        clock = WallClock()
+        end_ns = clock.now_ns() + LISTEN_NS
+        while clock.now_ns() < end_ns and not self._asked_to_stop:
+            clock.sleep_until(clock.now_ns() + _LOOK_NS)
+            for bus in self._buses.values():
+                heard.update(
+                    (item.bus, item.can_id)
+                    for item in bus.receive(0.0)
+                    if isinstance(item, Frame) and not item.extended and (item.bus, item.can_id) in ours
+                )
+        if heard:
+            specs = [contract(bus).by_id[can_id] for bus in BusName for on, can_id in sorted(heard) if on is bus]
+            listed = ", ".join(f"0x{spec.can_id:X} {spec.name}" for spec in specs[:_MOST_NAMED])
+            more = f" and {len(specs) - _MOST_NAMED} more" if len(specs) > _MOST_NAMED else ""
+            raise OtherSenderError(
+                f"bus {self.spec}: somebody already sends {listed}{more}, which this run would send; "
+                "stop that one, take another channel, or leave its place free with --without"
+            )
+
+    def _granted(self) -> str:
         """What the nodes run with, for people."""
         if not self._node_options:
             return "scheduled as any program: --realtime asks for more, `brakebench doctor` says what it would get"
@@ -99,13 +145,31 @@ class RealBench(BenchRun):
 
     def _spawn(self, name: str, arguments: list[str]) -> None:
         words = self.out / f"{name}.txt"
-        with interrupts_held():  # else a process could be started that nobody ends
-            self._children.append(Child(name, [*arguments, "--bus", self.spec], words))
+        try:
+            with interrupts_held():  # else a process could be started that nobody ends
+                self._children.append(Child(name, [*arguments, "--bus", self.spec], words))
+        except OSError as error:
+            raise BenchError(f"{name} cannot be started: {error}") from error
 
-    def _await_ready(self, children: Sequence[Child]) -> None:
+    def _await_ready(self, children: Sequence[Child]) -> bool:
+        """Wait until all are ready; False where somebody asks to stop before."""
+        deadline_ns = WallClock().now_ns() + READY_TIMEOUT_NS
         for child in children:
-            if not child.wait_ready(READY_TIMEOUT_S):
-                raise BenchError(f"did not start: {child.why()}; see {child.error_path.name}")
+            while not child.wait_ready(_LOOK_NS * 1e-9):
+                if self._asked_to_stop:
+                    return False
+                for bus in self._buses.values():  # what comes before the start is of no use, and must not pile up
+                    bus.receive(0.0)
+                if child.ended or WallClock().now_ns() > deadline_ns:
+                    raise self._fallen(child, "did not start: ")
+        return True
+
+    def _fallen(self, child: Child, what: str = "") -> BenchError:
+        """The error of a process that is gone, with its traceback where it left one."""
+        kind = RecordingError if child.name == RECORDER else BenchError
+        words = child.error_path.read_text(errors="replace")
+        trace = words[words.rfind(_TRACEBACK) :].rstrip() if _TRACEBACK in words else ""
+        return kind(f"{what}{child.why()}; see {child.error_path.name}", trace)
 
     def _release(self, now_ns: int) -> None:
         """Let the nodes begin whose time has come."""
@@ -118,10 +182,9 @@ class RealBench(BenchRun):
         now_ns = self._direct()
         dead = [child for child in self._children if child.ended]
         if dead:
-            why = f"{dead[0].why()}; see {dead[0].error_path.name}"
             while self._direct() < now_ns + SETTLE_NS:
                 pass
-            raise BenchError(why)
+            raise self._fallen(dead[0])
         return now_ns
 
     def _direct(self) -> int:
@@ -152,6 +215,6 @@ class RealBench(BenchRun):
             for child in group:
                 child.stop()
         for child in self._children:
-            if child.failed and self.state is not BenchState.BROKEN:
-                self._break(child.why())
+            if child.failed:
+                self._break(self._fallen(child))
         self._stack.close()

@@ -8,8 +8,8 @@ from typing import Protocol
 
 from dbc.frame import BusName, LinkEvent, LinkState, Received
 from hil.bus.error_frame import link_events
-from hil.errors import BrakebenchError
-from hil.rt.clock import WallClock, wall_time_ns
+from hil.errors import BrakebenchError, Verdict
+from hil.rt.clock import clocks_ns
 
 FLUSH_PERIOD_NS = 20_000_000
 
@@ -57,7 +57,7 @@ def recorded_events(error_class: int, data: bytes, bus: BusName, time_ns: int) -
 class RecorderError(BrakebenchError):
     """The recording cannot go on."""
 
-    exit_code = 3
+    exit_code = Verdict.INCOMPLETE.exit_code
 
 
 class Source(Protocol):
@@ -71,7 +71,8 @@ class Source(Protocol):
 class Recorder:
     """Appends frames to a candump log; what was received 20 ms before a kill is in the file.
 
-    Frames keep the monotonic times of their senders, shifted once to the time of day; link events are written as the
+    Frames keep their monotonic times, all shifted by the time of day at which the recorder began, whatever is done to
+    the time of day afterwards; link events are written as the
     kernel's CAN error frames. Lines of one flush are in order of time.
 
     Parameters
@@ -87,13 +88,17 @@ class Recorder:
         self.lost = 0
         self._buses = buses
         self._down: dict[BusName, LinkEvent] = {}
-        self._wall_offset_ns = wall_time_ns() - WallClock().now_ns() if epoch_ns is None else epoch_ns
+        self._wall_offset_ns = clocks_ns()[1] if epoch_ns is None else epoch_ns
         try:
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
         except FileExistsError as error:
             raise RecorderError(f"{path}: exists already; a recording never overwrites, name another file") from error
         except OSError as error:
             raise RecorderError(f"{path}: cannot be created ({error.strerror})") from error
+
+    def clock_set_ns(self) -> int:
+        """How far the time of day was set forward since the recorder began, ns."""
+        return clocks_ns()[1] - self._wall_offset_ns
 
     def flush(self) -> None:
         """Take what arrived and append it."""

@@ -1,7 +1,9 @@
 """What one run gave, measured on its recording."""
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -9,27 +11,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dbc.bench_messages import ManoeuvreState
-from dbc.contract import contract
+from dbc.codec import COUNTER_SIGNAL, CRC_SIGNAL
+from dbc.contract import MessageSpec, contract
 from dbc.frame import BusName, LinkEvent
 from hil.bench.recorder import recorded_events
+from hil.errors import BrakebenchError
 from hil.log.frames import FrameFlag, Recording
 from hil.log.read import read_log
 from hil.log.signals.decode import DecodedLog, decode_log, own_databases
+from hil.log.signals.integrity import FrameUse, use_of_frames
 
 Floats = NDArray[np.float64]
 
 STANDSTILL_MPS = 0.05
 PEDAL_ON = 0.005  # of the travel: above the noise of the sensor, below any brake demand
-_SI = {
-    f"{spec.name}.{field.signal}": field.si_per_unit
-    for bus in BusName
-    for spec in contract(bus).by_id.values()
-    for field in spec.fields
+_SPECS = {spec.name: spec for bus in BusName for spec in contract(bus).by_id.values()}
+_SI = {f"{spec.name}.{field.signal}": field.si_per_unit for spec in _SPECS.values() for field in spec.fields} | {
+    f"{spec.name}.{signal}": 1.0
+    for spec in _SPECS.values()
+    if spec.data_id is not None
+    for signal in (CRC_SIGNAL, COUNTER_SIGNAL)
 }
+_WRONG_LENGTH = "wrong length"
+_NEVER_NS = 1 << 62  # a message without a cycle has no gaps
+_WHY = {FrameUse.CORRUPT: "corrupt", FrameUse.REPEATED: "repeated", FrameUse.OUT_OF_SEQUENCE: "out of sequence"}
+
+
+class UnknownSignalError(BrakebenchError, LookupError):
+    """A name that neither of our two databases has."""
 
 
 class Signals:
     """SI series of a recording of our own buses, on a time axis that starts with the manoeuvre.
+
+    Only frames that a receiver uses are in the series (`hil.log.signals.integrity.FrameUse`); of messages without
+    protection those of the right length. The others are counted in `unused`.
 
     Parameters
     ----------
@@ -44,19 +60,65 @@ class Signals:
     def __init__(self, log: Path | Recording) -> None:
         recording = read_log(log) if isinstance(log, Path) else log
         self.decoded: DecodedLog = decode_log(recording, own_databases())
+        self._use: dict[str, NDArray[np.uint8]] = {}
         self.start_s = float(self.decoded.time_s[0]) if len(self.decoded.time_s) else 0.0
         t_s, state = self.get("TRUTH_MOTION.MANOEUVRE")
-        running = t_s[state >= ManoeuvreState.RUNNING]
+        running = t_s[(state == ManoeuvreState.RUNNING) | (state == ManoeuvreState.FINISHED)]
         if len(running):
             self.start_s += float(running[0])
 
     def get(self, name: str) -> tuple[Floats, Floats]:
-        """Time since the start of the manoeuvre, s, and value, SI, of ``MESSAGE.SIGNAL``; empty where never seen."""
-        if name not in self.decoded.columns:
+        """Time since the start of the manoeuvre, s, and value, SI, of ``MESSAGE.SIGNAL``; empty where never received.
+
+        Raises
+        ------
+        UnknownSignalError : no message of ours has such a signal.
+        """
+        if name not in _SI:
+            raise UnknownSignalError(f"no signal {name!r} in our databases; {nearest(name, _SI)}")
+        column = self.decoded.columns.get(name)
+        if column is None:
             return np.empty(0), np.empty(0)
-        t_s, values = self.decoded.series(name)
+        message = name.partition(".")[0]
+        used = self._used(message)[np.searchsorted(self.decoded.rows[message], column.rows)] == FrameUse.USED
+        t_s, values = self.decoded.time_s[column.rows[used]], column.values[used]
         order = np.argsort(t_s, kind="stable")
         return t_s[order] - self.start_s, np.asarray(values, np.float64)[order] * _SI[name]
+
+    @property
+    def unused(self) -> dict[str, dict[str, int]]:
+        """Frames that no receiver uses, by message and reason; messages without one are left out."""
+        found = {name: self._reasons(name) for name in self.decoded.rows}
+        return {name: reasons for name, reasons in found.items() if reasons}
+
+    def _reasons(self, message: str) -> dict[str, int]:
+        counts = np.bincount(self._used(message), minlength=len(FrameUse)).tolist()
+        if _SPECS[message].data_id is None:
+            return {_WRONG_LENGTH: counts[FrameUse.CORRUPT]} if counts[FrameUse.CORRUPT] else {}
+        return {why: counts[use] for use, why in _WHY.items() if counts[use]}
+
+    def _used(self, message: str) -> NDArray[np.uint8]:
+        """`FrameUse` of every frame of a message."""
+        if message not in self._use:
+            rows = self.decoded.rows[message]
+            self._use[message] = _use_of(_SPECS[message], self.decoded.recording, rows)
+        return self._use[message]
+
+
+def _use_of(spec: MessageSpec, recording: Recording, rows: NDArray[np.int64]) -> NDArray[np.uint8]:
+    frames = recording.frames
+    data, length = frames.data[rows], frames.length[rows]
+    if spec.data_id is not None:
+        gap_ns = 3 * spec.cycle_ns or _NEVER_NS  # a shorter gap leaves the sequence as it is
+        return use_of_frames(data, length, frames.time_ns[rows], spec.data_id, spec.length, gap_ns)
+    return np.where(length == spec.length, FrameUse.USED, FrameUse.CORRUPT).astype(np.uint8)
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """What somebody who wrote ``name`` may have meant, as a clause of an error."""
+    names = {one.upper(): one for one in known}
+    found = [names[one] for one in get_close_matches(name.upper(), names, n=3, cutoff=0.5)]
+    return f"did you mean {' or '.join(found)}?" if found else "they are listed in dbc/brake.dbc and dbc/bench.dbc"
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,8 +165,8 @@ class RunResult:
         return asdict(self)
 
 
-def measure(signals: Signals) -> RunResult:
-    """Measure a recorded run."""
+def measure(signals: Signals, bit_rate: int | None = None) -> RunResult:
+    """Measure a recorded run; ``bit_rate`` of the vehicle bus where it is not the one that its database states."""
     braking = _braking_window(signals)
     distance = time = mean = demanded = energy = None
     if braking is not None:
@@ -128,7 +190,7 @@ def measure(signals: Signals) -> RunResult:
         frames_corrupt=sum(_last(signals, f"{node}_RECEPTION.FRAMES_CORRUPT") for node in nodes),
         overruns=sum(_overruns(signals, node) for node in nodes),
         lateness_ms=max((_lateness(signals, node) for node in nodes), key=lambda lateness: lateness.p99),
-        bus_load=_bus_load(signals),
+        bus_load=_bus_load(signals, bit_rate or contract(BusName.VEHICLE).bit_rate),
         link_states=dict(Counter(event.state.value for event in link_events(signals))),
     )
 
@@ -158,7 +220,7 @@ def _last(signals: Signals, name: str) -> int:
 def _overruns(signals: Signals, node: str) -> int:
     t_s, count = signals.get(f"{node}_TIMING.OVERRUNS")
     count = count[t_s >= 0.0]
-    return int(count[-1] - count[0]) if len(count) else 0
+    return max(0, int(count[-1] - count[0])) if len(count) else 0
 
 
 def _lateness(signals: Signals, node: str) -> Lateness:
@@ -178,7 +240,7 @@ def _vehicle_frames(signals: Signals) -> NDArray[np.intp]:
     return np.flatnonzero(ours & ((frames.flags & FrameFlag.ERROR) == 0))
 
 
-def _bus_load(signals: Signals) -> float:
+def _bus_load(signals: Signals, bit_rate: int) -> float:
     """Share of the bit rate; a stuffed 11-bit frame takes 47 + 8 n + floor((34 + 8 n - 1) / 4) bits (Tindell 1994)."""
     frames, rows = signals.decoded.recording.frames, _vehicle_frames(signals)
     rows = rows[signals.decoded.time_s[rows] >= signals.start_s]
@@ -187,7 +249,8 @@ def _bus_load(signals: Signals) -> float:
     payload_bits = 8 * frames.length[rows].astype(np.int64)
     bits = int((47 + payload_bits + (33 + payload_bits) // 4).sum())
     t_s = signals.decoded.time_s[rows]
-    return bits / (contract(BusName.VEHICLE).bit_rate * float(t_s.max() - t_s.min()))
+    span_s = float(t_s.max() - t_s.min())  # 0 where a run ended in its first tick
+    return bits / (bit_rate * span_s) if span_s > 0.0 else 0.0
 
 
 def link_events(signals: Signals) -> list[LinkEvent]:

@@ -1,33 +1,41 @@
 """One run from start to report: bench, measurement, expectations, files; in real or virtual time alike."""
 
+import contextlib
 import json
 import math
 import os
 import platform
 import sys
+import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TextIO
 
-from hil.bench.bench_run import BenchRun, BenchState
+from dbc.contract import contract
+from dbc.frame import BusName
+from hil.bench.bench_run import BenchRun, BenchState, OutputError
 from hil.bench.real import RealBench
 from hil.bench.result import RunResult, Signals, measure
 from hil.bench.run_report import build_report
 from hil.bench.virtual import VirtualBench
+from hil.bench.watch import Finding
+from hil.bus.timed.line import is_timed, open_line
+from hil.errors import INTERRUPTED_EXIT_CODE, BrakebenchError, Verdict
 from hil.log.export.tables import export
+from hil.log.frames import FrameTable, Recording
 from hil.report.figure import write_figure
 from hil.report.html import write_html
-from hil.report.report import Number, Report, Verdict
+from hil.report.report import Number, Report
 from hil.report.text import print_text
 from hil.rt.clock import wall_time_ns
-from hil.rt.process import StopSignal
+from hil.rt.process import Child, StopSignal
 from hil.scenario.scenario import Scenario, load_scenario
 
-EXIT_CODES = {Verdict.PASSED: 0, Verdict.FAILED: 1, Verdict.INCOMPLETE: 3}
 EXPECTED = "Expected: "
-INTERRUPTED_EXIT_CODE = 130  # 128 + SIGINT, as a shell reports it
+_FILES = {"log": "recording.log", "signals": "signals.parquet", "figure": "figure.png", "page": "report.html"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +47,7 @@ class Outcome:
     result : the numbers.
     report : everything, for any printer.
     facts : what ``--json`` adds to the numbers: bus, processes, log, verdict, ...
-    exit_code : 0 ok, 1 an expectation failed, 3 the bench broke, 130 interrupted.
+    exit_code : of the verdict (`hil.errors.Verdict`); 130 where interrupted.
     """
 
     result: RunResult
@@ -47,16 +55,24 @@ class Outcome:
     facts: dict[str, Any]
     exit_code: int
 
+    @property
+    def verdict(self) -> Verdict:
+        """How the run is judged."""
+        return Verdict(self.facts["verdict"])
+
     def json_text(self) -> str:
         """One JSON object."""
         return json.dumps(self.result.as_json() | self.facts, indent=2)
 
     def print_text(self, stream: TextIO) -> None:
-        """What a terminal can show, then where the files are."""
+        """What a terminal can show, then where the files are and what is missing."""
         print_text(self.report, stream, brief=True)
         stream.write("\n")
-        for name in ("log", "signals", "figure", "page"):
-            stream.write(f"{name:8} {self.facts[name]}\n")
+        for name in _FILES:
+            if self.facts[name] is not None:
+                stream.write(f"{name:8} {self.facts[name]}\n")
+        for line in self.facts["missing"]:
+            stream.write(f"missing  {line}\n")
 
 
 def run_scenario(
@@ -76,27 +92,50 @@ def run_scenario(
     Raises
     ------
     BrakebenchError
-        Before anything was started: no such scenario, a wrong field, a taken channel.
+        Before anything was started: no such scenario, a wrong field, a taken channel, somebody else who sends what
+        this run would send, a folder that cannot be written.
     """
     scenario = load_scenario(name)
     started_ns = wall_time_ns()
-    folder = Path(out) if out else new_folder(scenario.name)
     stop = StopSignal()
+    folder = Path(out) if out else new_folder(scenario.name)
     bench_run: BenchRun
-    if virtual:
-        bench_run = VirtualBench(scenario, folder, seed, say, stop)
-    else:
-        bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without)
-    with bench_run:
-        say(f"bus {bench_run.spec}" + (f" ({bench_run.note})" if bench_run.note else ""))
-        bench_run.run()
+    try:
+        if virtual:
+            bit_rate = contract(BusName.VEHICLE).bit_rate
+            line = open_line(bus, bit_rate, seed) if is_timed(bus) else None
+            bench_run = VirtualBench(scenario, folder, seed, say, stop, line=line)
+        else:
+            bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without)
+        with bench_run:
+            say(f"bus {bench_run.spec}" + (f" ({bench_run.note})" if bench_run.note else ""))
+            bench_run.run()
+    except BrakebenchError:
+        with contextlib.suppress(OSError):  # a folder in which nothing is
+            folder.rmdir()
+        raise
+    if bench_run.error is not None:
+        say(explained(bench_run))
     say("measuring")
     provenance = {"realtime asked for": realtime, "command line": command_line, "started": started_ns // 1_000_000_000}
     return finish(bench_run, seed, provenance)
 
 
+def explained(bench_run: BenchRun) -> str:
+    """What broke a run, with the traceback of the code that did; empty where nothing did."""
+    error = bench_run.error
+    if error is None:
+        return ""
+    cause = error.__cause__
+    if cause is None or isinstance(cause, (BrakebenchError, OSError)):
+        return str(error)
+    return "".join(traceback.format_exception(cause)).rstrip() + f"\n{error.reason}"
+
+
 def finish(bench_run: BenchRun, seed: int, provenance: Mapping[str, object], failure: str = "") -> Outcome:
     """Measure a run that has ended, judge it, and write its files.
+
+    There is a verdict whatever fails on the way: what could not be read or written is listed as missing.
 
     Parameters
     ----------
@@ -104,28 +143,63 @@ def finish(bench_run: BenchRun, seed: int, provenance: Mapping[str, object], fai
     failure : why a test on this bench failed; empty where the scenario's expectations decide.
     """
     scenario = bench_run.scenario
-    signals = Signals(bench_run.log)
-    result = measure(signals)
+    missing: list[str] = []
+    signals = _recorded(bench_run, missing)
+    result = measure(signals, bench_run.bit_rate)
     met = list(expected(scenario, result, signals))
-    verdict, reason = _judge(bench_run, met, failure)
+    findings = list(_judgements(bench_run, met, failure))
+    verdict, reason = judge(findings)
     report = build_report(
         scenario.title, signals, result, verdict, reason, _provenance(scenario, bench_run, seed) | dict(provenance)
     )
     report = replace(report, numbers=report.numbers + tuple(met))
+    paths = {name: bench_run.out / file for name, file in _FILES.items()}
+    writers: dict[str, Callable[[Path], object]] = {
+        "signals": lambda path: export(signals.decoded, path, overwrite=True),
+        "figure": partial(write_figure, report),
+        "page": partial(write_html, report),
+    }
+    files = write_files(writers, paths, missing)
     facts = {
         "scenario": scenario.name,
         "verdict": verdict.value,
         "reason": reason,
+        "findings": [{"verdict": finding.verdict.value, "text": finding.text} for finding in findings],
+        "missing": missing,
+        "unused_frames": signals.unused,
         "bus": bench_run.spec,
+        "ended_early": bench_run.state in (BenchState.BROKEN, BenchState.UNRECORDED, BenchState.INTERRUPTED),
         "processes": bench_run.alive_at_end,
         "share_of_core": _shares(bench_run),
         "seed": seed,
     }
-    facts |= _write(bench_run.out, report, signals)
-    code = INTERRUPTED_EXIT_CODE if bench_run.state is BenchState.INTERRUPTED else EXIT_CODES[verdict]
-    outcome = Outcome(result, report, facts, code)
-    (bench_run.out / "result.json").write_text(outcome.json_text() + "\n")
+    outcome = _outcome(bench_run, result, report, facts | files)
+    try:
+        (bench_run.out / "result.json").write_text(outcome.json_text() + "\n")
+    except OSError as error:
+        missing.append(f"result.json: {error.strerror}")
+        outcome = _outcome(bench_run, result, report, facts | files)
     return outcome
+
+
+def _outcome(bench_run: BenchRun, result: RunResult, report: Report, facts: dict[str, Any]) -> Outcome:
+    """The outcome, incomplete at best where something is missing."""
+    missing = facts["missing"]
+    verdict, reason = Verdict(facts["verdict"]), facts["reason"]
+    if missing and verdict.rank < Verdict.INCOMPLETE.rank:
+        verdict, reason = Verdict.INCOMPLETE, f"missing: {'; '.join(missing)}"
+    code = INTERRUPTED_EXIT_CODE if bench_run.state is BenchState.INTERRUPTED else verdict.exit_code
+    report = replace(report, verdict=verdict, reason=reason)
+    return Outcome(result, report, facts | {"verdict": verdict.value, "reason": reason, "exit_code": code}, code)
+
+
+def _recorded(bench_run: BenchRun, missing: list[str]) -> Signals:
+    """The signals on record; none where there is no recording."""
+    try:
+        return Signals(bench_run.log)
+    except (OSError, BrakebenchError) as error:
+        missing.append(f"{bench_run.log.name}: {error}")
+        return Signals(Recording(bench_run.log, "candump", FrameTable.empty()))
 
 
 def new_folder(name: str) -> Path:
@@ -138,6 +212,8 @@ def new_folder(name: str) -> Path:
         except FileExistsError:
             number += 1
             continue
+        except OSError as error:
+            raise OutputError(f"{folder}: cannot be made ({error.strerror}); name a folder with --out") from error
         return folder
 
 
@@ -157,17 +233,31 @@ def expected(scenario: Scenario, result: RunResult, signals: Signals) -> Iterato
         yield Number(f"{EXPECTED}{x.name}", shown, limit=f"{x.minimum:g} to {x.maximum:g}", met=met)
 
 
-def _judge(bench_run: BenchRun, expected: Sequence[Number], failure: str) -> tuple[Verdict, str]:
-    if bench_run.state is BenchState.BROKEN:
-        return Verdict.INCOMPLETE, bench_run.reason
-    if bench_run.state is BenchState.INTERRUPTED:
-        return Verdict.INCOMPLETE, "interrupted"
+def judge(findings: Sequence[Finding]) -> tuple[Verdict, str]:
+    """The worst finding and how many there are beside it; *passed* where there is none."""
+    if not findings:
+        return Verdict.PASSED, ""
+    worst = max(findings, key=lambda finding: finding.verdict.rank)
+    more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
+    return worst.verdict, worst.text + more
+
+
+def _judgements(bench_run: BenchRun, expected: Sequence[Number], failure: str) -> Iterator[Finding]:
+    """What the bench itself, a test, the expectations and the watch say."""
     if failure:
-        return Verdict.FAILED, failure
-    for number in expected:
-        if not number.met:
-            return Verdict.FAILED, f"{number.label.removeprefix(EXPECTED)}: expected {number.limit}, got {number.value}"
-    return Verdict.PASSED, ""
+        yield Finding(Verdict.FAILED, failure)
+    if bench_run.state is BenchState.BROKEN:
+        yield Finding(Verdict.BROKEN, bench_run.reason)
+    elif bench_run.state is BenchState.UNRECORDED:
+        yield Finding(Verdict.INCOMPLETE, bench_run.reason)
+    elif bench_run.state is BenchState.INTERRUPTED:
+        yield Finding(Verdict.INCOMPLETE, "interrupted")
+    else:
+        for number in expected:
+            if not number.met:
+                label = number.label.removeprefix(EXPECTED)
+                yield Finding(Verdict.FAILED, f"{label}: expected {number.limit}, got {number.value}")
+        yield from bench_run.watch.findings()
 
 
 def _provenance(scenario: Scenario, bench_run: BenchRun, seed: int) -> dict[str, object]:
@@ -177,9 +267,7 @@ def _provenance(scenario: Scenario, bench_run: BenchRun, seed: int) -> dict[str,
         "parameter sets": {"plant": scenario.plant_set, "ecu": scenario.ecu_set},
         "seed": seed,
         "bus": bench_run.spec,
-        "processes": {
-            child.name: child.error_path.read_text(errors="replace").strip() for child in bench_run.processes
-        },
+        "processes": {child.name: _words_of(child) for child in bench_run.processes},
         "share of a core": _shares(bench_run),
         "versions": {"python": platform.python_version()} | {name: version(name) for name in packages},
         "host": {"kernel": platform.release(), "machine": platform.machine(), "processors": os.cpu_count()},
@@ -187,20 +275,30 @@ def _provenance(scenario: Scenario, bench_run: BenchRun, seed: int) -> dict[str,
     }
 
 
+def _words_of(child: Child) -> str:
+    try:
+        return child.error_path.read_text(errors="replace").strip()
+    except OSError as error:
+        return f"unknown: {error.strerror}"
+
+
 def _shares(bench_run: BenchRun) -> dict[str, float]:
     """Processor time over time of each process, where it is known."""
     return {c.name: round(c.share_of_core, 4) for c in bench_run.processes if c.share_of_core is not None}
 
 
-def _write(out: Path, report: Report, signals: Signals) -> dict[str, str]:
-    """Write what people take away; paths open from the current folder."""
-    files = {
-        "log": out / "recording.log",
-        "signals": out / "signals.parquet",
-        "figure": out / "figure.png",
-        "page": out / "report.html",
-    }
-    export(signals.decoded, files["signals"], overwrite=True)
-    write_figure(report, files["figure"])
-    write_html(report, files["page"])
-    return {name: os.path.relpath(path) for name, path in files.items()}
+def write_files(
+    writers: Mapping[str, Callable[[Path], object]], paths: Mapping[str, Path], missing: list[str]
+) -> dict[str, str | None]:
+    """Write what people take away, each on its own; paths open from the current folder, None where there is no file.
+
+    ``missing`` takes a line for each that could not be written.
+    """
+    for name, write in writers.items():
+        try:
+            write(paths[name])
+        except Exception as error:  # whatever a library says of a full disk: the verdict must come out
+            missing.append(f"{paths[name].name}: {error}")
+            with contextlib.suppress(OSError):
+                paths[name].unlink(missing_ok=True)  # half a file is none
+    return {name: os.path.relpath(path) if path.exists() else None for name, path in paths.items()}

@@ -1,6 +1,7 @@
 """The report of one run, built from its recording."""
 
 from collections.abc import Mapping
+from enum import IntEnum
 
 import numpy as np
 
@@ -113,20 +114,23 @@ def _spans(t_s: Floats, values: Floats) -> list[tuple[float, float, int]]:
 
 def _timeline(signals: Signals) -> tuple[Lane, ...]:
     manoeuvre = [
-        Span(a, b, ManoeuvreState(v).name.lower()) for a, b, v in _spans(*signals.get("TRUTH_MOTION.MANOEUVRE"))
+        Span(a, b, _name(ManoeuvreState, v).lower()) for a, b, v in _spans(*signals.get("TRUTH_MOTION.MANOEUVRE"))
     ]
-    modes = [Span(a, b, BrakeMode(v).name, _MODE_SEVERITY[v]) for a, b, v in _spans(*signals.get("BRAKE_STATUS.MODE"))]
+    modes = [
+        Span(a, b, _name(BrakeMode, v), _MODE_SEVERITY.get(v, "error"))
+        for a, b, v in _spans(*signals.get("BRAKE_STATUS.MODE"))
+    ]
     faults = [
         Span(a, b, _fault_names(v), "error") for a, b, v in _spans(*signals.get("BRAKE_STATUS.ACTIVE_FAULTS")) if v
     ]
     brakes = [
-        Span(a, b, f"{axle.lower()}: {EhbState(v).name}", "warning")
+        Span(a, b, f"{axle.lower()}: {_name(EhbState, v)}", "warning")
         for axle in ("FRONT", "REAR")
         for a, b, v in _spans(*signals.get(f"EHB_PRESSURE_{axle}.EHB_STATE_{axle}"))
         if v
     ]
     motors = [
-        Span(a, b, f"{w.lower()}: {MotorState(v).name}", "error" if v == MotorState.FAILED else "warning")
+        Span(a, b, f"{w.lower()}: {_name(MotorState, v)}", "error" if v == MotorState.FAILED else "warning")
         for w in WHEELS
         for a, b, v in _spans(*signals.get(f"MOTOR_STATUS_{_AXLE[w]}.FAULT_{w}"))
         if v
@@ -144,7 +148,14 @@ def _timeline(signals: Signals) -> tuple[Lane, ...]:
     )
 
 
+def _name(kind: type[IntEnum], value: int) -> str:
+    """Name of a value, which may be one that the DBC reserves."""
+    return {one.value: one.name for one in kind}.get(value, f"RESERVED {value}")
+
+
 def _fault_names(bits: int) -> str:
     """Names of the set bits, shortened where there are many (all of them before the first frames have come)."""
     names = [fault.name or "" for fault in Fault if fault and bits & fault]
+    unknown = bits & ~sum(fault for fault in Fault if fault)
+    names += [f"unknown bits 0x{unknown:X}"] if unknown else []
     return ", ".join(names if len(names) <= 3 else [*names[:2], f"{len(names) - 2} more"])

@@ -7,12 +7,13 @@ from threading import Condition, Thread
 from typing import Any
 
 from dbc.frame import Node
-from hil.bench.bench_run import BenchError, BenchRun, BenchState
+from hil.bench.bench_run import BenchRun, BenchState, prepare_folder
 from hil.bench.controls import SessionError
 from hil.bench.monitor import RunMonitor
 from hil.bench.real import RealBench
 from hil.bench.run import Outcome, finish
 from hil.bench.virtual import VirtualBench
+from hil.bench.watch import Finding
 from hil.rt.clock import WallClock
 from hil.rt.process import interrupts_held
 from hil.scenario.scenario import Scenario, load_scenario
@@ -34,13 +35,13 @@ def virtual_run(scenario: Scenario, folder: Path, seed: int, nodes: Mapping[str,
     return VirtualBench(scenario, folder, seed, plant=nodes.get("plant"), ecu=nodes.get("ecu"))
 
 
-def real_run(bus: str, without: Sequence[str] = ()) -> MakeBenchRun:
-    """Rigs in real time on a bus; the nodes in ``without`` are somebody else's."""
+def real_run(bus: str, without: Sequence[str] = (), realtime: bool = False) -> MakeBenchRun:
+    """Rigs in real time on a bus; the nodes in ``without`` are somebody else's; ``realtime`` as of `RealBench`."""
 
     def make(scenario: Scenario, folder: Path, seed: int, nodes: Mapping[str, Node]) -> BenchRun:
         if nodes:
             raise SessionError("use: a node as an object runs in virtual time only; put a process on the bus instead")
-        return RealBench(scenario, bus, folder, seed, without=without, whole=True)
+        return RealBench(scenario, bus, folder, seed, realtime, without=without)
 
     return make
 
@@ -135,10 +136,14 @@ class Session(RunMonitor):
                     self._ticked.wait(0.1)
             if self._error is not None:
                 raise self._error
-            if bench_run.state is BenchState.BROKEN:
-                raise BenchError(bench_run.reason)
+            self._raise_what_broke(bench_run)
             if bench_run.state is BenchState.FINISHED and not over():
                 raise SessionError(f"the scenario ended at {self.time_s:.2f} s, before what was waited for")
+
+    def _raise_what_broke(self, bench_run: BenchRun) -> None:
+        """Raise what ended the run, on top of what caused it."""
+        if bench_run.error is not None:
+            raise type(bench_run.error)(bench_run.error.reason, bench_run.error.details) from bench_run.error.__cause__
 
     def _tick(self, bench_run: BenchRun) -> bool:
         going = bench_run.tick()
@@ -151,15 +156,14 @@ class Session(RunMonitor):
         if self._bench_run is not None:
             return self._bench_run
         self._deadline_ns = WallClock().now_ns() + round(self._limit_s * 1e9)
-        self.folder.mkdir(parents=True, exist_ok=True)
+        prepare_folder(self.folder)
         bench_run = self._make_run(
             load_scenario(self._scenario or self._own_scenario()), self.folder, self.seed, self._nodes
         )
         self._take(bench_run.stimulus_node)
         self._bench_run = bench_run
         bench_run.start()
-        if bench_run.state is BenchState.BROKEN:
-            raise BenchError(bench_run.reason)
+        self._raise_what_broke(bench_run)
         if bench_run.real_time:
             self._thread = Thread(target=self._keep_ticking, args=(bench_run,), name="brakebench", daemon=True)
             self._thread.start()
@@ -183,6 +187,19 @@ class Session(RunMonitor):
             self._error = error
 
     # the end
+
+    @property
+    def findings(self) -> list[Finding]:
+        """What speaks against a run in real time so far: silence, overruns, other senders (`hil.bench.watch`).
+
+        None in virtual time, where objects of the test's own do what the test wants.
+        """
+        return self._bench_run.watch.findings() if self._bench_run is not None and self._bench_run.real_time else []
+
+    @property
+    def punctuality(self) -> str:
+        """What the nodes of a run in real time run with, for people; empty where there are none."""
+        return self._bench_run.punctuality if isinstance(self._bench_run, RealBench) else ""
 
     def stop(self) -> None:
         """End nodes and recorder; harmless when called again."""

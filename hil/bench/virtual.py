@@ -10,11 +10,13 @@ from dbc.frame import BusName, Frame, Node, Received
 from ecu.node import EcuNode
 from hil.bench.bench_run import HOLD_TIMEOUT_NS, BenchError, BenchRun, BenchState, Say, silent
 from hil.bench.node_process import ECU, NODE_PERIOD_NS, PLANT, Role
-from hil.bench.port import check_owned, owned_by
+from hil.bench.port import OwnedNode
 from hil.bench.recorder import Recorder
 from hil.bench.result import Signals
 from hil.bench.stimulus import BENCH_PHASE_NS, StimulusNode
-from hil.faults.frames import on_faulty_line
+from hil.bus.timed.line import TimedLine
+from hil.faults.fault import Injection
+from hil.faults.line import FaultyNode
 from hil.log.frames import FrameTable, Recording
 from hil.rt.lockstep import Member, Step, lockstep
 from hil.rt.process import StopSignal
@@ -32,10 +34,11 @@ def own_nodes(scenario: Scenario, seed: int) -> tuple[Node, Node]:
     return plant, EcuNode(scenario.ecu, NODE_PERIOD_NS)
 
 
-def members(scenario: Scenario, plant: Node, ecu: Node, stimulus_node: StimulusNode, seed: int = 1) -> list[Member]:
-    """Plant, controller and bench, each at the phase it has in real time; their frames meet the scenario's faults."""
+def members(scenario: Scenario, plant: Node, ecu: Node, stimulus_node: StimulusNode) -> list[Member]:
+    """Plant, controller and bench, each at the phase it has in real time; faults that are armed meet their frames."""
     order = scenario.start_order
-    plant, ecu = (on_faulty_line(node, scenario.frame_faults, seed) for node in (plant, ecu))
+    plant = FaultyNode(plant, PLANT.senders, stimulus_node)
+    ecu = FaultyNode(ecu, ECU.senders, stimulus_node)
     return [
         Member(plant, NODE_PERIOD_NS, PLANT.phase_ns + round(order.plant_s * 1e9)),
         Member(ecu, NODE_PERIOD_NS, ECU.phase_ns + round(order.ecu_s * 1e9)),
@@ -49,7 +52,9 @@ def simulate(
     *,
     plant: Node | None = None,
     ecu: Node | None = None,
+    faults: Sequence[Injection] = (),
     each_tick: Callable[[Step], None] | None = None,
+    line: TimedLine | None = None,
 ) -> Signals:
     """Run a scenario to its end without any file, and return what a recording of both buses would hold.
 
@@ -57,7 +62,9 @@ def simulate(
     ----------
     seed : of all noise.
     plant, ecu : nodes in the places of our own.
+    faults : beside the scenario's.
     each_tick : sees every step: member 0 the plant, 1 the controller, 2 the bench.
+    line : a timed vehicle bus; None: frames arrive at once.
 
     Raises
     ------
@@ -65,12 +72,18 @@ def simulate(
         The manoeuvre did not start within 15 s of virtual time.
     """
     own_plant, own_ecu = own_nodes(scenario, seed)
-    stimulus_node = StimulusNode(scenario.blending, scenario.faults)
+    stimulus_node = StimulusNode(scenario.blending, (*scenario.faults, *faults), seed=seed)
     frames: list[Frame] = []
     times: list[int] = []
-    for step in lockstep(members(scenario, plant or own_plant, ecu or own_ecu, stimulus_node, seed)):
-        frames += step.frames
-        times += [step.now_ns] * len(step.frames)
+    taking_part = members(scenario, plant or own_plant, ecu or own_ecu, stimulus_node)
+    for step in lockstep(taking_part) if line is None else line.lockstep(taking_part, (_STIMULUS_NODE,)):
+        if line is None:
+            frames += step.frames
+            times += [step.now_ns] * len(step.frames)
+        else:
+            heard = [one for one in line.heard() if isinstance(one, Frame)]
+            frames += heard
+            times += [frame.time_ns for frame in heard]
         if each_tick is not None:
             each_tick(step)
         if step.member == _STIMULUS_NODE:
@@ -100,15 +113,13 @@ class _Process:
 
     def __init__(self, role: Role, node: Node) -> None:
         self._role = role
-        self._node = node
-        self._owned = owned_by(role.senders)
+        self._node = OwnedNode(node, role.senders)
         self._health = Transmitter()
         self._tick = 0
 
     def step(self, now_ns: int, inbox: list[Received]) -> list[Frame]:
         try:
             frames = list(self._node.step(now_ns, inbox))
-            check_owned(frames, self._owned)
         except Exception as error:
             raise BenchError(
                 f"{self._role.name} raised {type(error).__name__} at {now_ns * 1e-9:.3f} s: {error}"
@@ -136,6 +147,7 @@ class VirtualBench(BenchRun):
     ----------
     scenario, out, seed, say, stop : as of `BenchRun`.
     plant, ecu : nodes in the places of our own.
+    line : a timed vehicle bus; None: frames arrive at once.
     """
 
     spec = SPEC
@@ -151,8 +163,12 @@ class VirtualBench(BenchRun):
         stop: StopSignal | None = None,
         plant: Node | None = None,
         ecu: Node | None = None,
+        line: TimedLine | None = None,
     ) -> None:
         super().__init__(scenario, out, seed, say, stop)
+        self._line = line
+        if line is not None:
+            self.spec, self.note, self.bit_rate = line.spec, line.note, line.bus.bit_rate
         self._nodes = (plant, ecu)
         self._tap = _Tap()
         self._recorder: Recorder | None = None
@@ -165,14 +181,15 @@ class VirtualBench(BenchRun):
         plant, ecu = (
             given or own for given, own in zip(self._nodes, own_nodes(self.scenario, self._seed), strict=True)
         )
-        self._steps = lockstep(
-            members(self.scenario, _Process(PLANT, plant), _Process(ECU, ecu), self.stimulus_node, self._seed)
+        taking_part = members(self.scenario, _Process(PLANT, plant), _Process(ECU, ecu), self.stimulus_node)
+        self._steps = (
+            lockstep(taking_part) if self._line is None else self._line.lockstep(taking_part, (_STIMULUS_NODE,))
         )
         self.alive_at_end = 2
 
     def _pass_period(self) -> int:
         for step in self._steps:
-            self._tap.heard += step.stamped()
+            self._tap.heard += step.stamped() if self._line is None else self._line.heard()
             if step.member == _STIMULUS_NODE:
                 break
         self._ticks += 1

@@ -18,7 +18,7 @@ from dbc.frame import BusName, Frame
 from hil.bus.bus import BusError
 from hil.bus.loopback import LoopbackBus as Member
 from hil.bus.rendezvous import live_channels
-from hil.rt.clock import monotonic_ns, wall_time_ns
+from hil.rt.clock import clocks_ns, monotonic_ns
 
 _log = logging.getLogger("can.brakebench")
 _MOST_OWN = 1 << 16  # own frames that wait to be received; beyond it they are lost, as others' are beyond their queue
@@ -72,7 +72,7 @@ class LoopbackBus(can.BusABC):
         self._waiting = select.poll()
         self._waiting.register(self._member.fileno(), select.POLLIN)
         self._waiting.register(self._wake, select.POLLIN)
-        self._epoch_ns = wall_time_ns() - monotonic_ns()  # fixed, so that stamps keep their distances
+        _, self._epoch_ns = clocks_ns()  # fixed, so that stamps keep their distances
         super().__init__(channel=channel, can_filters=can_filters, **kwargs)
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:

@@ -1,5 +1,6 @@
 """Open and close python-can's drivers; what they raise, in words a person can act on."""
 
+import errno
 import logging
 from typing import TYPE_CHECKING, Any
 
@@ -9,11 +10,25 @@ if TYPE_CHECKING:
     import can
 
 DEFAULT_BITRATE = 500_000
+_GONE = {errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.EIO, errno.EBADF, errno.EPIPE, errno.ENETUNREACH}
 
 
 def error_number(error: Exception) -> int | None:
     """Return the errno of whatever a driver raised."""
     return getattr(error, "error_code", None) or getattr(error, "errno", None)
+
+
+def is_gone(error: Exception) -> bool:
+    """Whether a driver's error says that there is no device any more."""
+    return error_number(error) in _GONE
+
+
+def descriptor(driver: "can.BusABC") -> int:
+    """Return the driver's file descriptor; -1 where it has none."""
+    try:
+        return driver.fileno()
+    except Exception:  # it has none; or it is just being unplugged
+        return -1
 
 
 def shut(driver: "can.BusABC") -> None:

@@ -24,6 +24,7 @@ from hil.rt.clock import WallClock
 
 _CHANNEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,47}")
 _PATIENCE_NS = 5_000_000_000
+_LEAVING_NS = 500_000_000  # a member that ends waits no longer; what it leaves behind goes with the next one
 _BACKLOG = 1024
 
 
@@ -80,7 +81,7 @@ class Rendezvous:
         -------
         The listening socket and a connection to each member, all non-blocking.
         """
-        with self._locked(), _short_name(self._directory) as place:
+        with self._locked(_PATIENCE_NS), _short_name(self._directory) as place:
             present = self._present(place)
             listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
             try:
@@ -96,7 +97,7 @@ class Rendezvous:
     def leave(self, listener: socket.socket) -> None:
         """Close and remove this member's socket, and the directory after the last member."""
         listener.close()
-        with contextlib.suppress(BusError), self._locked(), _short_name(self._directory) as place:
+        with contextlib.suppress(BusError), self._locked(_LEAVING_NS), _short_name(self._directory) as place:
             self._path.unlink(missing_ok=True)
             present = self._present(place)
             for connection in present:
@@ -122,9 +123,9 @@ class Rendezvous:
         return present
 
     @contextlib.contextmanager
-    def _locked(self) -> Iterator[None]:
+    def _locked(self, patience_ns: int) -> Iterator[None]:
         clock = WallClock()
-        give_up_ns = clock.now_ns() + _PATIENCE_NS
+        give_up_ns = clock.now_ns() + patience_ns
         while True:
             file = self._open_lock()
             if file is not None:
@@ -136,7 +137,10 @@ class Rendezvous:
                     pass
                 os.close(file)
             if clock.now_ns() > give_up_ns:
-                raise BusError(f"{self._directory}: locked for 5 s by another member; is one stopped while joining?")
+                raise BusError(
+                    f"{self._directory}: locked for {patience_ns * 1e-9:g} s by another member; "
+                    "is one stopped while joining?"
+                )
             clock.sleep_until(clock.now_ns() + 1_000_000)
         try:
             yield

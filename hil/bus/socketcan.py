@@ -4,11 +4,13 @@ python-can opens the same interfaces, at several times the cost per frame, waiti
 count of lost frames (SO_RXQ_OVFL breaks its reader): so this kind does without. Source: networking/can.rst of Linux.
 """
 
+import contextlib
 import errno
 import os
 import select
 import socket
 import struct
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
@@ -18,16 +20,18 @@ from dbc.frame import BusName, Frame, LinkEvent, LinkState, Received
 from hil.bus.bus import BusError, BusSpec
 from hil.bus.can_frame import CAN_FRAME, ERROR_FLAG, EXTENDED_FLAG, EXTENDED_MASK, REMOTE_FLAG, pack_frame
 from hil.bus.error_frame import append_event, link_events
-from hil.rt.clock import WallClock, monotonic_ns, wall_time_ns
+from hil.bus.wall_stamps import WallStamps
+from hil.rt.clock import WallClock, monotonic_ns
 
 _SO_RCVBUFFORCE, _SO_TIMESTAMPNS, _SO_RXQ_OVFL, _SO_MEMINFO = 33, 35, 40, 55  # asm-generic/socket.h
 _MEMINFO = struct.Struct("=9I")  # linux/sock_diag.h; the last one counts drops
 _CAN_RAW_ERR_FILTER = 2  # linux/can/raw.h
 _RECEIVE_BYTES = 1 << 20  # the default holds about 250 frames
 _ANCILLARY_BYTES = 128
+_STAMP_SLACK_NS = 1_000_000  # the kernel stamps a frame before it queues it
 _MOST_FRAMES = 1 << 14  # per receive: a babbling bus holds nobody up
 _QUEUE_FULL = {errno.ENOBUFS, errno.EAGAIN}
-_FIRST_RETRY_NS, _LAST_RETRY_NS = 100_000_000, 5_000_000_000
+_FIRST_RETRY_NS, _LAST_RETRY_NS = 10_000_000, 50_000_000  # a try is a bind: it costs nothing
 
 
 class SocketcanBus:
@@ -60,6 +64,7 @@ class SocketcanBus:
         self._dropped = 0
         self._retry_ns = _FIRST_RETRY_NS
         self._retry_at_ns = 0
+        self._stamps = WallStamps(slack_ns=_STAMP_SLACK_NS)
         try:
             self._socket: socket.socket | None = _open(spec.channel)
         except OSError as error:
@@ -89,7 +94,12 @@ class SocketcanBus:
             link = self._link()
             received = self._report()
             if link is not None:
-                self._read(link, received)
+                try:
+                    self._read(link, received)
+                except OSError as error:
+                    self._disconnect(error)
+                    link = None
+                    received += self._report()
             left_ns = deadline_ns - monotonic_ns()
             if received or left_ns <= 0:
                 return received
@@ -144,9 +154,12 @@ class SocketcanBus:
             self._pending.append(LinkEvent(self.bus, LinkState.BUS_OFF, monotonic_ns(), 1, detail))
 
     def _disconnect(self, error: OSError) -> None:
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
+        """Close the socket, after the frames that had arrived were taken from it."""
+        link, self._socket = self._socket, None
+        if link is not None:
+            with contextlib.suppress(OSError):
+                self._read(link, self._pending)
+            link.close()
         self._retry_at_ns = monotonic_ns() + self._retry_ns
         detail = f"{self._interface}: {error.strerror}"
         self._pending.append(LinkEvent(self.bus, LinkState.DISCONNECTED, monotonic_ns(), 1, detail))
@@ -161,25 +174,41 @@ class SocketcanBus:
         return received
 
     def _read(self, link: socket.socket, received: list[Received]) -> None:
-        offset_ns = wall_time_ns() - monotonic_ns()
-        receive, bus = link.recvmsg, self.bus
-        for _ in range(_MOST_FRAMES):
-            try:
+        """Append what the socket holds.
+
+        Raises
+        ------
+        OSError : the link's state; what was read before it is appended.
+        """
+        taken: list[tuple[bytes, int, int | None]] = []
+        receive = link.recvmsg
+        try:
+            for _ in range(_MOST_FRAMES):
                 record, ancillary, _, _ = receive(CAN_FRAME.size, _ANCILLARY_BYTES)
-            except BlockingIOError:  # the frames' own count is of the time before them: were some lost after the last?
-                self._count_drops(_drops(link, self._dropped), monotonic_ns(), received)
-                return
-            except OSError as error:
-                self._disconnect(error)
-                received += self._report()
-                return
-            time_ns = -1
-            for _, kind, value in ancillary:
-                if kind == _SO_TIMESTAMPNS:
-                    seconds, nanoseconds = struct.unpack("@ll", value)
-                    time_ns = seconds * 1_000_000_000 + nanoseconds - offset_ns
-                elif kind == _SO_RXQ_OVFL:
-                    self._count_drops(struct.unpack("=I", value)[0], time_ns, received)
+                stamp_ns, dropped = -1, None
+                for _, kind, value in ancillary:
+                    if kind == _SO_TIMESTAMPNS:
+                        seconds, nanoseconds = struct.unpack("@ll", value)
+                        stamp_ns = seconds * 1_000_000_000 + nanoseconds
+                    elif kind == _SO_RXQ_OVFL:
+                        dropped = int.from_bytes(value, sys.byteorder)
+                taken.append((record, stamp_ns, dropped))
+        except BlockingIOError:  # the frames' own count is of the time before them: were some lost after the last?
+            now_ns = self._take(taken, received)
+            self._count_drops(_drops(link, self._dropped), now_ns, received)
+        except OSError:
+            self._take(taken, received)
+            raise
+        else:
+            self._take(taken, received)
+
+    def _take(self, taken: list[tuple[bytes, int, int | None]], received: list[Received]) -> int:
+        """Append records (with stamp and count of drops) as frames and events; the time they were read by, ns."""
+        bus, now_ns = self.bus, self._stamps.look()
+        for record, stamp_ns, dropped in taken:
+            time_ns = self._stamps.monotonic_of(stamp_ns)
+            if dropped is not None:
+                self._count_drops(dropped, time_ns, received)
             flagged, length, data = CAN_FRAME.unpack(record)
             if flagged & ERROR_FLAG:
                 for event in link_events(flagged & EXTENDED_MASK, data, bus, time_ns):
@@ -190,6 +219,7 @@ class SocketcanBus:
                 received.append(Frame(bus, flagged ^ EXTENDED_FLAG, data[:length], time_ns, True))
             else:
                 received.append(Frame(bus, flagged, data[:length], time_ns))
+        return now_ns
 
     def _count_drops(self, dropped: int, time_ns: int, received: list[Received]) -> None:
         lost = (dropped - self._dropped) & 0xFFFFFFFF

@@ -18,15 +18,22 @@ def run(args: argparse.Namespace) -> int:
     """Run the controller until it is told to stop."""
     from dbc.frame import Node
     from ecu.node import EcuNode
+    from hil.bench.hold import notice
     from hil.bench.node_process import ECU, NODE_PERIOD_NS, serve
-    from hil.faults.frames import on_faulty_line
+    from hil.bus.channel import resolve
     from hil.scenario.scenario import load_scenario
 
     scenario = load_scenario(args.scenario)
 
     def make() -> Node:
         EcuNode(scenario.ecu, NODE_PERIOD_NS).step(0, [])  # compiles what the first tick would compile
-        return on_faulty_line(EcuNode(scenario.ecu, NODE_PERIOD_NS), scenario.frame_faults, args.seed)
+        return EcuNode(scenario.ecu, NODE_PERIOD_NS)
 
-    serve(ECU, make, args.bus, ready_fd=args.ready_fd, realtime=args.realtime, say=lambda s: print(s, file=sys.stderr))
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    words = notice(scenario, "ecu", resolve(args.bus)) if args.ready_fd is None else ""
+    if words:
+        say(f"ecu: {words}")
+    serve(ECU, make, args.bus, ready_fd=args.ready_fd, realtime=args.realtime, say=say)
     return 0

@@ -12,9 +12,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import NoReturn
 
-from hil.errors import BrakebenchError
-
-INTERRUPTED_EXIT_CODE = 130  # 128 + SIGINT, as a shell reports it
+from hil.errors import INTERRUPTED_EXIT_CODE, BrakebenchError
 
 COMMANDS = (
     "run",
@@ -23,11 +21,13 @@ COMMANDS = (
     "ecu",
     "plant",
     "record",
+    "inject",
     "replay",
     "decode",
     "convert",
     "diff",
     "plot",
+    "bus-analysis",
     "identify",
     "verify",
     "reproduce",
@@ -38,6 +38,7 @@ COMMANDS = (
     "trials",
     "effects",
     "sensitivities",
+    "faults",
 )
 """Subcommands in the order of the help; each is a module of this package."""
 
@@ -56,12 +57,13 @@ def build_parser(commands: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
     parser = Parser(
         prog="brakebench",
         description="CAN-bus brake ECU emulator and hardware-in-the-loop bench.",
-        epilog="Exit codes: 0 ok, 1 an expectation failed, 2 wrong use or input, 3 the bench broke.",
+        epilog="Exit codes: 0 passed, 1 failed, 2 wrong use or input, 3 broken, 4 inconclusive, 5 incomplete, "
+        "130 interrupted.",
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="show program's version number and exit")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in commands:
-        importlib.import_module(f"hil.cli.{name}").add_parser(subparsers)
+        importlib.import_module(f"hil.cli.{name.replace('-', '_')}").add_parser(subparsers)
     return parser
 
 

@@ -6,6 +6,7 @@ import json
 from dataclasses import asdict
 
 from hil.cli.options import add_json
+from hil.errors import BrakebenchError
 
 MEASUREMENTS = ("rt", "plant", "ecu", "codec", "loop", "decode", "explain")
 """Each is a module of hil.validation.perf with ``measure() -> list[Row]``."""
@@ -15,13 +16,17 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser("perf", help="measure beside a peer or a limit, as ratios of one run")
     parser.add_argument("name", choices=MEASUREMENTS, help="what to measure")
+    parser.add_argument("--beside", metavar="FOLDER", help="loop: compare with another checkout of the project instead")
     add_json(parser)
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print the rows."""
-    rows = importlib.import_module(f"hil.validation.perf.{args.name}").measure()
+    module = importlib.import_module(f"hil.validation.perf.{args.name}")
+    if args.beside is not None and args.name != "loop":
+        raise BrakebenchError(f"--beside goes with perf loop, not with perf {args.name}")
+    rows = module.measure() if args.beside is None else module.beside(args.beside)
     if args.json:
         print(json.dumps({"rows": [asdict(row) for row in rows]}, indent=2))
         return 0

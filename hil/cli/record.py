@@ -1,17 +1,22 @@
 """``brakebench record``: append everything on a bus to a candump file."""
 
 import argparse
+import contextlib
 import sys
 from pathlib import Path
 
 from dbc.frame import BusName
-from hil.bench.recorder import FLUSH_PERIOD_NS, Recorder
+from hil.bench.recorder import FLUSH_PERIOD_NS, Recorder, RecorderError
 from hil.bus.channel import bench_channel
 from hil.bus.open import open_bus
 from hil.cli.options import add_bus, add_ready_fd
+from hil.errors import BrakebenchError
+from hil.faults.line import FaultyListener
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop
 from hil.rt.process import StopSignal, end_with_parent, say_ready
+
+TOLD_S = 1.0  # more than a clock that is kept right drifts in a recording
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -28,10 +33,17 @@ def run(args: argparse.Namespace) -> int:
     if args.ready_fd is not None:
         end_with_parent()
     stop = StopSignal()
-    with open_bus(args.bus, BusName.VEHICLE) as vehicle, open_bus(bench_channel(args.bus), BusName.BENCH) as bench:
-        recorder = Recorder(args.out, [vehicle, bench])
+    with contextlib.ExitStack() as stack:
+        with stop.at_once():
+            vehicle = stack.enter_context(open_bus(args.bus, BusName.VEHICLE))
+            bench = stack.enter_context(open_bus(bench_channel(args.bus), BusName.BENCH))
         try:
-            say_ready(args.ready_fd)
+            recorder = Recorder(args.out, [vehicle, FaultyListener(bench, ("RECORDER",))])
+        except RecorderError as error:  # nothing has begun: wrong use
+            raise BrakebenchError(str(error)) from error
+        try:
+            with stop.at_once():
+                say_ready(args.ready_fd)
             for _ in Loop(WallClock(), FLUSH_PERIOD_NS).ticks():
                 recorder.flush()
                 if stop.asked:
@@ -39,5 +51,7 @@ def run(args: argparse.Namespace) -> int:
         finally:
             recorder.close()
     lost = f", {recorder.lost} lost on the way" if recorder.lost else ""
+    if abs(set_s := recorder.clock_set_ns() * 1e-9) > TOLD_S:
+        print(f"the time of day was set by {set_s:+.1f} s meanwhile; stamps go on from the start's", file=sys.stderr)
     print(f"{recorder.frames} frames recorded to {args.out}{lost}", file=sys.stderr)
     return 0

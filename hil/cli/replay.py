@@ -12,9 +12,10 @@ import numpy as np
 
 from hil.bench.playback import LATE_NS, ROLES, Replay, Selection, select
 from hil.cli.options import add_bus, add_json
+from hil.errors import INTERRUPTED_EXIT_CODE, Verdict
 
-INCOMPLETE_EXIT_CODE = 3
-INTERRUPTED_EXIT_CODE = 130  # 128 + SIGINT, as a shell reports it
+MOST_SUPERSEDED = 0.01
+"""Share of the frames that a stall may leave out before the replay says nothing of what hears it; a choice."""
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -25,8 +26,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         description="Send a recorded log back on a bus, each frame at its own time. The channels vehicle and bench of "
         "our own recordings go to the buses of these names, a foreign log's only channel goes to the vehicle bus.",
         epilog="The bus is listened to first: an identifier that somebody else sends is never sent (exit code 2 before "
-        "the start; during the replay that sender's messages are no longer sent: exit code 3 at the end). After a "
-        "stall overdue frames are sent at once, but no more than 20 ms of the past of each cyclic message.",
+        "the start; during the replay that sender's messages are no longer sent: exit code 5, incomplete, at the end). "
+        "After a stall overdue frames are sent at once, but no more than 20 ms of the past of each cyclic message.",
     )
     parser.add_argument("log", type=Path, metavar="LOG", help="candump, ASC, BLF, TRC, MF4, CSV or Parquet log")
     add_bus(parser)
@@ -85,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
         _print_text(facts)
     if stop.interrupted:
         return INTERRUPTED_EXIT_CODE
-    return INCOMPLETE_EXIT_CODE if replay.intruders else 0
+    return Verdict(facts["verdict"]).exit_code
 
 
 def recording_problems(rejected: int, truncated_at: int | None) -> list[str]:
@@ -99,7 +100,10 @@ def result(args: argparse.Namespace, spec: str, in_log: int, selection: Selectio
     served = replay.sent + replay.superseded + sum(replay.refused.values())
     late_ms = replay.lateness_ns * 1e-6
     p50, p99, most = np.percentile(late_ms, (50, 99, 100)).tolist() if late_ms.size else (None, None, None)
+    verdict, reason = judge(selection, replay, served)
     return {
+        "verdict": verdict.value,
+        "reason": reason,
         "log": str(args.log),
         "bus": spec,
         "role": args.role,
@@ -123,9 +127,20 @@ def result(args: argparse.Namespace, spec: str, in_log: int, selection: Selectio
     }
 
 
+def judge(selection: Selection, replay: Replay, served: int) -> tuple[Verdict, str]:
+    """How a replay of which so many frames were dealt with is judged, and why."""
+    reasons = [f"somebody else sends {replay.intruders[0]}"] if replay.intruders else []
+    reasons += ["stopped before the end of the log"] if served < len(selection.time_ns) else []
+    if reasons:
+        return Verdict.INCOMPLETE, "; ".join(reasons)
+    if replay.superseded > MOST_SUPERSEDED * len(selection.time_ns):
+        return Verdict.INCONCLUSIVE, f"{replay.superseded} frames were left out after stalls of this machine"
+    return Verdict.PASSED, ""
+
+
 def _print_text(facts: dict[str, Any]) -> None:
     """Print what happened."""
-    from hil.report.report import Number, Report, Verdict
+    from hil.report.report import Number, Report
     from hil.report.text import print_text
 
     refused = sum(row["frames"] for row in facts["refused"])
@@ -145,11 +160,8 @@ def _print_text(facts: dict[str, Any]) -> None:
     ]
     numbers += [Number(f"Left out: {reason}", count) for reason, count in facts["left_out"].items()]
     numbers += [Number(f"Link: {state}", number) for state, number in facts["link_events"].items()]
-    reasons = [f"somebody else sends {live}" for live in facts["live"][:1]]
-    reasons += ["stopped before the end of the log"] if facts["stopped"] else []
     title = f"Replay of {facts['log']} as {facts['role']} on {facts['bus']}"
-    verdict = Verdict.INCOMPLETE if reasons else None
-    print_text(Report(title, verdict, "; ".join(reasons), tuple(numbers)), sys.stdout)
+    print_text(Report(title, Verdict(facts["verdict"]), facts["reason"], tuple(numbers)), sys.stdout)
 
 
 def _say(text: str) -> None:

@@ -15,7 +15,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--virtual",
         action="store_true",
-        help="virtual time: both nodes in this process, as fast as it goes; the same seed gives the same bytes",
+        help="virtual time: both nodes in this process, as fast as it goes; the same seed gives the same bytes; "
+        "with --bus timed[:BITRATE][,bit_error_rate=P][,queue=fifo] on a CAN bus with real bit times",
     )
     parser.add_argument(
         "--without",
@@ -35,10 +36,17 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 def run(args: argparse.Namespace) -> int:
     """Run, measure, report."""
     from hil.bench.run import run_scenario
+    from hil.bus.timed.line import is_timed
     from hil.errors import BrakebenchError
 
-    if args.virtual and (args.without or args.realtime or args.bus != "auto"):
-        raise BrakebenchError("--virtual has no bus and no processes: leave out --bus, --without and --realtime")
+    timed = is_timed(args.bus)
+    if args.virtual and (args.without or args.realtime or not (timed or args.bus == "auto")):
+        raise BrakebenchError(
+            "--virtual has no processes and no bus but a timed one: leave out --without, --realtime and --bus, "
+            "or give --bus timed"
+        )
+    if timed and not args.virtual:
+        raise BrakebenchError(f"--bus {args.bus}: a timed bus is in virtual time; add --virtual")
     scenario, out = args.scenario, args.out
     if args.extend is not None:
         from hil.bench.run import new_folder

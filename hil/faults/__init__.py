@@ -1,5 +1,5 @@
 """Takes what is to break and when, and gives values and nodes that do so, deterministic by seed: one family a file.
 
-`physical` breaks parts of the car, `frames` what is on its way to the bus. A bus-off and other states of the link are
-no faults from here: the bus reports them (`hil.bus.error_frame`, `dbc.frame.LinkEvent`) and each node handles them.
+`catalogue` lists all faults; `wire` is how they travel on the bench bus; `line` is where they act: between a node and
+its buses, in virtual and in real time. `frames` makes valid frames for scripts of one's own.
 """

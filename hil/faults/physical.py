@@ -6,8 +6,13 @@ The bench sends them to the plant as commands; what each breaks is `PhysicalFaul
 from dataclasses import dataclass
 
 from dbc.bench_messages import PhysicalFault
+from dbc.messages import BrakeMode, Fault
+from hil.faults.bus import DETECT_MS, FOUND
+from hil.faults.fault import Expected, FaultKind, Injection, Side
+from hil.faults.targets import WHEELS, Takes
 
-WHEELS = ("fl", "fr", "rl", "rr")
+__all__ = ["ALL_WHEELS", "FAULTS", "FAULT_NAMES", "WHEELS", "FaultEvent", "events_of"]
+
 ALL_WHEELS = 0b1111
 FAULT_NAMES = tuple(fault.name.lower() for fault in PhysicalFault if fault is not PhysicalFault.NONE)
 
@@ -20,3 +25,57 @@ class FaultEvent:
     fault: PhysicalFault
     wheels: int = ALL_WHEELS
     active: bool = True
+
+
+def events_of(injection: Injection) -> list[FaultEvent]:
+    """Switching on and, where it ends, off; an intermittent fault switches as often as it fits into its time."""
+    fault, wheels = PhysicalFault[injection.kind.name.upper()], injection.target.wheels
+    on_s, off_s, for_s = (injection.number(name) for name in ("on_s", "off_s", "for_s"))
+    begin_s, end_s = max(injection.at_s, 0.0), max(injection.at_s, 0.0) + (for_s or LONGEST_S)
+    cycle_s = on_s + off_s
+    number = int((end_s - begin_s - 1e-9) / cycle_s) + 1 if cycle_s else 1
+    events: list[FaultEvent] = []
+    for k in range(number):
+        start_s = begin_s + k * cycle_s
+        stop_s = min(start_s + on_s, end_s) if cycle_s else end_s
+        events.append(FaultEvent(start_s, fault, wheels))
+        if stop_s < begin_s + LONGEST_S:
+            events.append(FaultEvent(stop_s, fault, wheels, active=False))
+    return events
+
+
+LONGEST_S = 3600.0  # as long as a manoeuvre can be
+_ROW = "motor, axle, battery, brake circuit"
+_MOTORS = Fault.MOTOR_FRONT | Fault.MOTOR_REAR
+_PRESSURES = Fault.EHB_PRESSURE_FRONT | Fault.EHB_PRESSURE_REAR
+_SILENT_MS = 150.0  # a motor that does not do what it is asked, and does not say so (budget of the silent motor)
+
+
+def _kind(
+    number: int, name: str, text: str, trouble: Fault, detect_ms: float | None, usual: tuple[str, ...], braking: bool
+) -> FaultKind:
+    modes = FOUND | {BrakeMode.NORMAL} if detect_ms is None else FOUND
+    reaction = Expected(modes, trouble, detect_ms, None if detect_ms is None else detect_ms + 10.0, braking)
+    return FaultKind(
+        number, name, "physical", text, _ROW, Side.PLANT, Takes.WHEELS, usual, reaction, of_target=False
+    )  # fmt: skip
+
+
+_EACH = ("fl", "fr", "rl", "rr", "front", "rear", "all")
+
+FAULTS: tuple[tuple[FaultKind, None], ...] = (
+    (_kind(70, "motor_dead", "A motor has no torque and says that it has failed.", _MOTORS, DETECT_MS, _EACH, False),
+     None),
+    (_kind(71, "motor_deaf", "A motor gives no torque, its current says so, its state says that it is well.", _MOTORS,
+           _SILENT_MS, ("fl", "rear", "all"), False), None),
+    (_kind(72, "motor_weak", "A motor gives half of what it is asked, and says that it is well.", _MOTORS, _SILENT_MS,
+           ("fl", "all"), False), None),
+    (_kind(73, "motor_stuck_on", "A motor keeps the torque that it had, whatever it is asked.", _MOTORS, None,
+           ("fl", "all"), True), None),
+    (_kind(74, "ehb_circuit_failed", "The pressure of the wheels goes to 0, the brake says that it has failed.",
+           _PRESSURES, DETECT_MS, ("front", "rear"), True), None),
+    (_kind(75, "accumulator_empty", "The brake holds the pressure that it has and can only release; its state says "
+           "that it follows.", _PRESSURES, None, ("all",), True), None),
+    (_kind(76, "battery_refuses_charge", "The battery announces no charge power, and enforces it after its notice.",
+           Fault.BATTERY | _MOTORS, None, ("all",), False), None),
+)  # fmt: skip

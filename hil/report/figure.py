@@ -25,7 +25,9 @@ WIDTH_IN = 11.0
 _EDGE, _LEFT, _GAP = 0.3, 0.55, 0.35  # in: page edge, room for tick labels, between columns
 _PLOT, _CHART, _LANE, _LINE = 1.25, 2.3, 0.34, 0.19  # in: heights of a plot, a chart, a lane, a line of text
 _SOFT, _RULE, _GRID = "#57636F", "#C9D1D9", "#E8ECF0"
-_VERDICT_COLOURS = {"passed": "#1D7A4F", "failed": "#B3261E", "incomplete": "#9A6700"}
+_VERDICT_COLOURS = {
+    "passed": "#1D7A4F", "failed": "#B3261E", "inconclusive": "#9A6700", "incomplete": "#9A6700", "broken": "#B3261E",
+}  # fmt: skip
 _NUMBERS_A_ROW = 7
 _ROW, _LETTER, _MOST_LETTERS = 0.16, 0.062, 36  # in: height of a named row, width of a letter of its name
 _DOT = 5.0  # points: marker of a named row

@@ -13,7 +13,7 @@ from hil.report.thin import samples_per_trace
 from hil.report.units import symbol
 from hil.report.words import clean, number_text, outline, value_text
 
-_VERDICT_MARKS = {"passed": "✓", "failed": "✗", "incomplete": "!"}
+_VERDICT_MARKS = {"passed": "✓", "failed": "✗", "inconclusive": "?", "incomplete": "!", "broken": "✗"}
 
 
 def write_html(report: Report, path: Path) -> None:

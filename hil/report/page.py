@@ -47,7 +47,9 @@ p { margin: 0 0 10px; max-width: 80ch; overflow-wrap: anywhere; }
 header p { font-size: 15px; display: flex; flex-wrap: wrap; gap: 6px 10px; align-items: center; }
 section { margin-top: 26px; }
 .badge { font-weight: 650; font-size: 13px; padding: 3px 11px; border-radius: 4px; color: #fff; white-space: nowrap; }
-.badge.passed { background: #1d7a4f; } .badge.failed { background: #b3261e; } .badge.incomplete { background: #9a6700; }
+.badge.passed { background: #1d7a4f; }
+.badge.failed, .badge.broken { background: #b3261e; }
+.badge.inconclusive, .badge.incomplete { background: #9a6700; }
 
 .cards { display: grid; grid-template-columns: repeat(auto-fill, minmax(178px, 1fr)); gap: 10px; margin: 18px 0 0; }
 .card { border: 1px solid var(--rule); border-radius: 6px; padding: 9px 12px 10px; background: var(--sheet); }

@@ -22,26 +22,18 @@ Names may hold anything a log can hold; the printers escape them.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hil.errors import Verdict as Verdict
 from hil.report.units import Unit
 
 Floats = NDArray[np.float64]
 Style = Literal["line", "demand", "estimate", "points"]
 Severity = Literal["info", "ok", "warning", "error"]
 Cell = str | float | int | bool | None
-
-
-class Verdict(StrEnum):
-    """What a report says of its run."""
-
-    PASSED = "passed"
-    FAILED = "failed"
-    INCOMPLETE = "incomplete"
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,13 @@ from hil.report.words import clean, float_text, number_text, outline, value_text
 MOST_EVENTS = 40  # of a timeline; the page lists all
 _BLOCKS = "▁▂▃▄▅▆▇█"
 _ASCII = str.maketrans(dict(zip(_BLOCKS + "─├┤│·–−✓✗…▲", "..::-=##-[]|.--+x~^", strict=True)) | {"≤": "<=", "≥": ">="})
-_VERDICT_SGR = {Verdict.PASSED: "1;32", Verdict.FAILED: "1;31", Verdict.INCOMPLETE: "1;33"}
+_VERDICT_SGR = {
+    Verdict.PASSED: "1;32",
+    Verdict.FAILED: "1;31",
+    Verdict.INCONCLUSIVE: "1;33",
+    Verdict.INCOMPLETE: "1;33",
+    Verdict.BROKEN: "1;31",
+}
 
 Paint = Callable[[str, str], str]
 

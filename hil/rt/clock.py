@@ -1,6 +1,7 @@
 """The one source of time. Everything else takes a `Clock`."""
 
 import time
+from collections.abc import Callable
 from typing import Protocol
 
 monotonic_ns = time.monotonic_ns
@@ -14,6 +15,33 @@ cpu_time_ns = time.thread_time_ns
 
 process_cpu_time_ns = time.process_time_ns
 """Processor time of this process, all its threads, ns: the same, for work that is shared out over threads."""
+
+
+_READINGS = 3
+_CLOSE_NS = 100_000  # between two readings of the clock around that of the other
+
+
+def clocks_ns(monotonic: Callable[[], int] = monotonic_ns, wall: Callable[[], int] = wall_time_ns) -> tuple[int, int]:
+    """Read both clocks together, again where the thread lost the processor in between.
+
+    Returns
+    -------
+    Monotonic time, and how far the time of day is ahead of it, ns.
+    """
+    best_ns = (1 << 62, 0, 0)
+    for _ in range(_READINGS):
+        before_ns = monotonic()
+        wall_ns = wall()
+        after_ns = monotonic()
+        best_ns = min(best_ns, (after_ns - before_ns, after_ns, wall_ns - (before_ns + after_ns) // 2))
+        if best_ns[0] < _CLOSE_NS:
+            break
+    return best_ns[1:]
+
+
+def step_wall_clock(seconds: float) -> None:
+    """Step the machine's time of day (needs the right to, and ends every other program's notion of it)."""
+    time.clock_settime(time.CLOCK_REALTIME, time.time() + seconds)
 
 
 class Clock(Protocol):

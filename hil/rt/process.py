@@ -29,6 +29,28 @@ def end_with_parent() -> None:
         os.kill(os.getpid(), signal.SIGTERM)
 
 
+def kill_self() -> None:
+    """End this process at once (SIGKILL), as a crash of the machine's would."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def stop_self(for_s: float) -> None:
+    """Stop this process (SIGSTOP) for a time; 0 for good, until somebody continues it.
+
+    A stopped process cannot wake itself: a shell of its own does (SIGCONT), which counts from when it is told to.
+    """
+    waker = None
+    if for_s > 0.0:
+        words = ["sh", "-c", f"read go && sleep {for_s:.6f}; kill -CONT {os.getpid()}"]
+        waker = subprocess.Popen(words, stdin=subprocess.PIPE, start_new_session=True)
+        assert waker.stdin is not None
+        waker.stdin.write(b"go\n")
+        waker.stdin.close()
+    os.kill(os.getpid(), signal.SIGSTOP)
+    if waker is not None:
+        waker.wait()
+
+
 def output_of(command: Sequence[str], timeout_s: float) -> str | None:
     """Return the standard output of a command; None where there is none such, it fails, or does not end in time."""
     try:
@@ -70,12 +92,26 @@ class StopSignal:
     def __init__(self) -> None:
         self.asked = False
         self.interrupted = False
+        self._at_once = False
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._take)
 
     def _take(self, number: int, _frame: object) -> None:
         self.asked = True
         self.interrupted = self.interrupted or number == signal.SIGINT
+        if self._at_once:
+            raise SystemExit(0)
+
+    @contextlib.contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Let a signal end the process by `SystemExit` meanwhile: where it waits for what may never come."""
+        self._at_once = True
+        try:
+            if self.asked:
+                raise SystemExit(0)
+            yield
+        finally:
+            self._at_once = False
 
 
 class Child:

@@ -1,5 +1,6 @@
 """What a process can ask of Linux and Python to be on time, and what it got."""
 
+import contextlib
 import ctypes
 import gc
 import os
@@ -46,8 +47,12 @@ def request_realtime() -> list[Grant]:
 
 
 def _scheduling() -> Grant:
+    """For every thread there is: a driver's threads hold what the node's own waits for."""
+    policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
+        for thread in Path("/proc/self/task").iterdir():
+            with contextlib.suppress(ProcessLookupError):  # it has just ended
+                os.sched_setscheduler(int(thread.name), policy, os.sched_param(PRIORITY))
     except OSError as error:
         help_ = f"allow it: `ulimit -r {PRIORITY}` (limits.conf: rtprio), or setcap cap_sys_nice=ep"
         return Grant("SCHED_FIFO", False, f"{error.strerror}; {help_}")

@@ -9,12 +9,13 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from dbc.bench_messages import PhysicalFault
 from dbc.contract import contract
 from dbc.frame import BusName
 from ecu.parameters.ecu import EcuParameters
-from hil.faults.frames import FrameFaults
-from hil.faults.physical import ALL_WHEELS, FAULT_NAMES, WHEELS, FaultEvent
+from hil.errors import BrakebenchError
+from hil.faults.catalogue import fault_named
+from hil.faults.fault import FROM_THE_FIRST_TICK, MOST_SEEDS, FaultKind, Injection
+from hil.faults.targets import WHEELS, Takes, target_names
 from hil.scenario.effects import Effects, read_effects
 from hil.scenario.expectations import (
     LONGEST_S,
@@ -55,7 +56,6 @@ class Scenario:
     start_order : which node joins when.
     blending : blending factor over time that the bench sends; empty leaves it to the controller.
     faults : what breaks when.
-    frame_faults : what befalls frames on their way.
     effects : what this car has and the baseline has not.
     expectations, signal_expectations : what decides between exit code 0 and 1.
     """
@@ -71,8 +71,7 @@ class Scenario:
     manoeuvre: Manoeuvre
     start_order: StartOrder
     blending: Trace
-    faults: tuple[FaultEvent, ...]
-    frame_faults: tuple[FrameFaults, ...]
+    faults: tuple[Injection, ...]
     effects: Effects
     expectations: tuple[Expectation, ...]
     signal_expectations: tuple[SignalExpectation, ...]
@@ -117,8 +116,10 @@ def load_scenario(name: str) -> Scenario:
         manoeuvre=_manoeuvre(top, start),
         start_order=order,
         blending=_blending(top),
-        faults=tuple(event for table in top.tables("faults") for event in _faults(table)),
-        frame_faults=tuple(_frame_faults(table) for table in top.tables("frame_faults")),
+        faults=(
+            *[_fault(table) for table in top.tables("faults")],
+            *[fault for table in top.tables("frame_faults") for fault in _frame_faults(table)],
+        ),
         effects=read_effects(top.table("effects").rest(), f"{source.name}: effects"),
         expectations=tuple(read_expectations(top.table("expect"))),
         signal_expectations=tuple(read_signal_expectation(table) for table in top.tables("expect_signal")),
@@ -205,31 +206,59 @@ def _blending(top: Table) -> Trace:
     return ((0.0, top.number("blending", None, 0.0, 1.0)),)
 
 
-def _faults(table: Table) -> Iterator[FaultEvent]:
-    """One fault, and its end where ``until_s`` is given."""
-    at_s = table.number("at_s", None, 0.0, LONGEST_S)
-    fault = PhysicalFault[table.choice("fault", FAULT_NAMES).upper()]
-    names = table.names("wheels", WHEELS)
-    wheels = sum(1 << WHEELS.index(name) for name in names) if names else ALL_WHEELS
-    yield FaultEvent(at_s, fault, wheels)
-    if table.has("until_s"):
-        yield FaultEvent(table.number("until_s", None, at_s, LONGEST_S), fault, wheels, active=False)
+def _fault(table: Table) -> Injection:
+    """One fault of the library: what, on what, from when to when, with which numbers."""
+    name = table.text("fault")
+    try:
+        kind = fault_named(name)
+    except BrakebenchError as error:
+        raise ScenarioError(f"{table.at('fault')}: {error}") from error
+    physical = kind.takes is Takes.WHEELS
+    at_s = table.number("at_s", None if physical else FROM_THE_FIRST_TICK, 0.0, LONGEST_S)
+    values = {p.name: table.number(p.name, None, p.low, p.high) for p in kind.all_parameters if table.has(p.name)}
+    begin_s = max(at_s, 0.0)
+    if table.has("until_s") and "for_s" not in values:
+        values["for_s"] = table.number("until_s", None, begin_s, LONGEST_S) - begin_s
+    seed = round(table.number("seed", 0, 0, MOST_SEEDS - 1)) if table.has("seed") else None
+    on = _wheels(table) if physical else _target(table, kind)
     table.done()
+    try:
+        return kind.on(on, at_s=at_s, seed=seed, values=values)
+    except BrakebenchError as error:
+        raise ScenarioError(f"{table.where}: {error}") from error
 
 
-def _frame_faults(table: Table) -> FrameFaults:
-    """Shares of some messages of the vehicle bus, or of all, between two times of the manoeuvre."""
-    known = {spec.name: spec.can_id for spec in contract(BusName.VEHICLE).by_id.values()}
-    from_s = table.number("from_s", -math.inf, 0.0, LONGEST_S)
-    faults = FrameFaults(
-        **{name: table.number(name, 0.0, 0.0, 1.0) for name in ("drop", "duplicate", "stale", "late")},
-        longest_ticks=int(table.number("longest_ticks", 2, 1, 100)),
-        can_ids=frozenset(known[name] for name in table.names("messages", sorted(known))),
-        from_s=from_s,
-        until_s=table.number("until_s", math.inf, max(from_s, 0.0), LONGEST_S),
-    )
+def _wheels(table: Table) -> str:
+    """Wheels by ``wheels`` or, as in the library, by ``on``; all of them where the file does not say."""
+    if table.has("on"):
+        return table.text("on")
+    return ",".join(table.names("wheels", WHEELS)) or "all"
+
+
+def _target(table: Table, kind: FaultKind) -> str | None:
+    """What it acts on; only what has one target needs no word."""
+    names = target_names(kind.takes)
+    return None if len(names) == 1 and not table.has("on") else table.text("on")
+
+
+_FRAME_FAULTS = {"drop": "lost", "duplicate": "doubled", "stale": "stale", "late": "late"}
+
+
+def _frame_faults(table: Table) -> Iterator[Injection]:
+    """Shares of some messages of the vehicle bus, or of all: faults of the library in one table."""
+    known = sorted(spec.name for spec in contract(BusName.VEHICLE).by_id.values())
+    from_s = table.number("from_s", FROM_THE_FIRST_TICK, 0.0, LONGEST_S)
+    shares = {name: table.number(name, 0.0, 0.0, 1.0) for name in _FRAME_FAULTS}
+    ticks = table.number("longest_ticks", 2, 1, 100)
+    messages = table.names("messages", known) or ["ALL"]
+    begin_s = max(from_s, 0.0)
+    for_s = table.number("until_s", math.inf, begin_s, LONGEST_S) - begin_s
     table.done()
-    return faults
+    for name, share in shares.items():
+        values = {"share": share} | ({"ticks": ticks} if name == "late" else {})
+        values |= {"for_s": for_s} if math.isfinite(for_s) else {}
+        for message in messages if share else ():
+            yield fault_named(_FRAME_FAULTS[name]).on(message, at_s=from_s, values=values)
 
 
 def _segment(table: Table) -> RoadSegment:

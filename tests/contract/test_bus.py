@@ -64,8 +64,8 @@ def numbers(received, can_id=0x123):
     return [int.from_bytes(f.data, "big") for f in received if isinstance(f, Frame) and f.can_id == can_id]
 
 
-def lost(received):
-    return sum(e.number for e in received if isinstance(e, LinkEvent) and e.state is LinkState.RX_OVERFLOW)
+def lost(received, state=LinkState.RX_OVERFLOW):
+    return sum(e.number for e in received if isinstance(e, LinkEvent) and e.state is state)
 
 
 def receive_all(bus, count):
@@ -95,20 +95,29 @@ def test_a_frame_arrives_as_it_was_sent(join):
     here.send(sent)
     received = receive_all(there, len(sent))
     assert [f._replace(time_ns=0) for f in received] == sent
-    tolerance_ns = 10**9 if "socketcan" in there.name or "virtual" in there.name else 0  # stamped in wall time
-    for frame in received:
-        assert before_ns - tolerance_ns <= frame.time_ns <= time.monotonic_ns() + tolerance_ns
+    tolerance_ns = 0 if "loopback" in there.name else 25_000_000  # stamped in the time of day, by whoever
+    times_ns = [frame.time_ns for frame in received]
+    assert times_ns == sorted(times_ns)
+    assert before_ns - tolerance_ns <= times_ns[0]
+    assert times_ns[-1] <= time.monotonic_ns()
 
 
 @every_bus
 def test_order_is_kept(join):
     here, there = join(), join()
-    received = []
+    received, refused = [], 0
     for start in range(0, 3000, 30):
         here.send(frames(range(start, start + 30)))
         received += there.receive()
-    received += receive_all(there, 3000 - len(received))
-    assert numbers(received) == list(range(3000))
+    while (news := there.receive(0.5)) or len(received) + refused < 3000:
+        received += news
+        told = here.receive()  # a driver's threads may be run over, where the machine is slow
+        refused += lost(told, LinkState.TX_OVERFLOW)
+        assert news or told, f"{len(received)} arrived, {refused} refused"
+    arrived = numbers(received)
+    assert arrived == sorted(arrived)
+    assert len(arrived) + refused == 3000
+    assert refused == 0 or here.name.startswith("virtual")
 
 
 @every_bus
@@ -134,11 +143,12 @@ def test_all_others_receive(join):
 def test_who_joins_late_receives_what_comes_later(join):
     here, there = join(), join()
     here.send(frames([1]))
+    assert numbers(receive_all(there, 1)) == [1]
     late = join()
     here.send(frames([2]))
-    late.send(frames([3]))
     assert numbers(receive_all(late, 1)) == [2]
-    assert numbers(receive_all(there, 3)) == [1, 2, 3]
+    late.send(frames([3]))
+    assert numbers(receive_all(there, 2)) == [2, 3]
     assert numbers(receive_all(here, 1)) == [3]
 
 
@@ -205,10 +215,16 @@ def test_a_burst_arrives_or_is_reported_lost(join):
         here.send(frames(range(start, start + 50)))
     received = receive_all(there, 1)
     here.send(frames([20_000]))  # a gap shows with what follows it
-    received += receive_all(there, 20_001 - len([f for f in received if isinstance(f, Frame)]) - lost(received))
+    refused, give_up = 0, time.monotonic() + PATIENCE_S
+    while len(numbers(received)) + lost(received) + refused < 20_001 and time.monotonic() < give_up:
+        received += there.receive(0.2)
+        if here.name.startswith(
+            "virtual"
+        ):  # what a driver in threads does not take; on a loopback the receiver is told
+            refused += lost(here.receive(), LinkState.TX_OVERFLOW)
     arrived = numbers(received)
     assert arrived == sorted(arrived)
-    assert len(arrived) + lost(received) == 20_001
+    assert len(arrived) + lost(received) + refused == 20_001
 
 
 @every_bus
@@ -224,7 +240,7 @@ def test_waiting_on_two_buses_at_once(join):
         assert numbers(received) == [1]
 
 
-@across  # the virtual driver has no descriptor
+@every_bus
 def test_a_descriptor_is_readable_while_frames_wait(join):
     here, there = join(), join()
     here.send(frames([1]))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hil.rt.clock import VirtualClock, WallClock, monotonic_ns
+from hil.rt.clock import VirtualClock, WallClock, clocks_ns, monotonic_ns
 
 CLOCKS = {"wall": WallClock, "spinning": lambda: WallClock(spin_ns=200_000), "virtual": lambda: VirtualClock(10**12)}
 
@@ -39,3 +39,21 @@ def test_virtual_time_passes_by_sleeping_only():
 def test_the_wall_clock_is_the_one_frames_are_stamped_with():
     before_ns = monotonic_ns()
     assert before_ns <= WallClock().now_ns() <= monotonic_ns()
+
+
+def test_both_clocks_are_read_together_or_again():
+    now_ns, lost_ns = 0, [0, 70_000_000]  # the processor, in the first reading
+
+    def monotonic():
+        nonlocal now_ns
+        now_ns += 100
+        return now_ns
+
+    def wall():
+        nonlocal now_ns
+        now_ns += lost_ns.pop() if lost_ns else 0
+        return monotonic() + 5_000
+
+    at_ns, ahead_ns = clocks_ns(monotonic, wall)
+    assert at_ns == now_ns
+    assert ahead_ns == 5_000

@@ -60,12 +60,14 @@ def test_the_ecu_alone_brakes_as_recorded(brakebench, start, channel, log, recor
         seen = []
         wait_until(lambda: seen.extend(bus.receive(0.1)) or decoded(seen, BrakeStatus), "frames of the ECU")
         seen.clear()
-        done = brakebench("replay", str(log), "--role", "plant", "--bus", channel, "--json")
+        done = brakebench("replay", str(log), "--role", "plant", "--bus", channel, "--json", check=(0, 4))
         seen += bus.receive(0.0)
     result = json.loads(done.stdout)
     print("replay", {key: result[key] for key in ("sent", "late", "lateness_ms", "duration_s", "log_duration_s")})
     played = {spec.can_id for spec in (spec_of(kind) for kind in (EhbDemandFront, BrakeStatus))}
     assert result["sent"] + result["superseded"] == result["selected"]
+    few = result["superseded"] <= 0.01 * result["selected"]  # a busy machine may leave out more
+    assert (result["verdict"], done.returncode) == (("passed", 0) if few else ("inconclusive", 4))
     assert (result["refused"], result["stopped"]) == ([], False)
     assert played <= {frame.can_id for frame in seen}
     assert BrakeMode.NORMAL in {status.mode for status in decoded(seen, BrakeStatus)}
@@ -94,7 +96,7 @@ def test_a_live_plant_is_not_talked_over(brakebench, start, channel, log):
         done = brakebench("replay", str(log), "--role", "plant", "--bus", channel, check=2)
         assert "somebody already sends 0x" in done.stderr
         assert "stop that one, or replay another role" in done.stderr
-        brakebench("replay", str(log), "--role", "ecu", "--speed", "10", "--bus", channel)
+        brakebench("replay", str(log), "--role", "ecu", "--speed", "10", "--bus", channel, check=(0, 4))
 
 
 def test_who_comes_in_during_the_replay_is_left_alone(start, channel, log):
@@ -105,7 +107,7 @@ def test_who_comes_in_during_the_replay_is_left_alone(start, channel, log):
         bus.send([Frame(BusName.VEHICLE, pedal.can_id, bytes(pedal.length))])
         out, err = process.communicate(timeout=RUN_LIMIT_S)
     result = json.loads(out)
-    assert process.returncode == 3, err
+    assert process.returncode == 5, err
     assert result["live"] == ["0xA0 (BRAKE_PEDAL of DRIVER) on the vehicle bus"]
     assert {row["message"] for row in result["refused"]} == {"BRAKE_PEDAL", "STEERING"}
     assert result["sent"] > 0

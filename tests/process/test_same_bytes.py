@@ -70,4 +70,4 @@ def test_the_same_frames_give_the_same_bytes_in_a_process_and_here(recorded):
         assert payloads[key][: len(frames)] == frames
         assert len(payloads[key]) - len(frames) in (0, 1)
     assert {spec_of(EcuReception).can_id} < {can_id for _, can_id in sent}
-    assert len(sent) == 8
+    assert len(sent) == 9

@@ -256,7 +256,7 @@ def test_a_run_tells_the_states_of_its_link_and_that_bus_off_spoilt_it(
         lines = (adapter.NO_ACK, adapter.NO_ACK, adapter.ERROR_WARNING, adapter.ERROR_PASSIVE, adapter.BUS_OFF)
         for line in lines:
             slcan.device.send_line(line)
-        result = result_of(bench.process, expected=3)
+        result = result_of(bench.process, expected=5)
     seen = witness.stop()
 
     assert result["verdict"] == "incomplete"
@@ -284,3 +284,22 @@ def test_a_run_tells_the_states_of_its_link_and_that_bus_off_spoilt_it(
         f"told by status {told + 1}; "
         f"{result['frames_lost']} of {result['frames_sent']} frames lost in the run; it says: {result['reason']}"
     )
+
+
+def test_a_stalled_adapter_costs_what_its_queue_does_not_take_and_no_more(slcan: SlcanInterface) -> None:
+    with open_bus(f"socketcan:{slcan.name}", BusName.VEHICLE) as bus:
+        sent = 0
+        refused: list[LinkEvent] = []
+        with slcan.device.stalled():
+            for _ in range(200):
+                bus.send([Frame(BusName.VEHICLE, 0x123, (sent + n).to_bytes(4, "big")) for n in range(10)])
+                sent += 10
+                refused += [item for item in bus.receive() if isinstance(item, LinkEvent)]
+        assert {event.state for event in refused} == {LinkState.TX_OVERFLOW}
+        taken = sent - sum(event.number for event in refused)
+        arrived = [int.from_bytes(slcan.device.receive().data, "big") for _ in range(taken)]
+        assert arrived == sorted(arrived)
+        assert taken < sent / 2
+        bus.send([Frame(BusName.VEHICLE, 0x124, b"")])
+        assert slcan.device.receive().can_id == 0x124  # next, and nothing of before after it
+        assert bus.receive() == []

@@ -6,7 +6,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ecu.law.compiled import entry, helper
-from ecu.law.joint.layout import COVARIANCE, FRICTION, MASS, SLID_S, SPEED, STARTED, STUCK, TORQUE, N
+from ecu.law.gravity import GRAVITY_MPS2
+from ecu.law.joint.layout import (
+    BIAS,
+    COVARIANCE,
+    EXPECTED,
+    FRICTION,
+    GRADE,
+    MASS,
+    ODD_S,
+    SPEED,
+    STARTED,
+    STUCK,
+    TORQUE,
+    N,
+)
 from ecu.law.types import Four
 
 Vector = NDArray[np.float64]
@@ -24,9 +38,10 @@ def confidence_of(s: Vector, i: int, full: float) -> float:
 @entry
 def read_estimates(
     s: Vector, full: float
-) -> tuple[bool, float, Four, Four, Four, float, tuple[bool, bool, bool, bool], bool]:
+) -> tuple[bool, float, Four, Four, Four, float, tuple[bool, bool, bool, bool], bool, float, float]:
     """Whether it has started, speed, wheel torques, pad friction and its confidence, mass, wheels that do not turn as
-    the car moves, whether the accelerometer is stuck.
+    the car moves, whether the accelerometer is stuck, what the accelerometer should show by the torques,
+    and what it shows of offset and grade, m/s2.
 
     Parameters
     ----------
@@ -41,10 +56,12 @@ def read_estimates(
         (confidence_of(s, 0, full), confidence_of(s, 1, full), confidence_of(s, 2, full), confidence_of(s, 3, full)),
         s[MASS],
         (
-            s[SLID_S] > IMPLAUSIBLE_S,
-            s[SLID_S + 1] > IMPLAUSIBLE_S,
-            s[SLID_S + 2] > IMPLAUSIBLE_S,
-            s[SLID_S + 3] > IMPLAUSIBLE_S,
+            s[ODD_S] > IMPLAUSIBLE_S,
+            s[ODD_S + 1] > IMPLAUSIBLE_S,
+            s[ODD_S + 2] > IMPLAUSIBLE_S,
+            s[ODD_S + 3] > IMPLAUSIBLE_S,
         ),
         s[STUCK] != 0.0,
+        s[EXPECTED],
+        s[BIAS] + GRAVITY_MPS2 * s[GRADE],
     )

@@ -12,8 +12,10 @@ from ecu.law.joint.layout import (
     AX,
     AY,
     BIAS,
+    EXPECTED,
     FORCE_LAG,
     GRADE,
+    HOLD,
     LAST_WHEEL,
     LOAD_ACCELERATION,
     LOCKED,
@@ -49,7 +51,7 @@ from ecu.law.joint.motion import (
     watch_accelerometer,
     wheel_states,
 )
-from ecu.law.joint.sliding import LOST_S, reinitialise_speed, torque_of_standing_wheels, watch_wheel
+from ecu.law.joint.sliding import LOST_S, count_odd_wheels, reinitialise_speed, torque_of_standing_wheels, watch_wheel
 from ecu.law.joint.torque import track_pressure_zero, update_torques, wheel_force
 
 Vector = NDArray[np.float64]
@@ -106,6 +108,8 @@ def watch_wheels(
         s[LAST_WHEEL + i] = 0.0 if isnan(omega) else omega
         s[SLID_S + i] = s[SLID_S + i] + dt if s[SLIDING + i] > 0.0 else 0.0
         sliding = sliding or s[SLIDING + i] > 0.0
+    if z[HOLD] == 0.0:
+        count_odd_wheels(s, dt)
     return sliding
 
 
@@ -122,7 +126,7 @@ def compare_wheels(
         ground = along[i] + s[SPEED] - speed  # what the measurements so far have changed
         compare_wheel_speed(
             s, p, i, z[WHEEL + i], ground, loads[i], acceleration, force_rate, learning and fast and pressures,
-            applied, not learning,
+            applied, not (learning and pressures),
         )  # fmt: skip
 
 
@@ -140,7 +144,8 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     -------
     new state; ``TORQUE`` holds the wheel torques, Nm, negative braking.
 
-    Without a believable acceleration the speed comes from the wheels and the force balance, and nothing is learned.
+    Without a believable acceleration the speed comes from the wheels and the force balance, and nothing is learned; nor
+    is anything while a pressure or a motor torque is missing.
     """
     s = s.copy()
     fastest = fastest_wheel(z)
@@ -155,7 +160,7 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
     ay = 0.0 if isnan(z[AY]) else z[AY]
     steer = 0.0 if isnan(z[STEER]) else z[STEER] / p[P_STEER_RATIO]
 
-    pressures = track_pressure_zero(s, z, p, dt)
+    pressures = track_pressure_zero(s, z, p, dt) and z[HOLD] == 0.0
     force, applied = update_torques(s, z, p, dt)
     force_rate = (force - s[FORCE_LAG]) / dt
     s[FORCE_LAG] = force
@@ -181,6 +186,7 @@ def joint_step(s: Vector, z: Vector, p: Vector, dt: float) -> Vector:
 
     # bound
     keep_in_bounds(s)
+    s[EXPECTED] = expected_acceleration(s, p, force, side_n) + s[BIAS]
     if body and s[LOCKED] + s[LOCKED + 1] + s[LOCKED + 2] + s[LOCKED + 3] > 0.0:
         torque_of_standing_wheels(s, p, ax, acceleration, loads, spin)
     return s

@@ -19,12 +19,16 @@ SLID_S = SPIN_RATE + 4  # how long a wheel has been sliding by now
 PITCH, PITCH_RATE, LOAD_ACCELERATION, FORCE_LAG, RELEASED_S, STARTED, REJECTED_S = (SLID_S + 4 + i for i in range(7))
 LAST_AX = SLID_S + 11  # for how long it has repeated itself, when that was last looked at and the wheels' speed then
 REPEATED_S, LOOKED_S, SPEED_THEN, STUCK = LAST_AX + 1, LAST_AX + 2, LAST_AX + 3, LAST_AX + 4
-SIZE = LAST_AX + 5
+ODD_S = LAST_AX + 5  # how long a wheel has been sliding alone or with one other, less than it has rolled since
+EXPECTED = ODD_S + 4  # what the accelerometer should show by the wheels' torques, m/s2
+SIZE = EXPECTED + 1
 
 # inputs
 AX, AY, YAW_RATE, STEER, DEMAND = 0, 1, 2, 3, 4
 WHEEL, PRESSURE, MOTOR = 5, 9, 13
-INPUTS = 17
+AVAILABLE, ASKED_PRESSURE, ASKED_MOTOR = 17, 21, 25  # of the actuators; used by the plausibility checks only
+HOLD = 29  # above 0: some value stands in for one that is missing or wrong, nothing may be learned from the sample
+INPUTS = 30
 
 # parameters
 (P_MASS, P_BASE, P_FRONT, P_HEIGHT, P_RADIUS, P_ARM, P_INERTIA, P_DRAG, P_ROLL, P_DIVE, P_STEER_RATIO) = range(11)

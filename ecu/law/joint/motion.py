@@ -42,6 +42,7 @@ Vector = NDArray[np.float64]
 
 REPEAT_S = 0.2
 CONTRADICTION_MPS2 = 0.5
+NO_VALUE = 1e9
 
 
 @helper
@@ -66,15 +67,14 @@ def watch_accelerometer(s: Vector, z: Vector, p: Vector, dt: float) -> bool:
     A living one never repeats itself for long while the car moves. One that does, while the wheels tell of another
     acceleration, is stuck until its value changes; what repeats itself (`REPEATED_S`) teaches nothing meanwhile.
     """
-    wheels, number = 0.0, 0
+    number = 0
     for i in range(4):
         if not isnan(z[WHEEL + i]):
-            wheels += z[WHEEL + i]
             number += 1
     if isnan(z[AX]) or number == 0:
-        s[REPEATED_S], s[STUCK] = 0.0, 0.0
+        s[LAST_AX], s[REPEATED_S], s[STUCK] = NO_VALUE, 0.0, 0.0
         return not isnan(z[AX])
-    speed = wheels / number * p[P_RADIUS]
+    speed = median_wheel(z) * p[P_RADIUS]
     if z[AX] != s[LAST_AX]:
         s[LAST_AX], s[REPEATED_S], s[LOOKED_S], s[SPEED_THEN], s[STUCK] = z[AX], 0.0, 0.0, speed, 0.0
         return True

@@ -10,6 +10,7 @@ from ecu.law.joint.layout import (
     LAST_WHEEL,
     LOCKED,
     MASS,
+    ODD_S,
     P_ARM,
     P_DRAG,
     P_INERTIA,
@@ -31,6 +32,7 @@ from ecu.law.joint.torque import wheel_force
 Vector = NDArray[np.float64]
 
 SLIDING_HOLD_S = 0.15
+ODD_MOST_S = 2.0  # of an odd wheel: two seconds of rolling make it a good one again
 LOST_S, AGREE = 0.3, 0.03  # all wheels "slide" for so long and agree so well: it is the speed that is wrong
 COARSE_MPS = 0.1  # what tooth sensing can be off at low speed
 LOCKED_SHARE = 0.15  # of the speed of the car: slower than that a wheel may be locked
@@ -67,6 +69,20 @@ def watch_wheel(s: Vector, p: Vector, i: int, omega: float, ground: float, expec
 
 
 @helper
+def count_odd_wheels(s: Vector, dt: float) -> None:
+    """Count how long each wheel slides, at half the rate down again: more than two at once are no faults of sensors."""
+    number = 0
+    for i in range(4):
+        if s[SLIDING + i] > 0.0:
+            number += 1
+    for i in range(4):
+        if s[SLIDING + i] == 0.0:
+            s[ODD_S + i] = max(s[ODD_S + i] - 0.5 * dt, 0.0)
+        elif number < 3:
+            s[ODD_S + i] = min(s[ODD_S + i] + dt, ODD_MOST_S)
+
+
+@helper
 def reinitialise_speed(s: Vector, z: Vector, p: Vector) -> None:
     """Take the speed from the wheels where all of them seem to slide and yet agree, as after driving off."""
     mean = 0.25 * (z[WHEEL] + z[WHEEL + 1] + z[WHEEL + 2] + z[WHEEL + 3])
@@ -81,7 +97,7 @@ def reinitialise_speed(s: Vector, z: Vector, p: Vector) -> None:
         s[COVARIANCE + j * N + SPEED] = 0.0
     s[COVARIANCE] = 0.25
     for i in range(4):
-        s[SLIDING + i], s[SLID_S + i], s[LOCKED + i] = 0.0, 0.0, 0.0
+        s[SLIDING + i], s[SLID_S + i], s[LOCKED + i], s[ODD_S + i] = 0.0, 0.0, 0.0, 0.0
 
 
 @helper

@@ -10,6 +10,7 @@ from ecu.law.joint.layout import (
     APPLIED_PA,
     DEMAND,
     FRICTION,
+    HOLD,
     MOTOR,
     MOTOR_LAG,
     P_ARM,
@@ -47,7 +48,7 @@ def track_pressure_zero(s: Vector, z: Vector, p: Vector, dt: float) -> bool:
         elif abs(z[PRESSURE + i]) > RELEASED_PA:
             settled = False
     s[RELEASED_S] = s[RELEASED_S] + dt if settled else 0.0
-    if s[RELEASED_S] > SETTLED_S:
+    if s[RELEASED_S] > SETTLED_S and z[HOLD] == 0.0:
         share = min(dt / p[P_ZERO_TIME], 1.0)
         for i in range(4):
             if not isnan(z[PRESSURE + i]):

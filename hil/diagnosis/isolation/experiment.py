@@ -183,7 +183,7 @@ def _library() -> tuple[str, ...]:
 
 def _is_eligible(scenario: Scenario) -> bool:
     plan = scenario.manoeuvre
-    sound = not scenario.faults and not scenario.frame_faults and not scenario.effects.on
+    sound = not scenario.faults and not scenario.effects.on
     flat = all(part.grade == 0.0 and part.friction_left == part.friction_right == 1.0 for part in plan.road)
     return sound and flat and not plan.pedal and not scenario.blending and plan.duration_s <= _MAX_DURATION_S
 

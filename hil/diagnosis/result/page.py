@@ -43,7 +43,7 @@ def build_report(answer: Answer, sources: Sequence[str]) -> Report:
     verdict = content["verdict"]
     return Report(
         title="Measured data against the simulation",
-        verdict={"none": Verdict.PASSED, "named": None}.get(verdict, Verdict.INCOMPLETE),
+        verdict={"none": Verdict.PASSED, "named": None}.get(verdict, Verdict.INCONCLUSIVE),
         reason=_headline(content),
         numbers=tuple(_numbers(answer)),
         sections=(

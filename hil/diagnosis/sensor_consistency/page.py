@@ -32,7 +32,7 @@ def build_report(answer: Consistency, sources: Sequence[str]) -> Report:
     content = answer.json
     return Report(
         title="Measured sensors against the car's own motion",
-        verdict={"none": Verdict.PASSED, "named": None}.get(content["verdict"], Verdict.INCOMPLETE),
+        verdict={"none": Verdict.PASSED, "named": None}.get(content["verdict"], Verdict.INCONCLUSIVE),
         reason=_headline(answer) or _SENTENCE[content["verdict"]],
         numbers=tuple(_numbers(answer)),
         sections=(_overview(answer), *_details(answer), _parameters(answer), _relations(answer), _limits(answer)),

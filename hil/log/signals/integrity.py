@@ -1,6 +1,7 @@
 """End-to-end protection checked over recorded frames, in columns and chunk after chunk."""
 
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import cache
 
 import numpy as np
@@ -13,6 +14,7 @@ from hil.log.frames import FrameFlag, Recording
 
 Bytes = npt.NDArray[np.uint8]
 
+_MOST_LOST = 2  # in a row before a receiver takes a frame for out of sequence, as of `dbc.e2e.Checker`
 LEGACY_SHARE = 0.9
 """From this share of legacy check values on, a message counts as recorded with them."""
 
@@ -142,6 +144,47 @@ def _pair(following: int, first: bool) -> Bytes:
     """
     low = np.arange(256, dtype=np.uint8) if first else _alone(following)
     return (low[np.newaxis, :] ^ _alone(following - 1)[:, np.newaxis]).ravel()
+
+
+class FrameUse(IntEnum):
+    """What a receiver does with one frame of a protected message (`dbc.e2e.Checker`)."""
+
+    USED = 0
+    CORRUPT = 1  # wrong check value, length or counter 15
+    REPEATED = 2  # with the counter of the one before
+    OUT_OF_SEQUENCE = 3  # more than two frames missing before it without a gap in time: another sender's
+
+
+def use_of_frames(
+    data: Bytes, length: Bytes, time_ns: npt.NDArray[np.int64], data_id: int, message_length: int, gap_ns: int
+) -> Bytes:
+    """Tell of each frame of one message whether a receiver uses it: `FrameUse`, uint8 (n,).
+
+    Unlike a receiver it takes the first sound frame, and the first one after a gap: nothing contradicts these. Where
+    nearly all frames carry the legacy check value, that one counts.
+
+    Parameters
+    ----------
+    data, length, data_id, message_length : as of `IntegrityCounter`.
+    time_ns : int64 (n,), stamps.
+    gap_ns : time without a sound frame after which a sequence may begin anew, ns.
+    """
+    use = np.full(len(data), FrameUse.CORRUPT, np.uint8)
+    counter = IntegrityCounter(data_id, message_length)
+    counter.add(data, length)
+    if counter.result.received == counter.result.corrupt and not counter.result.is_legacy:
+        return use
+    difference = counter._difference(data)
+    wanted = e2e.legacy_difference(message_length) if counter.result.is_legacy else 0
+    count = (data[:, 1] & 0x0F).astype(np.int8)
+    sound = np.flatnonzero((length == message_length) & (count < e2e.COUNTER_MODULUS) & (difference == wanted))
+    steps = np.diff(count[sound]) % e2e.COUNTER_MODULUS
+    in_sequence = ((steps > 0) & (steps <= _MOST_LOST + 1)) | (np.diff(time_ns[sound]) >= gap_ns)
+    use[sound[:1]] = FrameUse.USED
+    use[sound[1:]] = np.where(
+        in_sequence, FrameUse.USED, np.where(steps == 0, FrameUse.REPEATED, FrameUse.OUT_OF_SEQUENCE)
+    )
+    return use
 
 
 def check_frames(data: Bytes, length: Bytes, data_id: int, message_length: int, legacy: bool = False) -> Integrity:

@@ -9,8 +9,8 @@ from plant.injection_points import INJECTION_POINTS
 from plant.open_loop_manoeuvres import MANOEUVRES
 
 NOT_HERE = {
-    67: ("jitter", "random latency of frames: `late` of a scenario's `[[frame_faults]]`"),
-    68: ("frame_drop", "lost, doubled and stale frames: `drop`, `duplicate`, `stale` of `[[frame_faults]]`"),
+    67: ("jitter", "random latency of frames: the fault `late` of [docs/faults.md](faults.md)"),
+    68: ("frame_drop", "lost, doubled and stale frames: the faults `lost`, `doubled`, `stale` there"),
 }
 """Rows of the catalogue that are no effect of the plant, and where they are."""
 

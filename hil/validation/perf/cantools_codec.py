@@ -2,20 +2,29 @@
 
 import contextlib
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cache
+from types import ModuleType
 from typing import Any
 
 import cantools
+import numpy as np
 from cantools.database import Database
 from cantools.database.can import Message as DbcMessage
 from cantools.database.namedsignalvalue import NamedSignalValue
+from numpy.typing import NDArray
 
 from dbc import e2e, exchange
+from dbc.batch import Batch
 from dbc.codec import SNA
+from dbc.compiled import PAYLOAD
 from dbc.contract import Message, MessageSpec, database_text, spec_of
-from dbc.frame import BusName
+from dbc.exchange import Transmitter
+from dbc.frame import BusName, Frame
+from dbc.intake import BAD_IN_ROW, FRESH, LAST_VALID_NS, RECEIVED, VALID_IN_ROW, WELL, WORD, Intake
+from ecu import node
+from plant import reports
 
 
 @cache
@@ -77,11 +86,56 @@ def cantools_spec(message_type: type[Message]) -> MessageSpec:
     return replace(spec, encode=encoder(spec, message), decode=decoder(spec, message))
 
 
+class _CantoolsBatch(Batch):
+    """A batch whose frames go through cantools, one after the other."""
+
+    def __init__(self, types: Iterable[type[Message]]) -> None:
+        super().__init__(types := tuple(types))
+        self._types = types
+        self._transmitter = Transmitter()
+
+    def frames(self, now_ns: int) -> list[Frame]:
+        messages = (
+            tuple.__new__(kind, [None if math.isnan(value) else value for value in self.of(kind).tolist()])
+            for kind in self._types
+            if self._transmitter.due(kind, now_ns)
+        )
+        return self._transmitter.frames(now_ns, messages)
+
+
+class _CantoolsIntake(Intake):
+    """An intake that takes no frame as usual: each is checked and decoded alone, by cantools."""
+
+    def take(self, now_ns: int, begin: int, frames: NDArray[np.uint8]) -> int:
+        if begin == 0:
+            for memory in self.memory:
+                memory[FRESH] = memory[WELL] = 0
+        return min(begin, len(frames) // (1 + PAYLOAD))
+
+    def keep(self, now_ns: int, index: int, payload: bytes) -> None:
+        message = self.specs[index].decode(payload)
+        self.of(index)[:] = [math.nan if value is None else value for value in message]
+        memory = self.memory[index]
+        memory[FRESH] = memory[RECEIVED] = 1
+        memory[VALID_IN_ROW] += 1
+        memory[BAD_IN_ROW] = 0
+        memory[LAST_VALID_NS] = now_ns
+        memory[WORD] = int.from_bytes(payload, "little", signed=True)
+
+
+_REPLACED: tuple[tuple[ModuleType, str, Any], ...] = (
+    (exchange, "spec_of", cantools_spec),
+    (exchange, "Intake", _CantoolsIntake),
+    (reports, "Batch", _CantoolsBatch),
+    (node, "Batch", _CantoolsBatch),
+)
+
+
 @contextlib.contextmanager
 def cantools_inside() -> Iterator[None]:
-    """Receivers and transmitters use cantools in here."""
-    vars(exchange)["spec_of"] = cantools_spec
-    try:
+    """Receivers, transmitters and batches that are made in here use cantools."""
+    with contextlib.ExitStack() as stack:
+        for module, name, other in _REPLACED:
+            stack.callback(vars(module).__setitem__, name, vars(module)[name])
+            vars(module)[name] = other
         yield
-    finally:
-        vars(exchange)["spec_of"] = spec_of

@@ -181,7 +181,7 @@ def _car(period_ns: int) -> list[list[Frame]]:
     result: list[list[Frame]] = []
     for n in range(TICKS):
         w = 65.0 - 0.5 * n / TICKS
-        motor = (MotorStatusFront, MotorStatusRear)
+        motor = ((MotorStatusFront, -197.0), (MotorStatusRear, -85.0))  # about what the controller asks for
         messages = [
             BrakePedal(0.6, 0.6),
             WheelSpeedFront(w, w),
@@ -189,7 +189,7 @@ def _car(period_ns: int) -> list[list[Frame]]:
             BodyMotion(-3.2 + 0.01 * (n % 3), 0.0, 0.0),  # a living sensor never repeats itself for long
             EhbPressureFront(8e5, 8e5, EhbState.DEMAND),
             EhbPressureRear(8e5, 8e5, EhbState.DEMAND),
-            *(kind(-180.0, 600.0, MotorState.OK, -180.0, 600.0, MotorState.OK) for kind in motor),
+            *(kind(a, 600.0, MotorState.OK, a, 600.0, MotorState.OK) for kind, a in motor),
             Steering(0.0),
             BatteryStatus(0.5, 2e5),
             StimulusEcu(0.7),

@@ -1,36 +1,44 @@
 """The whole closed loop in virtual time beside the same loop over cantools and python-can's virtual bus.
 
 Same plant, same law, same protection, same frames; the other side encodes and decodes with cantools and sends every
-frame through python-can. The share of each part is timed in the same runs.
+frame through python-can. The share of each part is timed in the same runs. `beside` compares with another checkout.
 """
 
 import contextlib
+import os
 import statistics
+import subprocess
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import can
 
 import ecu.node
+from dbc.batch import Batch
 from dbc.exchange import Receiver, Transmitter
 from dbc.frame import BusName, Frame, Received
 from hil.bench.stimulus import StimulusNode
 from hil.bench.virtual import members, own_nodes
+from hil.errors import BrakebenchError
 from hil.rt.clock import cpu_time_ns, monotonic_ns
 from hil.rt.lockstep import Member, lockstep
 from hil.scenario.scenario import load_scenario
 from hil.validation.perf.cantools_codec import cantools_inside
-from hil.validation.perf.row import Row
+from hil.validation.perf.row import Row, paired
 from plant.node import PlantNode
 
 SCENARIO = "stop72_blend70"
 SIMULATED_S = 2.0
 PAIRS = 9
+BESIDE_PAIRS = 15
 _PARTS: tuple[tuple[str, Any, str], ...] = (
     ("vehicle model", PlantNode, "_advance"),
     ("control law", ecu.node, "step"),
     ("send: encode, protect", Transmitter, "frames"),
+    ("send: encode, protect", Batch, "frames"),
     ("receive: check, decode", Receiver, "accept"),
 )
 
@@ -155,6 +163,54 @@ def measure() -> list[Row]:
     factor = 1e4 / whole
     rows.append(Row("simulated time over time taken", factor, 1.0, "real time", factor, "s/s"))
     return rows
+
+
+class _Checkout:
+    """The loop of a checkout of the project, in a process of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        if not (folder / "hil").is_dir():
+            raise BrakebenchError(f"{folder}: expected a checkout of the project, found no folder hil in it")
+        child = Path(__file__).with_name("loop_child.py")
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", str(child)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+            cwd=folder, env=os.environ | {"PYTHONPATH": str(folder)},
+        )  # fmt: skip
+        found = self._answer()
+        if Path(found) != folder:
+            self.close()
+            raise BrakebenchError(f"{folder}: its process ran the code of {found}")
+
+    def _answer(self) -> str:
+        assert self._process.stdout is not None
+        answer = self._process.stdout.readline().strip()
+        if not answer:
+            self.close()
+            raise BrakebenchError("the process of a checkout ended; what it said is above")
+        return answer
+
+    def per_tick_us(self) -> float:
+        """Processor time of 10 ms of simulated time, us."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{round(SIMULATED_S * 100)}\n")
+        self._process.stdin.flush()
+        return float(self._answer())
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.communicate()
+
+
+def beside(folder: str) -> list[Row]:
+    """The whole loop beside that of another checkout of the project; the two take turns, each in its own process."""
+    with contextlib.ExitStack() as stack:
+        pair = []
+        for path in (Path(folder).resolve(), Path(__file__).resolve().parents[3]):
+            pair.append(_Checkout(path))
+            stack.callback(pair[-1].close)
+        other, ours = pair
+        name, other_is = "closed loop, 10 ms", f"the checkout in {folder}"
+        return [paired(name, ours.per_tick_us, other.per_tick_us, other_is, "us", pairs=BESIDE_PAIRS)]
 
 
 def _row(name: str, mine: Sequence[float], other: Sequence[float], other_is: str) -> Row:

@@ -17,6 +17,7 @@ CYCLES_MS = {
     "EHB_PRESSURE_FRONT": 10, "EHB_PRESSURE_REAR": 10, "MOTOR_STATUS_FRONT": 10, "MOTOR_STATUS_REAR": 10,
     "BATTERY_STATUS": 100, "EHB_DEMAND_FRONT": 10, "EHB_DEMAND_REAR": 10, "MOTOR_DEMAND_FRONT": 10,
     "MOTOR_DEMAND_REAR": 10, "BRAKE_STATUS": 20, "BRAKE_ESTIMATE_FRONT": 20, "BRAKE_ESTIMATE_REAR": 20,
+    "BRAKE_TROUBLE_CODE": 100,
 }  # fmt: skip
 
 
@@ -74,7 +75,7 @@ def test_identifiers_order_by_priority():
     groups = ["BRAKE_PEDAL", "EHB_DEMAND", "MOTOR_DEMAND", "WHEEL_SPEED", "BODY_MOTION", "EHB_PRESSURE", "MOTOR_STATUS"]
     positions = [min(i for i, name in enumerate(order) if name.startswith(group)) for group in groups]
     assert positions == sorted(positions)
-    assert order[-1].startswith("BRAKE_ESTIMATE")
+    assert [name.rpartition("_")[0] for name in order[-3:]] == ["BRAKE_ESTIMATE", "BRAKE_ESTIMATE", "BRAKE_TROUBLE"]
 
 
 def test_the_ecu_receives_no_truth():

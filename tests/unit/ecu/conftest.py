@@ -4,6 +4,7 @@ from importlib import resources
 import pytest
 
 from dbc.bench_messages import StimulusEcu
+from dbc.contract import spec_of
 from dbc.exchange import Transmitter
 from dbc.frame import Frame
 from dbc.messages import (
@@ -13,6 +14,8 @@ from dbc.messages import (
     EhbPressureFront,
     EhbPressureRear,
     EhbState,
+    MotorDemandFront,
+    MotorDemandRear,
     MotorState,
     MotorStatusFront,
     MotorStatusRear,
@@ -67,12 +70,22 @@ class Car:
         self.blending: float | None = None
         self.charge_power_w: float | None = 200e3
         self.available_nm = 700.0
+        self.current_a = [0.0, 0.0, 0.0, 0.0]  # as demanded, 1.75 Nm/A
         self.silent: set[type] = set()
         self.transmitter = Transmitter()
 
+    def follow(self, sent: list[Frame]) -> None:
+        """Give the motor torques that were sent."""
+        for frame in sent:
+            for axle, kind in enumerate((MotorDemandFront, MotorDemandRear)):
+                spec = spec_of(kind)
+                if (frame.bus, frame.can_id) == (spec.bus, spec.can_id):
+                    self.current_a[2 * axle : 2 * axle + 2] = [(nm or 0.0) / 1.75 for nm in spec.decode(frame.data)]
+
     def frames(self, now_ns: int) -> list[Frame]:
         w = self.wheel_speed
-        state = [MotorState.FAILED if i in self.failed_wheels else MotorState.OK for i in range(4)]
+        i = [0.0 if wheel in self.failed_wheels else current for wheel, current in enumerate(self.current_a)]
+        state = [MotorState.FAILED if k in self.failed_wheels else MotorState.OK for k in range(4)]
         messages = [
             BrakePedal(*self.pedal),
             WheelSpeedFront(w, w),
@@ -80,8 +93,8 @@ class Car:
             BodyMotion(-0.2, 0.0, 0.0),
             EhbPressureFront(0.0, 0.0, self.ehb_state),
             EhbPressureRear(0.0, 0.0, self.ehb_state),
-            MotorStatusFront(0.0, self.available_nm, state[0], 0.0, self.available_nm, state[1]),
-            MotorStatusRear(0.0, self.available_nm, state[2], 0.0, self.available_nm, state[3]),
+            MotorStatusFront(i[0], self.available_nm, state[0], i[1], self.available_nm, state[1]),
+            MotorStatusRear(i[2], self.available_nm, state[2], i[3], self.available_nm, state[3]),
             Steering(0.0),
             BatteryStatus(0.5, self.charge_power_w),
             StimulusEcu(self.blending),
@@ -101,6 +114,7 @@ class Rig:
             now = self.tick * TICK_NS
             sent = self.node.step(now, [*self.waiting, *(extra or [])])
             self.waiting = self.car.frames(now)
+            self.car.follow(sent)
             self.tick += 1
         return sent
 

@@ -1,5 +1,4 @@
 import itertools
-import math
 
 import pytest
 
@@ -16,29 +15,6 @@ def test_pedal_map_is_progressive_and_zero_in_the_free_travel(parameters):
     assert values[:6] == [0.0] * 6
     assert all(later >= earlier - 1e-12 for earlier, later in itertools.pairwise(steps))
     assert base_brake.reference_deceleration(1.4, parameters.pedal) == values[-1]
-
-
-@pytest.mark.parametrize(
-    ("one", "two", "lost", "travel"),
-    [
-        (0.5, 0.52, False, 0.51),
-        (0.5, 0.1, False, 0.5),
-        (0.1, 0.5, False, 0.5),
-        (math.nan, 0.3, False, 0.3),
-        (0.3, math.nan, False, 0.3),
-    ],
-)
-def test_pedal_channels(good_inputs, one, two, lost, travel):
-    reading = base_brake.read_pedal(good_inputs._replace(pedal_1=one, pedal_2=two), lost, 0.06)
-    assert reading.travel == pytest.approx(travel)
-    assert reading.channels_disagree == (abs(one - two) > 0.06)
-
-
-def test_no_pedal_channel_gives_no_travel(good_inputs):
-    assert math.isnan(base_brake.read_pedal(good_inputs, True, 0.06).travel)
-    assert math.isnan(
-        base_brake.read_pedal(good_inputs._replace(pedal_1=math.nan, pedal_2=math.nan), False, 0.06).travel
-    )
 
 
 def test_brake_torque_gives_the_demanded_deceleration(parameters):

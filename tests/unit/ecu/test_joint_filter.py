@@ -50,7 +50,7 @@ class SmallCar:
             slip = force / stiffness * (1 + 0.38 * (force / (1.19 * loads)) ** 2)  # Magic Formula to third order
             late = 0.005 + math.pi * RADIUS / 48 / self.v  # half a sample and half a tooth
             omega = (self.v - late * a) * (1 + slip) / RADIUS
-            z = np.zeros(17)
+            z = np.zeros(joint.INPUTS)
             z[joint.AX] = felt - 9.80665 * self.pitch + self.bias + noise * 0.02 * self.rng.normal()
             z[joint.DEMAND] = demand
             z[joint.WHEEL : joint.WHEEL + 4] = omega * (1 + noise * 1e-3 * self.rng.normal(size=4))
@@ -143,7 +143,7 @@ def test_missing_signals_leave_the_friction_alone(parameters, lost):
     car = SmallCar(parameters)
     car.run(1.0)
     friction = car.run(1.0, 25e5, demand=3.2)[FRICTION].copy()
-    z = np.zeros(17)
+    z = np.zeros(joint.INPUTS)
     z[joint.AX], z[joint.DEMAND] = -3.3, 3.2
     z[joint.WHEEL : joint.WHEEL + 4] = car.v / RADIUS * 0.99
     z[joint.PRESSURE : joint.PRESSURE + 4] = 25e5
@@ -164,7 +164,7 @@ def test_a_locked_wheel_gives_what_the_road_gives(parameters):
     for k in range(40):  # a road of 0.2 under all wheels: the front wheels spin down within 0.25 s and stand
         speed -= 1.6 * DT
         omega = max(omega - 2.4, 0.0)
-        z = np.zeros(17)
+        z = np.zeros(joint.INPUTS)
         z[joint.AX], z[joint.DEMAND] = -1.6 + 9.80665 * 0.00231 * -1.6 + 0.001 * (k % 2), 3.2
         z[joint.WHEEL : joint.WHEEL + 4] = [omega, omega, speed / RADIUS * 0.99, speed / RADIUS * 0.99]
         z[joint.PRESSURE : joint.PRESSURE + 4] = 25e5
@@ -179,14 +179,14 @@ def test_a_locked_wheel_gives_what_the_road_gives(parameters):
 def test_the_same_source_runs_uncompiled(parameters):
     car = SmallCar(parameters)
     car.run(0.5)
-    z = np.zeros(17)
+    z = np.zeros(joint.INPUTS)
     z[joint.WHEEL : joint.WHEEL + 4] = car.v / RADIUS
     plain = getattr(joint_step, "py_func", joint_step)
     assert plain(car.state, z, car.p, DT) == pytest.approx(joint_step(car.state, z, car.p, DT), rel=1e-9)
 
 
 def samples(car, ax, speeds):
-    z = np.zeros(17)
+    z = np.zeros(joint.INPUTS)
     states = []
     for value, speed in zip(ax, speeds, strict=True):
         z[joint.AX] = value
@@ -217,6 +217,6 @@ NONE = math.nan
 
 @pytest.mark.parametrize("speeds", [[4.0, 1.0, 3.0, 2.0], [NONE, 5.0, NONE, 1.0], [2.0, 9.0, NONE, 1.0], [3.0] * 4])
 def test_the_median_is_numpys(speeds):
-    z = np.zeros(17)
+    z = np.zeros(joint.INPUTS)
     z[joint.WHEEL : joint.WHEEL + 4] = speeds
     assert median_wheel(z) == np.nanmedian(speeds)

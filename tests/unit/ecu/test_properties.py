@@ -10,7 +10,9 @@ from dbc.contract import contract, spec_of
 from dbc.exchange import Transmitter
 from dbc.frame import BusName, Frame, LinkEvent, LinkState
 from dbc.messages import BrakeMode, EhbDemandFront, EhbDemandRear
+from ecu.law import base_brake, friction
 from ecu.law.step import initial_memory, step
+from ecu.law.trouble_codes import consequence
 from ecu.law.types import Brake, Health, Inputs, Source
 from ecu.node import SOURCES, EcuNode
 
@@ -45,10 +47,25 @@ inputs = st.builds(
     blending_factor=values(0.0, 1.0),
     link_down=st.booleans(),
     health=st.tuples(
-        *[st.builds(Health, st.sampled_from([0.0, 0.01, 0.05, math.inf]), st.booleans(), st.integers(0, 6))]
+        *[
+            st.builds(
+                Health,
+                st.sampled_from([0.0, 0.01, 0.05, math.inf]),
+                st.booleans(),
+                st.integers(0, 6),
+                *[st.sampled_from([0, 0, 0, 1])] * 3,
+            )
+        ]
         * len(Source)
     ),
 )
+
+
+def with_torque(inputs, memory):
+    """Motor currents as they were asked for in the last step, where they are there at all."""
+    asked = [0.0 if math.isnan(nm) else nm / 1.75 for nm in memory.asked_nm]
+    present = [math.nan if math.isnan(i) else a for i, a in zip(inputs.motor_current_a, asked, strict=True)]
+    return inputs._replace(motor_current_a=tuple(present))
 
 
 def check_outputs(o, p):
@@ -82,6 +99,28 @@ def test_no_input_sequence_gives_an_output_out_of_range(parameters, sequence, mo
     assert np.all(np.isfinite(memory.observer))
 
 
+@settings(RELAXED, max_examples=20)
+@given(
+    sequence=st.lists(st.tuples(inputs, st.integers(1, 25)), min_size=1, max_size=12), mode=st.sampled_from(BrakeMode)
+)
+def test_no_degradation_without_an_active_code(parameters, sequence, mode):
+    """The mode never gets worse than an active code's reaction; it stays worse only while the upgrade waits."""
+    memory = initial_memory(parameters)
+    memory = memory._replace(modes=memory.modes._replace(mode=mode))
+    for values_now, ticks in sequence:
+        for _ in range(ticks):
+            before = memory.modes.mode
+            memory, outputs = step(memory, values_now, parameters, 0.01)
+            if outputs.mode == BrakeMode.INIT:
+                continue
+            active = [trouble.code for trouble in memory.troubles.troubles if trouble.active]
+            allowed = max([code.reaction for code in active], default=BrakeMode.NORMAL)
+            assert outputs.mode >= allowed
+            assert outputs.mode == allowed or outputs.mode <= before
+            assert bool(outputs.faults) == bool(active)
+            assert consequence(memory.troubles.active) == (allowed, outputs.faults)
+
+
 @RELAXED
 @given(
     lost=st.sets(st.sampled_from([s for s in Source if s is not Source.PEDAL]), min_size=1),
@@ -96,7 +135,7 @@ def test_losing_anything_never_lowers_the_pressure_demand(
     normal = good_inputs._replace(blending_factor=factor, pedal_1=pedal, pedal_2=pedal)
     memory = initial_memory(parameters)
     for _ in range(40):
-        memory, before = step(memory, normal, parameters, 0.01)
+        memory, before = step(memory, with_torque(normal, memory), parameters, 0.01)
     assert before.mode == BrakeMode.NORMAL
     broken = normal
     if missing:
@@ -120,7 +159,7 @@ def test_losing_anything_never_lowers_the_pressure_demand(
     if channel is not None:
         broken = broken._replace(**{f"pedal_{channel}": math.nan})
     for _ in range(30):
-        memory, after = step(memory, broken, parameters, 0.01)
+        memory, after = step(memory, with_torque(broken, memory), parameters, 0.01)
         for a, b in zip(after.pressure_demand_pa, before.pressure_demand_pa, strict=True):
             assert a >= b - 0.01 * b - 1.0
 
@@ -136,6 +175,64 @@ def test_without_pedal_the_pressure_stands(parameters, good_inputs, hold_ticks, 
         memory, after = step(memory, normal._replace(pedal_1=math.nan, pedal_2=math.nan), parameters, 0.01)
         for a, b in zip(after.pressure_demand_pa, before.pressure_demand_pa, strict=True):
             assert a >= 0.99 * b
+
+
+def anything(low, high):
+    """Whatever a float can be, mostly what it should."""
+    return st.one_of(st.floats(low, high), st.sampled_from([math.nan, math.inf, -math.inf, 0.0, 1e300, -1e300]))
+
+
+def four_of_anything(low, high):
+    return st.tuples(*[anything(low, high)] * 4)
+
+
+broken_inputs = st.builds(
+    Inputs,
+    pedal_1=anything(0.0, 1.0),
+    pedal_2=anything(0.0, 1.0),
+    wheel_speed_rad_s=four_of_anything(0.0, 300.0),
+    acceleration_x_mps2=anything(-30.0, 30.0),
+    acceleration_y_mps2=anything(-30.0, 30.0),
+    yaw_rate_rad_s=anything(-3.2, 3.2),
+    pressure_pa=four_of_anything(-5e5, 2.5e7),
+    brake=st.just((Brake.DEMAND, Brake.DEMAND)),
+    motor_current_a=four_of_anything(-400.0, 400.0),
+    motor_available_nm=four_of_anything(0.0, 2000.0),
+    motor_failed=st.tuples(*[st.booleans()] * 4),
+    steering_wheel_angle_rad=anything(-15.0, 15.0),
+    charge_power_w=anything(0.0, 3e5),
+    blending_factor=st.just(0.0),
+    link_down=st.booleans(),
+    health=st.just((Health(0.0, True, 0),) * len(Source)),
+)
+
+
+@settings(RELAXED, max_examples=25)
+@given(
+    sequence=st.lists(st.tuples(broken_inputs, st.integers(1, 20)), min_size=1, max_size=6), factor=anything(0.0, 1.0)
+)
+def test_whatever_the_sensors_say_the_brake_gives_what_both_pedal_channels_ask(parameters, sequence, factor):
+    """Without motors the pressure is at least what the lower channel asks for; with them nothing is out of range."""
+    p = parameters
+    gains = friction.gains(p.friction_brake)
+    for blending in (0.0, factor):
+        memory = initial_memory(p)
+        for values_now, ticks in sequence:
+            for _ in range(ticks):
+                memory, o = step(memory, values_now._replace(blending_factor=blending), p, 0.01)
+                check_outputs(o, p)
+                channels = values_now.pedal_1, values_now.pedal_2
+                if blending != 0.0 or math.isnan(o.pressure_demand_pa[0]) or not all(map(math.isfinite, channels)):
+                    continue
+                mass = p.vehicle.mass_kg * memory.estimates.mass_factor
+                drag = base_brake.driving_resistance(p.plausibility.speed_max_mps, mass, p.vehicle)
+                asked = base_brake.reference_deceleration(min(channels), p.pedal)
+                torque = base_brake.distribute(
+                    base_brake.brake_torque(asked, drag, mass, p.vehicle), p.friction_brake.front_share
+                )
+                least = friction.pressure_demands(torque, memory.friction, gains, p.friction_brake)
+                assert all(a >= b - 1.0 for a, b in zip(o.pressure_demand_pa, least, strict=True))
+        assert np.all(np.isfinite(memory.observer))
 
 
 noise_frames = st.builds(

@@ -11,13 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dbc.bench_messages import PhysicalFault
 from hil.bench.result import measure
 from hil.bench.run import expected
 from hil.bench.virtual import simulate
 from hil.cli.main import main
 from hil.errors import BrakebenchError
-from hil.faults.physical import FAULT_NAMES, FaultEvent
+from hil.faults.catalogue import names
 from hil.scenario.expectations import EXPECTABLE
 from hil.scenario.scenario import load_scenario, scenario_names
 from hil.scenario.table import ScenarioError
@@ -135,11 +134,11 @@ def test_every_field_arrives(write):
     assert (m.road[1].friction_left, m.road[1].friction_right, m.road[1].grade) == (0.2, 1.0, 0.05)
     assert m.end_after_standstill_s is None
     assert [value_at(s.blending, t) for t in (0.5, 1.5, 2.5, 4.0)] == [0.0, 0.35, 0.7, 0.0]
-    dead = PhysicalFault.MOTOR_DEAD
-    assert s.faults == (FaultEvent(1.0, dead, 0b1001), FaultEvent(2.0, dead, 0b1001, active=False))
-    (lost,) = s.frame_faults
-    assert (lost.drop, lost.late, lost.longest_ticks, lost.from_s, lost.until_s) == (0.02, 0.1, 3, 1.5, 3.5)
-    assert lost.can_ids == {0xC0}
+    dead, lost, late = s.faults
+    assert (dead.kind.name, dead.target.wheels, dead.at_s, dead.until_s) == ("motor_dead", 0b1001, 1.0, 2.0)
+    assert (lost.kind.name, lost.number("share"), lost.at_s, lost.until_s) == ("lost", 0.02, 1.5, 3.5)
+    assert (late.kind.name, late.number("share"), late.number("ticks")) == ("late", 0.1, 3)
+    assert lost.target.can_ids == late.target.can_ids == {0xC0}
     assert s.signal_expectations[0].name == "TRUTH_MOTION.SPEED from 1 s to 2 s"
     assert load_scenario(write(FULL, "b.toml")).sha256 == s.sha256
 
@@ -148,10 +147,10 @@ def test_the_documented_file_is_one(write):
     text = Path(__file__).parents[4].joinpath("docs/scenarios.md").read_text()
     scenario = load_scenario(write(text.split("```toml\n")[1].split("```")[0]))
     assert scenario.plant.vehicle.mass_kg == 1600.0
-    assert len(scenario.faults) == 2
+    assert len(scenario.faults) == 4
     fields = set(re.findall(r"^\[*(\w+)|^(\w+) =", text, re.MULTILINE))
     assert {"blending", "faults", "expect_signal"} <= {name for pair in fields for name in pair}
-    assert all(name in text for name in (*GENERATORS, *FAULT_NAMES, *EXPECTABLE))
+    assert all(name in text for name in (*GENERATORS, *names("physical"), *EXPECTABLE))
 
 
 def test_the_hash_covers_the_csv(write, tmp_path):
@@ -174,7 +173,7 @@ WRONG = [
     ("mass_kg = 1500.0", "mass_kg = 15.0", "plant.vehicle.mass_kg: expected"),
     ("vehicle.mass_kg", "vehicle.mass", "plant.vehicle: unknown key 'mass'; known here:"),
     ('set = "paper_car"', 'set = "no_car"', "cannot be read"),
-    ('"motor_dead"', '"motor_ill"', "faults[0].fault: expected one of " + ", ".join(FAULT_NAMES)),
+    ('"motor_dead"', '"motor_ded"', "faults[0].fault: no fault 'motor_ded'; did you mean 'motor_dead'?"),
     ('["fl", "rr"]', '["fl", "xx"]', "faults[0].wheels: expected a list out of fl, fr, rl, rr"),
     ('["fl", "rr"]', '["fl", "fl"]', "faults[0].wheels: expected a list out of fl, fr, rl, rr"),
     ('["fl", "rr"]', "[[1], {}]", "faults[0].wheels: expected a list out of fl, fr, rl, rr"),

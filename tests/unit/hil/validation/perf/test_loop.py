@@ -1,9 +1,13 @@
 """What the comparisons of speed compare: both sides do the same."""
 
+from pathlib import Path
+
 import pytest
 
 from dbc.contract import contract
 from dbc.frame import BusName
+from hil.cli.main import main
+from hil.errors import BrakebenchError
 from hil.validation.perf import codec, loop
 from hil.validation.perf.cantools_codec import cantools_spec
 
@@ -35,3 +39,18 @@ def test_rows_of_the_loop(monkeypatch):
     assert whole.other == pytest.approx(sum(row.other for row in parts))
     assert factor.ours == pytest.approx(1e4 / whole.ours)
     assert all(row.ratio > 0.0 for row in (whole, *parts))
+
+
+@pytest.mark.slow
+def test_beside_the_same_checkout_nothing_is_gained(monkeypatch):
+    monkeypatch.setattr(loop, "BESIDE_PAIRS", 5)
+    (row,) = loop.beside(str(Path(loop.__file__).parents[3]))
+    assert row.unit == "us"
+    assert 0.5 < row.ratio < 2.0  # of processor time
+
+
+def test_beside_what_is_no_checkout(tmp_path, capsys):
+    with pytest.raises(BrakebenchError, match="expected a checkout of the project"):
+        loop.beside(str(tmp_path))
+    assert main(["perf", "codec", "--beside", str(tmp_path)]) == 2
+    assert "--beside goes with perf loop" in capsys.readouterr().err
