@@ -26,9 +26,14 @@ HEAVY = ("numpy", "numba", "numba.extending", "cantools", "can", "hypothesis", "
 
 
 def state(module: dict[str, Any]) -> str:
-    """Digits that differ when the outcome for a module may."""
+    """Digits that differ when the module, its tests or the run itself are changed."""
+    tests = [ROOT / test for test in module["tests"]]
+    files = {file for test in tests for file in ([*test.glob("*.py")] if test.is_dir() else [test])}
+    files |= {file.parent / "conftest.py" for file in files if (file.parent / "conftest.py").exists()}
+    said = "".join(file.read_text("utf-8") for file in files)
+    files |= {file for file in (ROOT / "tests/support").glob("*.py") if f"from {file.stem} import" in said}
     ours = (HERE / "mutants.py", HERE / "trial.py")
-    return digest([ROOT / module["path"], *(ROOT / test for test in module["tests"]), *ours])[:16]
+    return digest([ROOT / module["path"], *sorted(files), *ours])[:16]
 
 
 def run(module: dict[str, Any], listed: list[str], workers: int) -> bool:
@@ -71,8 +76,12 @@ def main() -> int:
         importlib.import_module(name)
     good = True
     for module in modules:
-        path, now = module["path"], state(module)
-        if (args.path and path not in args.path) or (args.changed and passed.get(path) == now):
+        path = module["path"]
+        if args.path and path not in args.path:
+            continue
+        now = state(module)
+        if args.changed and passed.get(path) == now:
+            print(f"{path}: passed as it is")
             continue
         if run(module, listed, args.workers):
             passed[path] = now

@@ -23,6 +23,7 @@ from typing import Any
 import numba
 import pytest
 from _pytest.main import pytest_runtestloop
+from hypothesis import Phase, settings
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("dbc", "ecu", "plant", "hil")
@@ -90,6 +91,8 @@ class _Importer(importlib.abc.MetaPathFinder, importlib.abc.Loader):
 def _prepare(path: str, source: str) -> None:
     os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
     os.environ["CI"] = "1"  # hypothesis draws the same examples every time
+    settings.register_profile("mutation", phases=(Phase.explicit, Phase.generate))  # what fails need not be made small
+    settings.load_profile("mutation")  # and the profile of the tests inherits that
     os.chdir(ROOT)
     nothing = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nothing, 1)

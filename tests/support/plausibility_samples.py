@@ -12,8 +12,8 @@ from ecu.parameters.plausibility import PlausibilityParameters
 DT = 1 / 64
 LIMITS = PlausibilityParameters(
     forget=1 / 64, heal_s=16 * DT,
-    wheel_s=3 * DT, wheel_fall_rad_s2=64 / DT, wheel_rise_rad_s2=32 / DT, wheel_above=0.25, wheel_above_mps=4.0,
-    speed_max_mps=128.0,
+    wheel_s=3 * DT, wheel_fall_rad_s2=64 / DT, wheel_rise_rad_s2=32 / DT, wheel_above=0.25, wheel_above_mps=4.125,
+    speed_max_mps=128.25,
     pressure_s=5 * DT, pressure_pa=2.0**18, pressure_share=0.125, pressure_lag_s=7 * DT,
     motor_s=4 * DT, motor_nm=32.0, motor_share=0.25, motor_lag_s=3 * DT, motor_rate_nm_s=32 / DT,
     motor_start_s=4 * DT, motor_retry_s=8 * DT,
