@@ -101,7 +101,7 @@ def _prepare(path: str, source: str) -> None:
 
 
 def _in_child(work: Callable[[], int]) -> int:
-    """Exit code of a function in a process of its own, with its share of processor time; negative where it was ended."""
+    """Exit code of a function in a process of its own, with its share of processor time; below 0 where ended."""
     child = os.fork()
     if child == 0:
         code = KILLED

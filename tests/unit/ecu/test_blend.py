@@ -115,7 +115,9 @@ def simple(parameters):
     )
 
 
-@pytest.mark.parametrize(("speed", "share"), [(4.0, 1.0), (3.0, 1.0), (2.5, 0.75), (1.25, 0.125), (1.0, 0.0), (-2.0, 0.0)])
+@pytest.mark.parametrize(
+    ("speed", "share"), [(4.0, 1.0), (3.0, 1.0), (2.5, 0.75), (1.25, 0.125), (1.0, 0.0), (-2.0, 0.0)]
+)
 def test_share_left_at_a_speed(simple, speed, share):
     assert fade(speed, simple) == share
 

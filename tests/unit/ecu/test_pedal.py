@@ -174,7 +174,9 @@ def test_levels_count_up_and_slowly_down(read):
     assert reading[1:] == (False, False, True, (True, False))
 
 
-@pytest.mark.parametrize(("levels", "believed", "wrong"), [(FOUND_1, 0.5, (True, False)), (FOUND_2, 0.55, (False, True))])
+@pytest.mark.parametrize(
+    ("levels", "believed", "wrong"), [(FOUND_1, 0.5, (True, False)), (FOUND_2, 0.55, (False, True))]
+)
 def test_a_channel_that_was_found_wrong_is_not_followed_even_where_it_agrees(read, levels, believed, wrong):
     after, reading = read(AT_REST._replace(levels=levels), 0.55, 0.5)
     assert reading == (believed, False, False, True, wrong)
@@ -188,7 +190,10 @@ def test_of_two_that_were_found_the_one_with_more_evidence_is_named(read):
     both = AT_REST._replace(levels=(9 * TICK_S, 9 * TICK_S, 9 * TICK_S))
     assert read(both, 0.5, 0.5)[1].implausible == (True, False)
     assert read(both._replace(levels=(8 * TICK_S, 9 * TICK_S, 0.0)), 0.5, 0.5)[1].implausible == (False, True)
-    assert read(AT_REST._replace(levels=(3 * TICK_S, 3 * TICK_S, 3 * TICK_S)), 0.5, 0.5)[1].implausible == (False, False)
+    assert read(AT_REST._replace(levels=(3 * TICK_S, 3 * TICK_S, 3 * TICK_S)), 0.5, 0.5)[1].implausible == (
+        False,
+        False,
+    )
 
 
 @pytest.mark.parametrize(

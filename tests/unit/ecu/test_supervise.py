@@ -76,7 +76,13 @@ def test_a_healthy_tick_says_nothing(running):
 def test_a_source_has_timed_out_at_its_limit(running, source):
     p = running.p
     limit = p.battery_timeout_s if source == Source.BATTERY else p.timeout_s
-    for age, is_out in ((0.0, False), (math.nextafter(limit, 0.0), False), (limit, True), (math.inf, True), (math.nan, True)):
+    for age, is_out in (
+        (0.0, False),
+        (math.nextafter(limit, 0.0), False),
+        (limit, True),
+        (math.inf, True),
+        (math.nan, True),
+    ):
         inputs = running.inputs._replace(health=running.health(source, age_s=age))
         assert timed_out_sources(inputs, p) == (out(source) if is_out else IN_TIME)
         both = with_one(inputs.health, Source.BATTERY, WELL._replace(age_s=math.inf))
@@ -93,7 +99,7 @@ def test_a_source_is_lost_where_it_has_timed_out_or_another_speaks_for_it(source
         assert lost_sources(IN_TIME, streams) == (out(source) if lost else IN_TIME)
         assert lost_sources(out(other), streams) == (out(source, other) if lost else out(other))
     assert lost_sources(out(source), ALL_CLEAN) == out(source)
-    assert lost_sources(out(source), tuple(ALL_CLEAN[:-1]) + (CLEAN._replace(bad=1),)) == out(source)
+    assert lost_sources(out(source), (*ALL_CLEAN[:-1], CLEAN._replace(bad=1))) == out(source)
 
 
 @pytest.mark.parametrize("source", Source)
@@ -160,7 +166,9 @@ def test_a_motor_that_says_it_has_failed_unless_its_message_is_lost(running, i):
     assert codes == {f"motor_{WHEELS[i]}_failed", f"{NAMES[other]}_lost"}
 
 
-@pytest.mark.parametrize(("axle", "name", "source"), [(0, "front", Source.EHB_PRESSURE_FRONT), (1, "rear", Source.EHB_PRESSURE_REAR)])
+@pytest.mark.parametrize(
+    ("axle", "name", "source"), [(0, "front", Source.EHB_PRESSURE_FRONT), (1, "rear", Source.EHB_PRESSURE_REAR)]
+)
 def test_a_brake_that_says_it_has_failed_unless_its_message_is_lost(running, axle, name, source):
     brake = with_one((Brake.DEMAND, Brake.DEMAND), axle, Brake.FAILED)
     assert running.tick(brake=brake).codes == {f"brake_{name}_failed"}

@@ -182,7 +182,9 @@ def test_nothing_is_judged_without_forces_with_one_wheel_or_slowly(witnesses, di
     assert j.z[AX] == -9.0
 
 
-@pytest.mark.parametrize(("wheel", "judges"), [((6.0,) * 4, True), ((6.0, 6.0, nan, nan), True), ((6.0, nan, nan, nan), False)])
+@pytest.mark.parametrize(
+    ("wheel", "judges"), [((6.0,) * 4, True), ((6.0, 6.0, nan, nan), True), ((6.0, nan, nan, nan), False)]
+)
 def test_judged_at_three_metres_per_second_with_two_wheels(witnesses, wheel, judges):
     j = witnesses.judged
     j.sample(speed=3.0, WHEEL=(6.0,) * 4)

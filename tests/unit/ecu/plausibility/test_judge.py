@@ -60,7 +60,9 @@ def test_wheels_pressures_and_motors_beyond_all_limits_are_missing_and_no_fault(
 
 
 def test_demands_have_no_such_limits(judged):
-    judged.sample(DEMAND=1e9, AVAILABLE=(1e9,) * 4, ASKED_PRESSURE=(1e9,) * 4, ASKED_MOTOR=(1e9,) * 4, PRESSURE=(1e6,) * 4)
+    judged.sample(
+        DEMAND=1e9, AVAILABLE=(1e9,) * 4, ASKED_PRESSURE=(1e9,) * 4, ASKED_MOTOR=(1e9,) * 4, PRESSURE=(1e6,) * 4
+    )
     assert judged.z[DEMAND] == 1e9
     for place in (AVAILABLE, ASKED_PRESSURE, ASKED_MOTOR):
         assert judged.four(place) == (1e9,) * 4
@@ -97,10 +99,14 @@ def test_the_verdict_as_the_supervision_takes_it():
     assert nothing == PLAUSIBLE
     for i in range(4):
         alone = one(i, True, False)
-        assert plausibility_of(1 << i, (False,) * 4, False, (False,) * 2, False) == PLAUSIBLE._replace(wheel_speed=alone)
+        assert plausibility_of(1 << i, (False,) * 4, False, (False,) * 2, False) == PLAUSIBLE._replace(
+            wheel_speed=alone
+        )
         assert plausibility_of(0, alone, False, (False,) * 2, False) == PLAUSIBLE._replace(wheel_speed=alone)
         assert plausibility_of(16 << i, (False,) * 4, False, (False,) * 2, False) == PLAUSIBLE._replace(pressure=alone)
-        assert plausibility_of(256 << i, (False,) * 4, False, (False,) * 2, False) == PLAUSIBLE._replace(motor_torque=alone)
+        assert plausibility_of(256 << i, (False,) * 4, False, (False,) * 2, False) == PLAUSIBLE._replace(
+            motor_torque=alone
+        )
     stuck = PLAUSIBLE._replace(acceleration=True)
     assert plausibility_of(1 << 12, (False,) * 4, False, (False,) * 2, False) == stuck
     assert plausibility_of(0, (False,) * 4, True, (False,) * 2, False) == stuck

@@ -179,7 +179,8 @@ def test_what_drives_is_opposed_where_the_acceleration_confirms_it(ready):
 
 
 @pytest.mark.parametrize(
-    ("ax", "expected", "better"), [(-3.0, -3.0, -1), (-2.5, -3.0, 0), (-2.25, -3.0, 0.5), (nan, -3.0, 0), (-2.0, nan, 0)]
+    ("ax", "expected", "better"),
+    [(-3.0, -3.0, -1), (-2.5, -3.0, 0), (-2.25, -3.0, 0.5), (nan, -3.0, 0), (-2.0, nan, 0)],
 )
 def test_how_much_better_the_report_explains_it(ready, ax, expected, better):
     excluded_driving(ready, ax, expected)

@@ -6,7 +6,7 @@ import pytest
 from plausibility_samples import NAN4, beyond, one, same
 
 from ecu.law.joint.layout import PRESSURE
-from ecu.law.plausibility.layout import PRESSURE_BIT, PRESSURE_HIGH, PRESSURE_LEVEL, PRESSURE_LOW
+from ecu.law.plausibility.layout import PRESSURE_BIT, PRESSURE_LEVEL, PRESSURE_LOW
 
 MOST = 2.0**18
 WHEELS = range(4)
@@ -77,7 +77,12 @@ def test_the_brake_may_be_anywhere_between_the_lag_and_the_demand(judged):
     start = judged.state
     high = 7 * 2.0**17
     most = MOST + high / 8
-    for value, right in ((high + most, True), (beyond(high + most), False), (-most, True), (beyond(-most, -1e9), False)):
+    for value, right in (
+        (high + most, True),
+        (beyond(high + most), False),
+        (-most, True),
+        (beyond(-most, -1e9), False),
+    ):
         judged.state = start
         judged.sample(PRESSURE=one(3, value, 2.0**19))
         assert (judged.hold == 0.0) == right

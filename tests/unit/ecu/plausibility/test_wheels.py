@@ -80,7 +80,9 @@ def test_no_wheel_of_this_car_turns_faster_than_its_top_speed(judged, way):
     assert judged.bits == bit(0)
 
 
-@pytest.mark.parametrize(("speed", "most"), [(0.0, 133.25), (nan, 133.25), (50.0, 133.25), (60.0, 158.25), (60.125, 158.5625)])
+@pytest.mark.parametrize(
+    ("speed", "most"), [(0.0, 133.25), (nan, 133.25), (50.0, 133.25), (60.0, 158.25), (60.125, 158.5625)]
+)
 def test_above_the_second_fastest_and_the_observer_by_the_margin(judged, speed, most):
     """A quarter of either, and 4.125 m/s."""
     begun = judged.state
