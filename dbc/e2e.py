@@ -68,11 +68,6 @@ def _continued(crc: int, payload: bytes | bytearray) -> int:
     return crc
 
 
-def counter_of(payload: bytes | bytearray) -> int:
-    """Alive counter of a payload (low nibble of its second byte)."""
-    return payload[1] & 0x0F
-
-
 def protect(data_id: int, payload: bytearray, counter: int) -> bytes:
     """Write ``counter`` and the check value into ``payload`` and return it as bytes."""
     payload[1] = (payload[1] & 0xF0) | (counter % COUNTER_MODULUS)

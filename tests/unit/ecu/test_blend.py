@@ -105,3 +105,78 @@ def test_no_torque_asks_for_no_pressure_and_the_maximum_holds(parameters):
     p = parameters.friction_brake
     assert pressure_demand(0.0, 0.38, gains(p)[0], p) == 0.0
     assert pressure_demand(1e6, 0.38, gains(p)[0], p) == p.pressure_max_pa
+
+
+@pytest.fixture
+def simple(parameters):
+    """Fades from 3 to 1 m/s, friction half a second ahead; a limit changes hands in 1/8 s."""
+    return dataclasses.replace(
+        parameters.blend, fade_start_mps=3.0, fade_end_mps=1.0, friction_lead_s=0.5, charge_handover_s=0.125
+    )
+
+
+@pytest.mark.parametrize(
+    ("speed", "share"), [(4.0, 1.0), (3.0, 1.0), (2.5, 0.75), (1.25, 0.125), (1.0, 0.0), (-2.0, 0.0)]
+)
+def test_share_left_at_a_speed(simple, speed, share):
+    assert fade(speed, simple) == share
+
+
+def test_what_is_asked_of_each_motor(parameters):
+    motor = dataclasses.replace(parameters.motor, torque_max_nm=300.0)
+    demand, available = (100.0, 200.0, 400.0, 800.0), (1000.0, 50.0, 1000.0, 1000.0)
+    assert wanted_torque(demand, 0.5, available, motor) == (50.0, 50.0, 200.0, 300.0)
+    assert wanted_torque(demand[::-1], 0.5, available[::-1], motor) == (300.0, 200.0, 50.0, 50.0)
+    assert wanted_torque((80.0,) * 4, 0.5, (10.0, 20.0, 30.0, 35.0), motor) == (10.0, 20.0, 30.0, 35.0)
+    assert wanted_torque((900.0,) * 4, 0.5, PLENTY, motor) == (300.0,) * 4
+    for factor in (0.0, -0.5):
+        assert wanted_torque(demand, factor, available, motor) == (0.0,) * 4
+    assert wanted_torque(demand, 1.5, PLENTY, motor) == (150.0, 300.0, 300.0, 300.0)
+
+
+def ramped(held, announced, power, simple, dt_s=1 / 64):
+    return tuple(ramp_charge_limit(ChargePower(*held), announced, power, simple, dt_s))
+
+
+@pytest.mark.parametrize(
+    ("held", "announced", "power", "after"),
+    [
+        ((100.0, 100.0, 100.0), 80.0, 64.0, (80.0, 80.0, 80.0)),  # does not bind
+        ((64.0, 64.0, 64.0), 64.0, 64.0, (64.0, 64.0, 64.0)),
+        ((0.0, 0.0, 0.0), 0.0, 0.0, (0.0, 0.0, 0.0)),
+        ((0.0, 0.0, 0.0), 0.0, 0.5, (0.0, 0.0, 0.0)),
+        # an eighth of the power in a tick; each lag takes a seventeenth of its way
+        ((64.0, 64.0, 64.0), 0.0, 64.0, (56.0, 64.0 - 8 / 17, 64.0 - 8 / 17 / 17)),
+        ((640.0, 640.0, 640.0), 0.0, 64.0, (56.0, 64.0 - 8 / 17, 64.0 - 8 / 17 / 17)),  # from what is in use
+        ((64.0, 64.0, 64.0), 60.0, 64.0, (60.0, 64.0 - 4 / 17, 64.0 - 4 / 17 / 17)),
+        ((64.0, 64.0, 64.0), math.nan, 64.0, (56.0, 64.0 - 8 / 17, 64.0 - 8 / 17 / 17)),
+        ((0.0, 0.0, 0.0), 100.0, 64.0, (8.0, 8 / 17, 8 / 17 / 17)),
+        ((60.0, 0.0, 0.0), 100.0, 64.0, (64.0, 64 / 17, 64 / 17 / 17)),  # no more than is used
+        ((64.0, 30.0, 64.0), 64.0, 64.0, (64.0, 32.0, 64.0 - 32 / 17)),
+        ((64.0, 64.0, 30.0), 64.0, 64.0, (64.0, 64.0, 32.0)),
+        ((30.0, 64.0, 64.0), 64.0, 64.0, (38.0, 64.0 - 26 / 17, 64.0 - 26 / 17 / 17)),
+        ((10.0, 20.0, 30.0), 10.0, 64.0, (10.0, 20.0 - 10 / 17, 30.0 - (10.0 + 10 / 17) / 17)),
+    ],
+)
+def test_one_tick_of_a_handing_over(simple, held, announced, power, after):
+    assert ramped(held, announced, power, simple) == pytest.approx(after, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("power", "charge", "speed", "deceleration", "motors", "friction"),
+    [
+        (0.0, (1.0, 1.0, 1.0), 10.0, 2.0, 1.0, 1.0),  # no power: nothing to limit
+        (-5.0, (1.0, 1.0, 1.0), 2.0, 1.0, 0.5, 0.25),
+        (0.5, (0.25, 9.0, 0.125), 10.0, 2.0, 0.25, 0.5),
+        (100.0, (25.0, 9.0, 75.0), 10.0, 2.0, 0.75, 0.25),
+        (100.0, (200.0, 9.0, 300.0), 10.0, 2.0, 1.0, 1.0),
+        (100.0, (25.0, 9.0, 75.0), 2.0, 1.0, 0.375, 0.0625),
+        (100.0, (100.0, 9.0, 100.0), 2.0, -1.0, 0.5, 0.75),
+    ],
+)
+def test_shares_of_one_tick(simple, power, charge, speed, deceleration, motors, friction):
+    """Each wheel another demand, and a quarter of it from the motor."""
+    demand, wanted = (80.0, 160.0, 320.0, 640.0), (20.0, 40.0, 80.0, 160.0)
+    result = blend(demand, wanted, power, ChargePower(*charge), speed, deceleration, simple)
+    assert result.motor_nm == tuple(motors * w for w in wanted)
+    assert result.friction_nm == tuple(d - friction * w for d, w in zip(demand, wanted, strict=True))

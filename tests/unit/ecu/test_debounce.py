@@ -1,5 +1,7 @@
 """The up-down counter behind every plausibility check."""
 
+import math
+
 import pytest
 
 from ecu.law.debounce import up_down
@@ -37,3 +39,27 @@ def test_heals_after_the_time_without_evidence_and_remembers_half():
     assert count([0] * 200 + [1] + [0] * 299, level)[-1] > LIMIT_S
     assert first_fault([1, 1, 1] + [0] * 301) == 3
     assert count([0] * 301 + [1, 1], level)[-1] > LIMIT_S
+
+
+@pytest.mark.parametrize(
+    ("level", "evidence", "after"),
+    [
+        (0.0, 0.5, 0.5),
+        (0.5, 0.25, 0.75),  # evidence adds up
+        (0.0, 1.998, 1.998),  # a thousandth below the limit may be rounding
+        (0.0, math.nextafter(1.998, 2.0), 5.0),
+        (1.5, 0.5, 5.0),  # a fault, and three seconds until it heals
+        (5.0, 0.125, 5.0),
+        (2.25, 0.125, 5.0),  # any evidence begins the time anew
+        (5.0, 0.0, 4.875),
+        (2.25, 0.0, 2.125),
+        (2.125, 0.0, 1.0),  # healed: half is kept
+        (2.0, 0.0, 1.96875),  # the limit itself is none
+        (0.5, 0.0, 0.46875),  # a quarter of the time is taken off
+        (0.01, 0.0, 0.0),
+        (0.0, 0.0, 0.0),
+    ],
+)
+def test_one_sample(level, evidence, after):
+    """Of 1/8 s; two seconds are a fault."""
+    assert up_down(level, evidence, 0.125, 2.0, 0.25, 3.0) == after
