@@ -81,6 +81,7 @@ class Reception:
         self._usual_ns = self._cycle_ns
         self._ahead_ns = 0  # by its counter, of its earliest phase so far; at most 0, negative where late
         self._judged_ns = 0  # tick for which that holds
+        self._steady_ns = self._steady_counter = -1  # last frame of the last long run of them
         self._stray_ns = self._stray_since_ns = self._stray_counter = -1
 
     @property
@@ -144,8 +145,9 @@ class Reception:
 
         One sender's counter advances by one a cycle. Frames may be lost, late (then several come at once) or cease for
         any time; a counter that leaps without time for the frames between, or goes back, is not that sender's. Such
-        frames are refused until the counter fits the time again (by a cycle), until `SILENT_CYCLES` without any frame,
-        or until the new counter has lived alone for `ADOPTED_CYCLES`.
+        frames are refused until the counter fits the time again (by a cycle; that of the last frame, or that of the last
+        long run of frames, for one of the others may fit by chance), until `SILENT_CYCLES` without any frame, or until
+        the new counter has lived alone for `ADOPTED_CYCLES`.
         """
         if status is _WRONG_CRC:
             self._note(now_ns, bad=1)
@@ -170,8 +172,8 @@ class Reception:
             late_ns = min(late_ns, 0)
         ahead_ns = late_ns + step * cycle_ns - since_ns
         if self._usual_ns < 0:  # frames of another counter came since
-            gap = (since_ns - step * cycle_ns + cycle_ns) % (COUNTER_MODULUS * cycle_ns)
-            fits = gap <= 2 * cycle_ns
+            fits = self._due(now_ns, counter, self._known_ns, known)
+            fits = fits or self._due(now_ns, counter, self._steady_ns, self._steady_counter)
             ahead_ns = min(ahead_ns, 0)
         elif status is _WRONG_SEQUENCE:
             fits = ahead_ns <= cycle_ns
@@ -188,15 +190,23 @@ class Reception:
         if silent_ns >= SILENT_CYCLES * cycle_ns or self._adopted(now_ns, counter):
             return self._begin(now_ns, data, _WRONG_SEQUENCE)
         self._note(now_ns, foreign=1)
+        if self.valid_in_row >= COUNTER_MODULUS:
+            self._steady_ns, self._steady_counter = self._known_ns, known
         assert self.checker is not None
         self.checker.counter = known  # it goes on from the frames that are believed
         self.checker.lost -= step - 1
         self._usual_ns = -1
         return _WRONG_SEQUENCE
 
+    def _due(self, now_ns: int, counter: int, from_ns: int, from_counter: int) -> bool:
+        """Whether a counter is the one due, by a cycle, of a stream that had another one earlier."""
+        cycle_ns = self._cycle_ns
+        gap_ns = now_ns - from_ns - (counter - from_counter) * cycle_ns + cycle_ns
+        return from_ns >= 0 and gap_ns % (COUNTER_MODULUS * cycle_ns) <= 2 * cycle_ns
+
     def _begin(self, now_ns: int, data: bytes, status: Status) -> Status:
         """Follow a stream from this frame on."""
-        self._ahead_ns, self._judged_ns = _QUEUE_NS, now_ns
+        self._ahead_ns, self._judged_ns, self._steady_ns = _QUEUE_NS, now_ns, -1
         self._usual_ns = self._cycle_ns
         self._remember(now_ns, data)
         return status

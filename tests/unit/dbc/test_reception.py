@@ -186,3 +186,16 @@ def test_frames_of_no_use_never_raise(ear):
     frame = Frame(BusName.VEHICLE, 160, b"")
     assert ear.hear(40, frame.data, b"\x00" * 8, b"\xff" * 8, b"\x01" * 9) == []
     assert ear.odd == (4, 0, 0)
+
+
+@settings(max_examples=40)
+@given(st.lists(st.integers(0, COUNTER_MODULUS - 1), min_size=1, max_size=60))
+def test_counters_at_random_leave_the_senders_own_place_in_time(counters):
+    ear = Ear()
+    for tick in range(40 - STEADY, 40):
+        ear.hear(tick, payload(tick))
+    for tick, counter in enumerate(counters, 40):
+        ear.hear(tick, payload(counter, FAKE))
+    end = 40 + len(counters)
+    back = [tick for tick in range(end, end + 4) if ear.hear(tick, payload(tick))]
+    assert len(back) >= 2, "the sender itself is believed within two frames"
