@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from hil.validation.fault_campaign.budgets import ORIGINS
+from hil.validation.fault_campaign.budgets import GONE
 from hil.validation.fault_campaign.campaign import Campaign
 from hil.validation.fault_campaign.table import Found, Row
 
@@ -114,7 +114,7 @@ def verdict(campaign: Campaign) -> list[str]:
         lines.append(
             f"{what}: {longest.longest[1]}: the stop is {longest.longest[0]:.1f} m longer ({100 * (ratio - 1):+.0f} %)."
         )
-    lines.append(_released([row for row in rows if not any(one.bound for one in row.found if one.budget == "release")]))
+    lines.append(_released(rows))
     lines.append(_used(campaign.rows))
     exceptions = sum(row.exceptions for row in rows)
     lines.append("No run raised an exception." if not exceptions else f"{exceptions} runs raised an exception.")
@@ -122,14 +122,17 @@ def verdict(campaign: Campaign) -> list[str]:
 
 
 def _released(rows: Sequence[Row]) -> str:
+    """How long the brake gave too little, those rows left out whose fault takes its pressure away."""
+    rows = [row for row in rows if not any(one.budget == "release" and one.bound == GONE for one in row.found)]
     worst = max(rows, key=lambda row: _most(row, "release_ms"), default=None)
-    if worst is None or not any(one.budget == "release" for row in rows for one in row.found):
-        longest = 0.0 if worst is None else _most(worst, "release_ms")
-        return (
-            "No fault but those of the brake's own pressure released the brake against the pedal: less than half of "
-            f"the braking due for {longest:.0f} ms at most."
-        )
-    return f"The brake let go against the pedal: {worst.fault} {worst.target}, {_most(worst, 'release_ms'):.0f} ms."
+    longest = 0.0 if worst is None else _most(worst, "release_ms")
+    if worst is None or longest == 0.0:
+        return "No fault released the brake against the pedal."
+    where = next((f" ({one.where})" for one in worst.found if one.budget == "release"), "")
+    return (
+        "Those of the brake's own pressure left out, the brakes gave less than half of what was due for "
+        f"{longest:.0f} ms at most: {worst.fault} {worst.target}{where}."
+    )
 
 
 def _used(rows: Sequence[Row]) -> str:
@@ -139,8 +142,3 @@ def _used(rows: Sequence[Row]) -> str:
 
 def _most(row: Row, column: str) -> float:
     return max((value for value in row.numbers[column] if math.isfinite(value)), default=0.0)
-
-
-def budgets() -> list[str]:
-    """The budgets and where they come from."""
-    return [f"{name}: {text}" for name, text in ORIGINS.items()]
