@@ -23,6 +23,7 @@ Octets = NDArray[np.uint8]
 LIMIT = 1e300  # beyond is not a finite number to the codec
 _COUNTERS = e2e.COUNTER_MODULUS
 _new = tuple.__new__  # without the Python-made __new__ of a NamedTuple
+_FRAMES = repeat(Frame)
 
 
 _FIELD = np.dtype(
@@ -107,7 +108,8 @@ class Batch:
         self._fields = np.array([_row(m, s, f) for m, s in enumerate(self._specs) for f in s.fields], _FIELD)
         self._messages = np.array([_sending(spec) for spec in self._specs], _SENDING)
         self._due, self._payloads = bytearray(len(self._specs)), bytearray(PAYLOAD * len(self._specs))
-        self._views = np.frombuffer(self._due, np.uint8), np.frombuffer(self._payloads, np.uint8)
+        views = np.frombuffer(self._due, np.uint8), np.frombuffer(self._payloads, np.uint8)
+        self._state = self.values, self._fields, self._messages, *views
         self._split = Struct("".join(f"{spec.length}s{PAYLOAD - spec.length}x" for spec in self._specs)).unpack
         self._buses, self._ids = tuple(spec.bus for spec in self._specs), tuple(spec.can_id for spec in self._specs)
         self._times, self._extended = (0,) * len(self._specs), (False,) * len(self._specs)
@@ -123,12 +125,12 @@ class Batch:
 
     def frames(self, now_ns: int) -> list[Frame]:
         """Frames of the messages that are due, protected with their next counters."""
-        odd = _write(now_ns, self.values, self._fields, self._messages, *self._views)
+        odd = _write(now_ns, *self._state)
         if odd >= 0:
             raise CodecError(self._refusal(odd))
         payloads = self._split(self._payloads)
         parts = zip(self._buses, self._ids, payloads, self._times, self._extended, strict=False)
-        return list(map(_new, repeat(Frame), compress(parts, self._due)))
+        return list(map(_new, _FRAMES, compress(parts, self._due) if 0 in self._due else parts))
 
     def _refusal(self, index: int) -> str:
         spec = self._specs[self._fields[index]["message"]]

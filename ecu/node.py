@@ -7,6 +7,7 @@ from dbc.batch import Batch
 from dbc.bench_messages import EcuReception, StimulusEcu
 from dbc.exchange import Receiver
 from dbc.frame import BusName, Frame, LinkState, Received
+from dbc.intake import BAD_IN_ROW, FRESH, LAST_VALID_NS, RECEIVED
 from dbc.messages import (
     BatteryStatus,
     BodyMotion,
@@ -52,6 +53,7 @@ SENT: tuple[type[tuple[Any, ...]], ...] = (
     EhbDemandFront, EhbDemandRear, MotorDemandFront, MotorDemandRear, BrakeStatus, BrakeEstimateFront,
     BrakeEstimateRear, BrakeTroubleCode,
 )  # fmt: skip
+_NOTHING_ODD = (0, 0, 0)
 _OTHERS = len(SOURCES) - 1  # all but the battery, the last
 _new = tuple.__new__  # without the Python-made one of a NamedTuple
 _FAILED = float(MotorState.FAILED)
@@ -69,11 +71,10 @@ _BRAKE: dict[float, Brake] = {
 
 def _health(reception: Reception, now_ns: int) -> Health:
     """Supply of a source that is not well."""
-    r = reception
-    odd = (r.bad, r.foreign, r.doubled) if r.odd_ns == now_ns else (0, 0, 0)
-    last_ns = r.last_valid_ns
-    age_s = math.inf if last_ns is None else (now_ns - last_ns) * 1e-9
-    return _new(Health, (age_s, r.fresh, r.bad_in_row, *odd))
+    r, memory = reception, reception.memory
+    odd = (r.bad, r.foreign, r.doubled) if r.odd_ns == now_ns else _NOTHING_ODD
+    age_s = (now_ns - memory[LAST_VALID_NS]) * 1e-9 if memory[RECEIVED] else math.inf
+    return _new(Health, (age_s, memory[FRESH] != 0, memory[BAD_IN_ROW], *odd))
 
 
 class EcuNode:

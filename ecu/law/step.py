@@ -97,55 +97,53 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     dt_s : time since the last step.
     """
     p = parameters
-    time_s = memory.time_s + dt_s
+    (
+        time_s, streams, mode_memory, troubles, pedal_memory, last_deceleration, recent, without_pedal_s, handed_over,
+        factor, charge, watch, bits, wheel_speed, observer, since_sample_s, known, mu, asked_pa, asked_nm,
+    ) = memory  # fmt: skip
+    time_s += dt_s
     timed_out = modes.timed_out_sources(inputs, p.supervision)
-    streams = judge_streams(memory.streams, inputs.health, timed_out, p.supervision, dt_s)
+    streams = judge_streams(streams, inputs.health, timed_out, p.supervision, dt_s)
     lost = modes.lost_sources(timed_out, streams)
     pedal_memory, pedal = pedal_travel.read_pedal(
-        memory.pedal, inputs, lost[_PEDAL], p.supervision, p.plausibility, dt_s
+        pedal_memory, inputs, lost[_PEDAL], p.supervision, p.plausibility, dt_s
     )
     if math.isfinite(pedal.travel):
         deceleration = base_brake.reference_deceleration(pedal.travel, p.pedal)
         # frames of another's: the driver's may be the larger
         if streams is not ALL_CLEAN and streams[_PEDAL].suspect:
-            deceleration = max(deceleration, *memory.recent_mps2)
+            deceleration = max(deceleration, *recent)
         without_pedal_s = 0.0
     else:
-        deceleration = memory.deceleration_mps2
-        without_pedal_s = memory.without_pedal_s + dt_s
-    factor = memory.blending_factor
+        deceleration = last_deceleration
+        without_pedal_s += dt_s
     if math.isfinite(inputs.blending_factor):
         factor = min(max(inputs.blending_factor, 0.0), 1.0)
 
-    known, observer, since_sample_s = memory.estimates, memory.observer, memory.since_sample_s + dt_s
-    watch, bits, wheel_speed = memory.watch, memory.bits, memory.wheel_speed_rad_s
+    since_sample_s += dt_s
     slow, stuck = known.implausible, known.stuck
     if since_sample_s > 0.95 * SAMPLE_S:
-        asked_pa = memory.asked_pa
         if inputs.brake != _BOTH_FOLLOW:
             asked_pa = _asked_of_followers(asked_pa, inputs.brake)
-        z = estimator.measured(inputs, lost, deceleration, asked_pa, memory.asked_nm, p.motor.torque_per_current_nm_a)
+        z = estimator.measured(inputs, lost, deceleration, asked_pa, asked_nm, p.motor.torque_per_current_nm_a)
         watch, bits, wheel_speed, observer, known = estimator.observe(watch, observer, known, z, p, since_sample_s)
         since_sample_s = 0.0
     plausibility = PLAUSIBLE
     if bits or stuck or slow != estimator.PLAUSIBLE or pedal.channels_disagree or True in pedal.implausible:
         plausibility = judge.plausibility_of(bits, slow, stuck, pedal.implausible, pedal.channels_disagree)
     mode_memory, active, faults = modes.supervise(
-        memory.modes, inputs, timed_out, lost, streams, pedal, plausibility, p.supervision, dt_s
+        mode_memory, inputs, timed_out, lost, streams, pedal, plausibility, p.supervision, dt_s
     )
     mode = mode_memory.mode
-    troubles = memory.troubles
     if active != troubles.active and (mode != _INIT or time_s > p.supervision.start_tolerated_s):
         troubles = trouble_codes.remember(troubles, active, time_s, _freeze_frame(memory, inputs))
-    handed_over = mode == _SAFE_STOP and (
-        memory.handed_over or without_pedal_s > p.supervision.demand_hold_s + 0.5 * dt_s
-    )
+    handed_over = mode == _SAFE_STOP and (handed_over or without_pedal_s > p.supervision.demand_hold_s + 0.5 * dt_s)
 
     if slow != estimator.PLAUSIBLE:
         wheel_speed = _fastest_of(inputs, slow, wheel_speed)
     opposing_nm = ZERO if plausibility.motor_torque == _NONE else judge.opposing_torque(watch)
     mu, charge, torque, motor_nm, pressure = actuate(
-        memory.friction, memory.charge, known.pad_friction, known.confidence, known.mass_factor, deceleration, factor,
+        mu, charge, known.pad_friction, known.confidence, known.mass_factor, deceleration, factor,
         wheel_speed, _usable_torque(inputs, lost, mode, plausibility.motor_torque), opposing_nm,
         inputs.charge_power_w, dt_s, p,
     )  # fmt: skip
@@ -170,7 +168,7 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
             round(CONFIDENCE_STEPS * c3),
         ),
     )
-    recent = (deceleration, memory.recent_mps2[0], memory.recent_mps2[1])
+    recent = (deceleration, recent[0], recent[1])
     state = (
         time_s, streams, mode_memory, troubles, pedal_memory, deceleration, recent, without_pedal_s, handed_over,
         factor, charge, watch, bits, wheel_speed, observer, since_sample_s, known, mu, pressure_demand, motor_demand,

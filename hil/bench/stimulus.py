@@ -3,9 +3,11 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from enum import StrEnum
+from math import nan
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from dbc.batch import Batch
 from dbc.bench_messages import (
     FaultCommand,
     FaultSelect,
@@ -43,7 +45,7 @@ class Channel(StrEnum):
     __hash__ = str.__hash__  # that of an enum is slow, and asked several times a tick
 
 
-_CHANNELS: tuple[tuple[type[Any], tuple[Channel, ...]], ...] = (
+_CHANNELS: tuple[tuple[type[Message], tuple[Channel, ...]], ...] = (
     (StimulusEcu, (Channel.BLENDING,)),
     (StimulusDriver, (Channel.PEDAL, Channel.SPEED, Channel.STEERING)),
     (StimulusRoad, (Channel.FRICTION_LEFT, Channel.FRICTION_RIGHT, Channel.GRADE)),
@@ -88,6 +90,7 @@ class StimulusNode:
         self.sent: Sequence[Frame] = ()
         self.time_s: float | None = None
         self._traces: dict[Channel, Trace] = {Channel.BLENDING: blending} if blending else {}
+        self._all = [(Batch((kind,)), channels) for kind, channels in _CHANNELS]
         self._stimulated = self._of_traces()
         self._waiting: list[_Planned] = []
         self._seed = seed
@@ -133,9 +136,9 @@ class StimulusNode:
             self._traces.pop(channel, None)
             self._stimulated = self._of_traces()
 
-    def _of_traces(self) -> list[tuple[type[Any], tuple[Channel, ...]]]:
+    def _of_traces(self) -> list[tuple[Batch, tuple[Channel, ...]]]:
         """Messages with a channel that is stimulated, and all their channels."""
-        return [(kind, channels) for kind, channels in _CHANNELS if not self._traces.keys().isdisjoint(channels)]
+        return [(batch, channels) for batch, channels in self._all if not self._traces.keys().isdisjoint(channels)]
 
     def value(self, channel: Channel) -> float | None:
         """Value of a channel that acts next; None where it is not stimulated."""
@@ -186,17 +189,22 @@ class StimulusNode:
             if self._start_ns is not None:
                 self.time_s = (now_ns - self._start_ns) * 1e-9
             extra, self._extra = self._extra, []
-            frames = self._transmitter.frames(now_ns, self._outgoing()) + extra
+            frames = self._stimulus(now_ns) + self._transmitter.frames(now_ns, self._outgoing()) + extra
             self.sent = frames
             return frames
 
-    def _outgoing(self) -> list[Message]:
-        out: list[Message] = []
+    def _stimulus(self, now_ns: int) -> list[Frame]:
+        frames: list[Frame] = []
         if self._traces:
             next_s = self.next_s
-            for kind, channels in self._stimulated:
+            for batch, channels in self._stimulated:
                 traces = [self._traces.get(channel) for channel in channels]
-                out.append(kind(*[value_at(trace, next_s) if trace else None for trace in traces]))
+                batch.write(*[value_at(trace, next_s) if trace else nan for trace in traces])
+                frames += batch.frames(now_ns)
+        return frames
+
+    def _outgoing(self) -> list[Message]:
+        out: list[Message] = []
         opens = self._opening > 0 and self.motion is not None
         if opens:
             self._opening -= 1

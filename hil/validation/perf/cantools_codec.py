@@ -24,6 +24,7 @@ from dbc.exchange import Transmitter
 from dbc.frame import BusName, Frame
 from dbc.intake import BAD_IN_ROW, FRESH, LAST_VALID_NS, RECEIVED, VALID_IN_ROW, WELL, WORD, Intake
 from ecu import node
+from hil.bench import stimulus
 from plant import reports
 
 
@@ -128,6 +129,7 @@ _REPLACED: tuple[tuple[ModuleType, str, Any], ...] = (
     (exchange, "Intake", _CantoolsIntake),
     (reports, "Batch", _CantoolsBatch),
     (node, "Batch", _CantoolsBatch),
+    (stimulus, "Batch", _CantoolsBatch),
 )
 
 
