@@ -175,6 +175,13 @@ def test_every_source_is_watched_from_the_first_odd_frame_on(parameters, source,
     assert judge_streams(ALL_CLEAN, late, IN_TIME, parameters.supervision, 0.01) is ALL_CLEAN
 
 
+def test_healed_streams_are_the_clean_ones_again(parameters):
+    """The same object, by which the rest of the law knows them."""
+    p = replace(parameters.supervision, **LIMITS)
+    streams = (CLEAN._replace(doubled=1, clean_s=1.0), *ALL_CLEAN[1:])
+    assert judge_streams(streams, (WELL,) * len(Source), IN_TIME, p, 1 / 64) is ALL_CLEAN
+
+
 def test_suspect_and_found():
     assert not CLEAN.suspect
     assert CLEAN._replace(foreign=1).suspect

@@ -63,6 +63,10 @@ def witnesses(judged):
         (beyond(-3.3125, -9.0), 2.5, 2.5, True),
         (-1.6875, 2.5, 2.5, False),
         (beyond(-1.6875), 2.5, 2.5, True),
+        (2.0, 0.6, 0.0, False),
+        (0.5, -0.1, 0.0, False),  # as the forces say, just
+        (0.625, 0.125, 0.0, False),  # as the wheels say, just
+        (beyond(0.625), 0.125, 0.0, True),
         (0.6, 0.2, 0.0, False),  # as the wheels say
         (0.6, 0.0, 0.2, False),  # as the forces say
     ],
@@ -82,10 +86,10 @@ def test_six_samples_are_a_fault_and_it_heals_where_the_wheels_agree(witnesses):
     assert bits == [0, 0, 0, 0, 0, BIT, BIT]
     witnesses.say(3.0, 0.0, 3.0, times=20)  # the forces agree: not enough
     assert witnesses.judged.bits == BIT
-    witnesses.say(0.5, 0.0, 3.0, times=15)
+    witnesses.say(0.875, 0.0, 3.0, times=8).say(3.0, 3.0, 0.0, times=7)
     assert witnesses.judged.bits == BIT
     assert not witnesses.believed
-    witnesses.say(0.5, 0.0, 3.0)
+    witnesses.say(0.875, 0.0, 3.0)
     assert (witnesses.judged.bits, witnesses.believed) == (0, True)
     witnesses.say(3.0, 0.0, 0.0, times=2)
     assert witnesses.judged.bits == 0
@@ -129,6 +133,22 @@ def test_what_bends_from_sample_to_sample_is_evidence_and_still_used(judged, sig
         assert judged.state[ACCELERATION_LEVEL] == 0.0
     judged.sample(AX=sign * (1.0 + 1e-9))
     assert judged.state[ACCELERATION_LEVEL] == 1 / 64
+
+
+def test_a_steep_straight_rise_is_none_up_to_the_jump(judged):
+    judged.sample(times=2)
+    start = judged.state.copy()
+    start[[BODY, WHEELS, FORCES]] = 16.0
+    start[LAST_AX] = 8.0  # from 0
+    for value, evidence in ((16.0, 0.0), (beyond(16.0), 1 / 64)):
+        judged.state = start
+        judged.sample(AX=value, grade=16.0, expected=16.0)
+        assert judged.state[ACCELERATION_LEVEL] == evidence
+
+
+def test_wheels_that_slow_down_show_it(judged):
+    judged.sample().sample(WHEEL=(79.99,) * 4)
+    assert judged.state[WHEELS] == pytest.approx(-0.005 * 64 / 16)
 
 
 def test_rough_values_are_a_fault_in_the_sixth(judged):

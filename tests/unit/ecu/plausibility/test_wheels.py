@@ -162,8 +162,18 @@ def test_wheels_that_hardly_turn_are_no_measure_for_another(judged):
     assert judged.sample(speed=0.0, WHEEL=(9.25, 0.8, -0.5, -0.7)).z[WHEEL] == 9.25
     judged.state[:] = 0.0
     assert judged.sample(speed=0.0, WHEEL=(9.5, 0.8, -0.5, -0.7)).z[WHEEL] != 9.5
-    judged.state[:] = 0.0
-    assert judged.sample(speed=0.0, WHEEL=(-1.0, 8.5, -0.5, -0.7)).z[WHEEL + 1] != 8.5
+    for others in ((-1.0, -0.5, -0.7), (0.0, 0.0, 0.0)):
+        judged.state[:] = 0.0
+        assert judged.sample(speed=0.0, WHEEL=(8.5, *others)).z[WHEEL] != 8.5
+        judged.state[:] = 0.0
+        assert judged.sample(speed=-5.0, WHEEL=(8.25, *others)).z[WHEEL] == 8.25
+
+
+def test_the_first_samples_of_three_wheels_do_not_hang_together(judged):
+    judged.sample(WHEEL=(nan, 80.0, 90.0, 85.0)).sample(WHEEL=(200.0, 80.0, 90.0, 85.0), speed=FAST)
+    assert judged.four(WHEEL) == (200.0, 80.0, 90.0, 85.0)
+    judged.sample(WHEEL=(240.0, 80.0, 90.0, nan), speed=FAST).sample(WHEEL=(80.0, 200.0, 90.0, 85.0), speed=FAST)
+    assert same(judged.four(WHEEL), (nan, nan, 90.0, 85.0))
 
 
 def test_a_rare_odd_sample_is_forgotten(judged):
@@ -171,3 +181,13 @@ def test_a_rare_odd_sample_is_forgotten(judged):
         judged.sample(WHEEL=one(2, 257.0, 80.0)).sample(times=200)
         assert judged.bits == 0
     assert judged.state[WHEEL_LEVEL + 2] == 0.0
+
+
+def test_a_missing_wheel_lets_no_other_jump(judged):
+    judged.sample(speed=FAST, WHEEL=(nan, 80.0, 90.0, 85.0)).sample(speed=FAST, WHEEL=(nan, 200.0, 90.0, 85.0))
+    assert same(judged.four(WHEEL), (nan, nan, 90.0, 85.0))
+
+
+def test_pressures_are_no_wheels(judged):
+    pressures = {"PRESSURE": (1e5,) * 4, "ASKED_PRESSURE": (1e5,) * 4}
+    assert judged.sample(speed=0.0, WHEEL=one(1, 150.0, 80.0), **pressures).z[WHEEL + 1] != 150.0
