@@ -145,9 +145,9 @@ class Reception:
 
         One sender's counter advances by one a cycle. Frames may be lost, late (then several come at once) or cease for
         any time; a counter that leaps without time for the frames between, or goes back, is not that sender's. Such
-        frames are refused until the counter fits the time again (by a cycle; that of the last frame, or that of the last
-        long run of frames, for one of the others may fit by chance), until `SILENT_CYCLES` without any frame, or until
-        the new counter has lived alone for `ADOPTED_CYCLES`.
+        frames are refused until the counter fits the time again (by a cycle; of the last frame, or of the last long run
+        of frames, as one of the others may fit by chance), until `SILENT_CYCLES` without any frame, or until the new
+        counter has lived alone for `ADOPTED_CYCLES`.
         """
         if status is _WRONG_CRC:
             self._note(now_ns, bad=1)
