@@ -87,7 +87,8 @@ def _actuate(z: Vector, p: Vector) -> None:
 
 
 @lru_cache(maxsize=16)
-def _numbers(p: EcuParameters) -> Vector:
+def actuation_parameters(p: EcuParameters) -> Vector:
+    """Parameter vector of the actuation."""
     sets = p.vehicle, p.friction_brake, p.motor, p.pedal, p.blend, p.compensation
     return np.array([*friction.gains(p.friction_brake), *(number for one in sets for number in numbers(one))])
 
@@ -113,7 +114,7 @@ def actuate(
             mass_factor, deceleration_mps2, factor, wheel_speed_rad_s, announced_w, dt_s,
         )
     )  # fmt: skip
-    _actuate(np.frombuffer(z), _numbers(parameters))
+    _actuate(np.frombuffer(z), actuation_parameters(parameters))
     a, b, c, d, soon, built, now, torque_nm, e, f, g, h, i, j, k, m = _UNPACK(z)
     charge = _new(blend.ChargePower, (soon, built, now))
     return _new(Actuation, ((a, b, c, d), charge, torque_nm, (e, f, g, h), (i, j, k, m)))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from dbc.messages import BrakeMode
 from ecu.law import base_brake, blend, estimator, modes, trouble_codes
 from ecu.law import pedal as pedal_travel
-from ecu.law.actuation import actuate
+from ecu.law.actuation import actuate, actuation_parameters
 from ecu.law.communication import ALL_CLEAN, Streams, judge_streams
 from ecu.law.plausibility import judge
 from ecu.law.types import PLAUSIBLE, UNKNOWN, ZERO, Brake, Four, Inputs, Outputs, Source
@@ -62,6 +62,8 @@ class Memory(NamedTuple):
 
 def initial_memory(parameters: EcuParameters) -> Memory:
     """State before the first step."""
+    for derived in (estimator.joint_parameters, judge.judge_parameters, actuation_parameters):
+        derived(parameters)  # kept beside the set from now on: no work of the first tick
     mu = parameters.friction_brake.pad_friction
     return Memory(
         time_s=0.0,

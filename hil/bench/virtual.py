@@ -1,6 +1,8 @@
 """The bench in virtual time: the same nodes, codec and protection in one process, as fast as the machine goes."""
 
+import gc
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -76,22 +78,35 @@ def simulate(
     frames: list[Frame] = []
     times: list[int] = []
     taking_part = members(scenario, plant or own_plant, ecu or own_ecu, stimulus_node)
-    for step in lockstep(taking_part) if line is None else line.lockstep(taking_part, (_STIMULUS_NODE,)):
-        if line is None:
-            frames += step.frames
-            times += [step.now_ns] * len(step.frames)
-        else:
-            heard = [one for one in line.heard() if isinstance(one, Frame)]
-            frames += heard
-            times += [frame.time_ns for frame in heard]
-        if each_tick is not None:
-            each_tick(step)
-        if step.member == _STIMULUS_NODE:
-            if stimulus_node.finished:
-                break
-            if stimulus_node.time_s is None and step.now_ns > HOLD_TIMEOUT_NS:
-                raise BenchError("the manoeuvre did not start: the plant never saw valid demands of an ECU")
+    with _no_collection():
+        for step in lockstep(taking_part) if line is None else line.lockstep(taking_part, (_STIMULUS_NODE,)):
+            if line is None:
+                frames += step.frames
+                times += [step.now_ns] * len(step.frames)
+            else:
+                heard = [one for one in line.heard() if isinstance(one, Frame)]
+                frames += heard
+                times += [frame.time_ns for frame in heard]
+            if each_tick is not None:
+                each_tick(step)
+            if step.member == _STIMULUS_NODE:
+                if stimulus_node.finished:
+                    break
+                if stimulus_node.time_s is None and step.now_ns > HOLD_TIMEOUT_NS:
+                    raise BenchError("the manoeuvre did not start: the plant never saw valid demands of an ECU")
     return Signals(Recording(Path(scenario.name), SPEC, frame_table(frames, times)))
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Without the collection of cyclic garbage, of which a run makes none: it would look through all frames so far."""
+    on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if on:
+            gc.enable()
 
 
 def frame_table(frames: Sequence[Frame], times_ns: Sequence[int]) -> FrameTable:
