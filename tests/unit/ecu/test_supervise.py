@@ -362,3 +362,22 @@ def test_frames_of_a_slow_source_do_not_disturb_the_count(running):
     running.tick(times=3, health=health)
     assert running.memory.valid_counts == (10,) * 10
     assert isinstance(Health(0.0, True, 0), tuple)
+
+
+def test_all_sources_lost_at_once(running):
+    running.tick(timed_out=(True,) * len(Source))
+    assert running.codes >= {f"{name}_lost" for name in NAMES.values()}
+    assert running.memory.valid_counts == (0,) * len(Source)
+
+
+@pytest.mark.parametrize("source", Source)
+def test_a_bad_frame_some_time_after_the_last_good_one_is_counted(running, source):
+    for changes in ({"age_s": 0.01, "fresh": False}, {"age_s": 0.0, "fresh": True}):
+        running.memory = running.memory._replace(valid_counts=(10,) * len(Source))
+        running.tick(health=running.health(source, bad_in_row=1, **changes))
+        assert running.memory.valid_counts[source] == 0
+
+
+def test_a_source_without_a_new_frame_hides_no_other(running):
+    health = with_one(running.health(Source.PEDAL, fresh=False), Source.STEERING, WELL._replace(age_s=math.inf))
+    assert timed_out_sources(running.inputs._replace(health=health), running.p) == out(Source.STEERING)

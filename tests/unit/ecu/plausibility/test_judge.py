@@ -124,5 +124,6 @@ def test_the_state_begins_with_zeros_and_opposing_torques_are_read_from_it():
 
 def test_what_was_believed_of_reports_ends_where_no_motor_is_excluded(judged):
     judged.state[layout.REPORTED] = 1.0
+    judged.state[layout.MOTOR_LEVEL : layout.MOTOR_LEVEL + 4] = 0.01
     assert judged.sample().state[layout.REPORTED] == 0.0
     assert judged.state[layout.BEGUN] == 1.0

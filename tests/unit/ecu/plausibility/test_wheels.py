@@ -191,3 +191,9 @@ def test_a_missing_wheel_lets_no_other_jump(judged):
 def test_pressures_are_no_wheels(judged):
     pressures = {"PRESSURE": (1e5,) * 4, "ASKED_PRESSURE": (1e5,) * 4}
     assert judged.sample(speed=0.0, WHEEL=one(1, 150.0, 80.0), **pressures).z[WHEEL + 1] != 150.0
+
+
+def test_without_the_observers_speed_the_car_may_stand(judged):
+    assert judged.sample(speed=nan, WHEEL=one(3, 8.5)).z[WHEEL + 3] != 8.5
+    judged.state[:] = 0.0
+    assert judged.sample(speed=nan, WHEEL=one(3, 8.25)).z[WHEEL + 3] == 8.25
