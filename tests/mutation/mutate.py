@@ -2,7 +2,7 @@
 
     python tests/mutation/mutate.py                      # all modules of modules.toml
     python tests/mutation/mutate.py dbc/e2e.py           # some
-    python tests/mutation/mutate.py --changed            # those that no run passed as they are (passed.toml)
+    python tests/mutation/mutate.py --changed            # those that have changed since they passed (passed.toml)
 
 The mutants are those of cosmic-ray's operators (`mutants`); each meets the tests that `modules.toml` names for its
 module (`trial`). A test that fails, an import that fails and tests that do not end kill a mutant. Exit code 1 where a
@@ -63,7 +63,7 @@ def main() -> int:
     modules = tomllib.loads((HERE / "modules.toml").read_text("utf-8"))["module"]
     parser = argparse.ArgumentParser(description="mutate safety-relevant modules; every survivor has to be listed")
     parser.add_argument("path", nargs="*", help=f"of {', '.join(m['path'] for m in modules)}; all by default")
-    parser.add_argument("--changed", action="store_true", help="only modules that no run passed as they are")
+    parser.add_argument("--changed", action="store_true", help="only modules that have changed since they passed")
     parser.add_argument("--workers", type=int, default=2)
     args = parser.parse_args()
     if unknown := set(args.path) - {m["path"] for m in modules}:
@@ -80,8 +80,8 @@ def main() -> int:
         if args.path and path not in args.path:
             continue
         now = state(module)
-        if args.changed and passed.get(path) == now:
-            print(f"{path}: passed as it is")
+        if args.changed and passed.get(path, now) == now:
+            print(f"{path}: passed as it is" if path in passed else f"{path}: LEFT OUT, no run has passed yet")
             continue
         if run(module, listed, args.workers):
             passed[path] = now
