@@ -99,7 +99,7 @@ def simulate(
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """Without the collection of cyclic garbage, of which a run makes none: it would look through all frames so far."""
+    """Without the collection of cyclic garbage, of which a run makes next to none: it would look through all frames so far."""
     on = gc.isenabled()
     gc.disable()
     try:

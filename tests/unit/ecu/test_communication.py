@@ -183,6 +183,7 @@ def test_healed_streams_are_the_clean_ones_again(parameters):
 
 
 def test_suspect_and_found():
+    assert CLEAN == (0, 0, 0, 0.0, False, False, False)
     assert not CLEAN.suspect
     assert CLEAN._replace(foreign=1).suspect
     assert not CLEAN._replace(corrupted=True).foreign_found

@@ -161,7 +161,8 @@ def test_which_channel_is_followed(read, memory, one, two, travel, suspect, swap
 
 
 def test_levels_count_up_and_slowly_down(read):
-    after, _ = read(AT_REST._replace(levels=LEVELS_S), 0.5, 0.5)
+    after, reading = read(AT_REST._replace(levels=LEVELS_S), 0.5, 0.5625)
+    assert reading.travel == 0.53125
     assert after.levels == (0.25 * TICK_S, 0.0, 1.25 * TICK_S)
     after, reading = read(AT_REST._replace(levels=LEVELS_S), 0.9, 0.5)
     assert after.levels == (1.5 * TICK_S, 0.0, 2.5 * TICK_S)
