@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from dbc.bench_messages import ManoeuvreState, TruthMotion
+from dbc.bench_messages import ManoeuvreState
 from dbc.frame import BusName
 from hil.bench.recorder import RecorderError
 from hil.bench.stimulus import StimulusNode
@@ -25,6 +25,7 @@ from hil.scenario.scenario import Scenario
 RECORDING = "recording.log"
 HOLD_TIMEOUT_NS = 15_000_000_000
 LOST_TIMEOUT_NS = 2_000_000_000  # without any word of the plant's motion no manoeuvre goes on
+LOST = f"the plant said nothing of its motion for {LOST_TIMEOUT_NS * 1e-9:g} s"
 Say = Callable[[str], None]
 
 
@@ -138,8 +139,6 @@ class BenchRun(ABC):
         self._stop_signal = stop
         self._second = -1
         self._left = False
-        self._motion: TruthMotion | None = None
-        self._moved_ns = 0
         prepare_folder(out)
 
     @property
@@ -233,10 +232,8 @@ class BenchRun(ABC):
                 return
             self.watch.begin()
         self.state = BenchState.FINISHED if self.stimulus_node.finished else BenchState.DRIVING
-        if motion is not self._motion:
-            self._motion, self._moved_ns = motion, now_ns
-        if motion is None or now_ns - self._moved_ns > LOST_TIMEOUT_NS:
-            raise BenchError(f"the plant said nothing of its motion for {LOST_TIMEOUT_NS * 1e-9:g} s")
+        if motion is None or (self.stimulus_node.motion_age_ns(now_ns) or 0) > LOST_TIMEOUT_NS:
+            raise BenchError(LOST)
         if now_ns // 1_000_000_000 != self._second:
             self._second = now_ns // 1_000_000_000
             self._say(f"driving: {(motion.speed_mps or 0.0) * 3.6:5.1f} km/h, {motion.distance_m or 0.0:6.1f} m")

@@ -111,6 +111,10 @@ class StimulusNode:
         """The plant's last word about its motion."""
         return self._receiver.latest(TruthMotion)
 
+    def motion_age_ns(self, now_ns: int) -> int | None:
+        """Time since the plant's last word about its motion; None before the first."""
+        return self._receiver.age_ns(TruthMotion, now_ns)
+
     @property
     def next_s(self) -> float:
         """Manoeuvre time at which a command given now acts."""

@@ -10,7 +10,16 @@ import numpy as np
 from dbc.exchange import Transmitter
 from dbc.frame import BusName, Frame, Node, Received
 from ecu.node import EcuNode
-from hil.bench.bench_run import HOLD_TIMEOUT_NS, BenchError, BenchRun, BenchState, Say, silent
+from hil.bench.bench_run import (
+    HOLD_TIMEOUT_NS,
+    LOST,
+    LOST_TIMEOUT_NS,
+    BenchError,
+    BenchRun,
+    BenchState,
+    Say,
+    silent,
+)
 from hil.bench.node_process import ECU, NODE_PERIOD_NS, PLANT, Role
 from hil.bench.port import OwnedNode
 from hil.bench.recorder import Recorder
@@ -71,7 +80,7 @@ def simulate(
     Raises
     ------
     BenchError
-        The manoeuvre did not start within 15 s of virtual time.
+        The manoeuvre did not start within 15 s of virtual time, or the plant fell silent for 2 s.
     """
     own_plant, own_ecu = own_nodes(scenario, seed)
     stimulus_node = StimulusNode(scenario.blending, (*scenario.faults, *faults), seed=seed)
@@ -94,12 +103,14 @@ def simulate(
                     break
                 if stimulus_node.time_s is None and step.now_ns > HOLD_TIMEOUT_NS:
                     raise BenchError("the manoeuvre did not start: the plant never saw valid demands of an ECU")
+                if (stimulus_node.motion_age_ns(step.now_ns) or 0) > LOST_TIMEOUT_NS:
+                    raise BenchError(LOST)
     return Signals(Recording(Path(scenario.name), SPEC, frame_table(frames, times)))
 
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """Without the collection of cyclic garbage, of which a run makes next to none: it would look through all frames so far."""
+    """Without the collection of cyclic garbage: a run makes next to none, and it would look through all frames so far."""
     on = gc.isenabled()
     gc.disable()
     try:

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from dbc.frame import BusName, Frame
-from hil.bench.bench_run import BenchState
+from hil.bench.bench_run import BenchError, BenchState
 from hil.bench.result import Signals, measure
 from hil.bench.virtual import VirtualBench, frame_table, simulate
+from hil.faults.catalogue import injection
 from hil.scenario.scenario import StartOrder, load_scenario
 
 SHORT = """title = "short stop"
@@ -158,3 +159,8 @@ def test_frames_of_a_scenario_are_lost_in_their_time(tmp_path):
 def _written(path, text):
     path.write_text(text)
     return path
+
+
+def test_a_plant_that_falls_silent_ends_the_simulation(short):
+    with pytest.raises(BenchError, match="said nothing of its motion for 2 s"):
+        simulate(short, faults=[injection("process_killed", "PLANT", at_s=0.3)])
