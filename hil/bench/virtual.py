@@ -110,7 +110,7 @@ def simulate(
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """Without the collection of cyclic garbage: a run makes next to none, and it would look through all frames so far."""
+    """Without the collection of cyclic garbage: a run makes next to none, and it would look through all frames."""
     on = gc.isenabled()
     gc.disable()
     try:
