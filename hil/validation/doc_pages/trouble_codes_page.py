@@ -31,7 +31,8 @@ A frame is used when its check value, its length, its counter and its time are r
 
 - Up to two frames in a row may be lost, and frames may be late and come several at once, without any code.
 - A counter that leaps without time for the frames between, or goes back, is not this sender's. Such frames are refused
-  until the counter is the one that is due by the cycle time (within a cycle), or until no frame has come for 15 cycles
+  until the counter is the one that is due by the cycle time (within a cycle, from the last frame or from the
+  last long run of frames), or until no frame has come for 15 cycles
   (a sender that restarted), or until the new counter has lived alone for 1000 cycles.
 - The same counter with other bytes, and more frames than cycles, tell of a second sender in its first tick.
 - From the first foreign pedal frame on the demand does not fall: the largest of the last ticks is held. When a second
