@@ -209,6 +209,7 @@ def test_fixtures_in_parallel(run_pytest, tmp_path):
     assert "BRK-7: failed (1 test)" in out
 
 
+@pytest.mark.slow
 def test_an_ecu_that_says_nothing_is_named(run_pytest):
     out = output(run_pytest(OWN_ECU), 1)
     assert "BenchError: the manoeuvre did not start: the plant never saw valid demands of an ECU" in out
@@ -225,6 +226,7 @@ def test_an_exception_in_an_own_node_is_shown_with_file_and_line(run_pytest):
     assert "1 broken" in out
 
 
+@pytest.mark.slow
 def test_the_wall_time_limit(run_pytest):
     endless = "def test_endless(bench):\n    bench.run_until(lambda b: False, timeout=1e6)\n"
     out = output(run_pytest(endless, "--brakebench-limit", "1"), 1)
@@ -232,6 +234,7 @@ def test_the_wall_time_limit(run_pytest):
     assert named(out, "report").exists()
 
 
+@pytest.mark.slow
 def test_interrupted_in_virtual_time(run_pytest, tmp_path):
     text = "def test_endless(bench):\n    bench.run_until(lambda b: False, timeout=1e6)\n"
     process = run_pytest(text, "--brakebench-out", "files")

@@ -173,6 +173,7 @@ def test_a_killed_bench_leaves_no_orphan(start, channel, tmp_path):
     assert Signals(log_of(tmp_path)).decoded.rejected == 0
 
 
+@pytest.mark.slow
 def test_a_second_bench_on_the_channel_is_refused(start, brakebench, channel, tmp_path):
     first = start("run", LASTING, "--json", "--realtime", "--bus", channel, "--out", "out")
     await_truth(first, tmp_path, 10)
