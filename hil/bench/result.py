@@ -33,7 +33,6 @@ _SI = {f"{spec.name}.{field.signal}": field.si_per_unit for spec in _SPECS.value
     for signal in (CRC_SIGNAL, COUNTER_SIGNAL)
 }
 _WRONG_LENGTH = "wrong length"
-_NEVER_NS = 1 << 62  # a message without a cycle has no gaps
 _WHY = {FrameUse.CORRUPT: "corrupt", FrameUse.REPEATED: "repeated", FrameUse.OUT_OF_SEQUENCE: "out of sequence"}
 
 
@@ -109,7 +108,7 @@ def _use_of(spec: MessageSpec, recording: Recording, rows: NDArray[np.int64]) ->
     frames = recording.frames
     data, length = frames.data[rows], frames.length[rows]
     if spec.data_id is not None:
-        gap_ns = 3 * spec.cycle_ns or _NEVER_NS  # a shorter gap leaves the sequence as it is
+        gap_ns = 3 * spec.cycle_ns  # a shorter gap leaves the sequence as it is; a command, without a cycle, has none
         return use_of_frames(data, length, frames.time_ns[rows], spec.data_id, spec.length, gap_ns)
     return np.where(length == spec.length, FrameUse.USED, FrameUse.CORRUPT).astype(np.uint8)
 

@@ -86,7 +86,7 @@ def test_faults_by_hand_act_in_the_processes_and_are_on_record(bench, brakebench
 def test_a_disk_that_is_full_ends_the_recording_not_the_loop(bench, brakebench, channel):
     process, _, _, log = bench
     brakebench("inject", "disk_full", "--bus", channel)
-    result = result_of(process, expected=3)
+    result = result_of(process, expected=5)
     assert "INCOMPLETE" in result["reason"]
     assert Signals(log).decoded.rejected == 0
     _, mode = Signals(log).get("BRAKE_STATUS.MODE")

@@ -48,7 +48,7 @@ def test_motor_loss_on_vcan(
     kept_up = done.returncode == 0
     if kept_up:
         assert "BRK-7: passed (1 test)" in done.stdout
-    else:  # one processor of User-Mode Linux for five processes: the output must say so, or the budget of 1 m/s2 be kept
+    else:  # one processor of User-Mode Linux for five processes: the output says so, or the budget of 1 m/s2 is kept
         assert "BRK-7: failed (1 test)" in done.stdout, done.stdout + done.stderr
         skipped = re.search(r"^overruns: \d+ ticks skipped, the machine was too busy", done.stdout, re.MULTILINE)
         assert skipped or re.search(r"assert 0\.\d+ < 0\.3", done.stdout), done.stdout
