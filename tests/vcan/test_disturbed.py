@@ -34,6 +34,7 @@ HOUR_S = 3600.0
 APART_S = 0.1  # of frames of one tick; a busy machine sends them late, an hour it is not
 BACK_S = 0.3  # after the interface is up again
 DOWN_S = 0.5
+READ_S = 0.1  # until a reader has taken what had arrived
 BURST_S = 0.2
 
 TICK_NS = 10_000_000
@@ -178,7 +179,9 @@ def test_frames_flow_again_soon_after_the_interface_is_up_and_none_is_stale(
     assert result["link_states"] == {"disconnected": 1, "restarted": 1}
 
     frames = [(time_s - ahead_s, can_id) for time_s, can_id in stamps(log)["vehicle"]]
-    assert not [time_s for time_s, can_id in frames if can_id < 0x800 and down_s + 0.01 < time_s < early_s]
+    # what was on its way when the interface went down may be stamped when its reader looks next
+    down = [time_s - down_s for time_s, can_id in frames if can_id < 0x800 and down_s + READ_S < time_s < early_s]
+    assert not down, down
     first_s = {}
     for message in contract(BusName.VEHICLE).by_id.values():
         later = [time_s for time_s, can_id in frames if can_id == message.can_id and time_s >= early_s]
