@@ -36,16 +36,20 @@ from ecu.law.plausibility.layout import (
 Vector = NDArray[np.float64]
 
 SLOWEST_MPS = 3.0  # below, teeth are sparse, and a brake that holds gives no force
+SLIDING = 0.05  # slip of the median wheel, far beyond that of braking with grip (1 to 2 %)
 UNLIKE = 0.5  # share of the tolerance within which the two witnesses must agree to overrule the sensor
 
 
 @helper
-def judge_acceleration(s: Vector, z: Vector, p: Vector, expected: float, grade: float, begun: bool, dt: float) -> int:
+def judge_acceleration(
+    s: Vector, z: Vector, p: Vector, car_mps: float, expected: float, grade: float, begun: bool, dt: float
+) -> int:
     """Take an acceleration that cannot be right out of ``z``; returns the fault's bit.
 
     Wrong is what jumps as no car does, and what neither the wheels nor the force balance (``expected``, m/s2, NaN
     where there is none) show while these two agree: each of them is wrong alone where wheels slide, pads fade or a
-    pressure is wrong. What is too rough sample by sample is no noise of this sensor.
+    pressure is wrong. Where the wheels slide against the observer's speed, both are wrong alike: then nothing is
+    compared. What is too rough sample by sample is no noise of this sensor.
     """
     ax = z[AX]
     share = dt / (p[ACCELERATION_LAG_S] + dt)
@@ -54,7 +58,7 @@ def judge_acceleration(s: Vector, z: Vector, p: Vector, expected: float, grade: 
         if not isnan(z[WHEEL + i]):
             number += 1
     speed = median_wheel(z) * p[RADIUS] if number >= 2 else 0.0
-    if isnan(ax) or isnan(expected) or speed < SLOWEST_MPS:
+    if isnan(ax) or isnan(expected) or speed < SLOWEST_MPS or speed < (1.0 - SLIDING) * car_mps:
         s[BODY] = np.nan
         s[LAST_AX], s[BEFORE_AX] = ax, np.nan
         return _count(s, z, p, 0.0, dt)

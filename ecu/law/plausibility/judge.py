@@ -70,7 +70,7 @@ def judge_sample(
     bits, top = judge_wheels(s, z, p, 0.0 if isnan(speed) else speed, begun, dt)
     bits |= judge_pressures(s, z, p, dt)
     bits |= judge_motors(s, z, p, dt)
-    bits |= judge_acceleration(s, z, p, expected, grade, begun, dt)
+    bits |= judge_acceleration(s, z, p, 0.0 if isnan(speed) else speed, expected, grade, begun, dt)
     s[BEGUN] = 1.0
     return bits, top
 
