@@ -256,18 +256,10 @@ def test_the_command_prints_a_table_and_one_json_object(capsys):
 
 
 OPEN = {  # what the controller still misses; each is to go
-    ("silent", "EHB_DEMAND_FRONT", "detect"),  # the brake says so at once, it is tolerated for 0.3 s
-    ("silent", "EHB_DEMAND_REAR", "detect"),
-    ("second_sender", "EHB_DEMAND_FRONT", "detect"),  # what the brake lacks is within the tolerance of the pressures
-    ("second_sender", "EHB_DEMAND_FRONT", "stale_used"),
-    *((name, "BODY_MOTION.LONGITUDINAL_ACCELERATION", "detect")
-      for name in ("signal_value", "signal_offset", "signal_step", "signal_random")),
-    *((name, f"BRAKE_PEDAL.PEDAL_TRAVEL_{k}", "recovery")  # heals later than its trouble code says
-      for name in ("signal_offset", "signal_gain", "signal_stuck") for k in (1, 2)),
-    *((name, target, "recovery")  # the stream that goes on is refused for ten seconds
-      for name in ("counter_random", "counter_jump")
-      for target in ("BRAKE_PEDAL", "WHEEL_SPEED_FRONT", "EHB_PRESSURE_FRONT", "MOTOR_STATUS_FRONT")),
-}  # fmt: skip
+    # a wrong sensor moves the observer's speed away from the wheels, as wheels that slide do: then nothing is compared
+    (name, "BODY_MOTION.LONGITUDINAL_ACCELERATION", "detect")
+    for name in ("signal_value", "signal_offset")
+}
 
 
 @pytest.mark.slow
