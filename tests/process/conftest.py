@@ -10,6 +10,8 @@ import pytest
 from processes import RUN_LIMIT_S, heed_interrupts
 
 COMMAND = [sys.executable, "-m", "hil.cli.main"]
+INCONCLUSIVE = 4  # the verdict on a run that a busy machine disturbed: it tells nothing, so it is made again
+RUNS = 3
 
 
 @pytest.fixture
@@ -41,17 +43,19 @@ def brakebench(tmp_path):
     """Run a command to its end in a folder of its own; ``check`` is the exit code that it must have, or several."""
 
     def run(*arguments, check=0, env=None):
-        done = subprocess.run(
-            [*COMMAND, *arguments],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            timeout=RUN_LIMIT_S,
-            env=os.environ | (env or {}),
-        )
-        assert done.returncode in (check if isinstance(check, tuple) else (check,)), (
-            f"exit {done.returncode}\n{done.stdout}\n{done.stderr}"
-        )
+        wanted = check if isinstance(check, tuple) else (check,)
+        for _ in range(RUNS):
+            done = subprocess.run(
+                [*COMMAND, *arguments],
+                cwd=tmp_path,
+                capture_output=True,
+                text=True,
+                timeout=RUN_LIMIT_S,
+                env=os.environ | (env or {}),
+            )
+            if done.returncode != INCONCLUSIVE or INCONCLUSIVE in wanted:
+                break
+        assert done.returncode in wanted, f"exit {done.returncode}\n{done.stdout}\n{done.stderr}"
         return done
 
     return run
