@@ -51,7 +51,7 @@ class NuisanceFit:
         self._masks, self._base, self._relinearise = masks, base, relinearise
         recordings = simulator.dataset.recordings
         measured = all(recording.log.disc_temperature_k is not None for recording in recordings)
-        self.nuisances = (*vehicle.nuisances, *recording_nuisances(measured, vehicle.node_latency_s))
+        self.nuisances = (*vehicle.nuisances, *recording_nuisances(measured, vehicle.latencies))
         self._steps: Floats = np.full(len(self.nuisances), _COARSE)
         self.fitter = Fitter(simulator, masks, base, self.nuisances, {})
         self._taken: deque[tuple[Floats, tuple[Term, ...], Fitter]] = deque(maxlen=_REMEMBERED)

@@ -24,11 +24,13 @@ OF_LATENCY = (
     Excitation.NONE,
     Excitation.BRAKES,
     Excitation.MOTORS,
-    Excitation.BRAKES | Excitation.MOTORS,
+    Excitation.BRAKES,
+    Excitation.MOTORS,
     Excitation.TURNING,
     Excitation.TURNING,
+    Excitation.NONE,
 )
-"""For the latency of each node (`hil.diagnosis.vehicle.priors.LATENCY_NODES`)."""
+"""For the latency of each node (`hil.diagnosis.vehicle.latency.LATENCY_NODES`)."""
 
 
 def _of_parameters() -> NDArray[np.int64]:

@@ -16,6 +16,7 @@ from hil.diagnosis.data.grid import averaged, cubic, shifted, shifted_linear, up
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.sensors import after_sensors
+from hil.diagnosis.vehicle.latency import LATENCY_NODES
 from plant.injection.sensing_chain import Chain
 from plant.parameters.plant import PlantParameters
 from plant.vectors import INPUT, P
@@ -33,9 +34,11 @@ SOURCE = {
 """Columns of the plant that each group of channels measures."""
 Stack = dict[str, Floats]
 """Channels by group, (samples of all recordings, channels)."""
-_LATE = {"ax": (0,), "ay": (0,), "yaw": (0, 5), "pressure": (1,)}
-"""Latencies of a parameter set that each group has."""
-_MOTOR = 2
+_LATE = {
+    "ax": ("imu",), "ay": ("imu",), "yaw": ("imu", "yaw_rate"), "pressure": ("pressure",), "motor": ("motor",),
+    "gps": ("ground_speed",),
+}  # fmt: skip
+"""Nodes whose latencies each group has."""
 _USUAL_RADIUS_M = 0.3
 _TOOTH_ROWS, _TURNS_RAD_S = 2.0, 0.1
 _FADING_MPS, _LEAST_NM = 0.3, 1.0
@@ -44,7 +47,8 @@ _FINER = 4
 """Points per row between which a motor's torque is linear: its lag bends it, and a straight line from row to row would
 come 1.3 ms late."""
 
-_MEASURED = (("pressure_pa", 1), ("motor_torque_nm", 2), ("motor_torque_bend_nm", 2))
+_MEASURED = (("pressure_pa", "pressure"), ("motor_torque_nm", "motor"), ("motor_torque_bend_nm", "motor"))
+_DEMANDS = (("pressure_demand_pa", "pressure_demand"), ("motor_demand_nm", "motor_demand"))
 _STEERING = INPUT.slice("steering_wheel_rad")
 
 
@@ -86,7 +90,7 @@ class MeasurementModel:
         others = {group: values for group, values in true.items() if group != "motor"}
         stack = after_sensors(others, chain, ROW_S) if others else {}
         for group, values in stack.items():
-            late = sum(parameters.latency_s[k] for k in _LATE.get(group, ()))
+            late = _latency_s(parameters.latency_s, group)
             if late:
                 stack[group] = delayed(values, late / ROW_S, straight=group == "pressure")
             elif group == "wheel":
@@ -97,7 +101,7 @@ class MeasurementModel:
             fine = _finer(true["motor"], recording.inputs[:, INPUT.slice("motor_torque_bend_nm")])
             fine = after_sensors({"motor": fine}, chain, ROW_S / _FINER)["motor"]
             stack["motor"] = np.empty_like(true["motor"])
-            shifted_linear(fine, _FINER, _FINER * parameters.latency_s[_MOTOR] / ROW_S, stack["motor"])
+            shifted_linear(fine, _FINER, _FINER * _latency_s(parameters.latency_s, "motor") / ROW_S, stack["motor"])
         return stack
 
     def _at_measured_speed(self, channels: Stack, recording: Recording) -> None:
@@ -177,29 +181,36 @@ def delayed(values: Floats, rows: float, straight: bool = False) -> Floats:
     return out
 
 
-def _held_later(values: Floats, rows: float) -> Floats:
-    """Held values that change a fraction of a row later (earlier where negative), as the mean over each row."""
-    change = np.diff(values, axis=0)
-    moved = values.copy()
-    if rows >= 0.0:
-        moved[1:] -= min(rows, 1.0) * change
-    else:
-        moved[:-1] += min(-rows, 1.0) * change
-    return moved
+def held_later(values: Floats, rows: float) -> Floats:
+    """Held values, (rows, columns), that change some rows later (earlier where negative), as the mean over each row."""
+    whole, share = divmod(rows, 1.0)
+    at = np.arange(len(values)) - int(whole)
+    last = len(values) - 1
+    now, before = values[np.clip(at, 0, last)], values[np.clip(at - 1, 0, last)]
+    return np.asarray(now + share * (before - now))
+
+
+def _latency_s(latencies_s: tuple[float, ...], group: str) -> float:
+    return sum(latencies_s[LATENCY_NODES.index(node)] for node in _LATE.get(group, ()))
 
 
 def without_latency(inputs: Floats, late_s: tuple[float, ...]) -> Floats:
-    """Measured inputs, (rows, INPUT.size), with their nodes' latency (s) taken back; demands when they are acted on."""
-    if not any(late_s[1:5]):
+    """Measured inputs, (rows, INPUT.size), with their nodes' latency (s) taken back; demands when they are acted on.
+
+    ``late_s`` are the latencies of `LATENCY_NODES`, s.
+    """
+    rows = {node: late / ROW_S for node, late in zip(LATENCY_NODES, late_s, strict=True) if late}
+    if not rows:
         return inputs
     moved = inputs.copy()
-    moved[:, _STEERING] = delayed(inputs[:, _STEERING], late_s[4] / ROW_S)
-    for part in ("pressure_demand_pa", "motor_demand_nm"):
-        where = INPUT.slice(part)
-        moved[:, where] = _held_later(inputs[:, where], late_s[3] / ROW_S)
-    for part, late in _MEASURED:
-        where = INPUT.slice(part)
-        moved[:, where] = delayed(inputs[:, where], -late_s[late] / ROW_S, straight=True)
+    if late := rows.get("steering"):
+        moved[:, _STEERING] = delayed(inputs[:, _STEERING], late)
+    for part, node in _DEMANDS:
+        if late := rows.get(node):
+            moved[:, INPUT.slice(part)] = held_later(inputs[:, INPUT.slice(part)], late)
+    for part, node in _MEASURED:
+        if late := rows.get(node):
+            moved[:, INPUT.slice(part)] = delayed(inputs[:, INPUT.slice(part)], -late, straight=True)
     return moved
 
 

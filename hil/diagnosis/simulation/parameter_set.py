@@ -13,7 +13,8 @@ from hil.diagnosis.data.log import Floats
 from hil.diagnosis.simulation import excitation
 from hil.diagnosis.simulation.sensors import SENSORS
 from hil.diagnosis.vehicle.extension_file import Extension
-from hil.diagnosis.vehicle.priors import LATENCY_NODES, Nuisance, NuisanceKind, factor_of
+from hil.diagnosis.vehicle.latency import LATENCY_NODES
+from hil.diagnosis.vehicle.priors import Nuisance, NuisanceKind, factor_of
 from hil.diagnosis.vehicle.spec import Vehicle
 from plant.excitation import Excitation
 from plant.injection.bank import NO_TERMS
@@ -95,7 +96,7 @@ class ParameterSet:
                         p[at] += amount * step
                     case NuisanceKind.SENSOR | NuisanceKind.SIDE_TO_SIDE | NuisanceKind.LINE_LAG:
                         theta[at] += amount * step
-                    case NuisanceKind.LATENCY | NuisanceKind.DEMAND_LATENCY:
+                    case NuisanceKind.LATENCY:
                         late[at] += amount * step
                     case NuisanceKind.DISC_TEMPERATURE:
                         disc += amount * step
@@ -132,7 +133,7 @@ def _positive(now: float, z: float, step: float) -> float:
 
 def nominal(vehicle: Vehicle) -> ParameterSet:
     """Parameter set of the nominal vehicle."""
-    return ParameterSet(vehicle.p, THETA.neutral())
+    return ParameterSet(vehicle.p, THETA.neutral(), latency_s=tuple(one.value_s for one in vehicle.latencies))
 
 
 def _strengths(effect: str) -> list[int]:

@@ -68,10 +68,6 @@ SPECIAL: Final = {
 }  # fmt: skip
 """Names that are not a parameter of the plant by themselves; brake gains are N m at one wheel per Pa."""
 
-LATENCY: Final = "node_latency_s"
-"""Latency of a node's frames behind those of the wheel speeds; a set states its tolerance alone."""
-LATENCY_S: Final = 4e-3
-"""Default half-width of the latency, s."""
 LINE: Final = "line_lag_s"
 """Lag of the pads behind the pressure sensors, as one pole; a set states its tolerance alone."""
 LINE_S: Final = 8e-3

@@ -14,8 +14,6 @@ from hil.diagnosis.data.log import UnusableError
 from hil.diagnosis.vehicle.keys import (
     ALIASES,
     DERIVED,
-    LATENCY,
-    LATENCY_S,
     LINE,
     LINE_S,
     SPECIAL,
@@ -23,8 +21,11 @@ from hil.diagnosis.vehicle.keys import (
     WIDE,
     split_name,
 )
+from hil.diagnosis.vehicle.latency import ALL_NODES, LATENCY_KEYS, latencies
 from hil.diagnosis.vehicle.priors import (
+    INSTRUMENTS,
     Nuisance,
+    instruments,
     line_lag,
     nuisance_parameters,
     side_to_side_variation,
@@ -43,10 +44,10 @@ _THRESHOLD = "friction_brake_threshold_pressure_pa"
 _BALANCE = 0.3
 """Half-width of an axle's cornering stiffness beside the other axle's, where the set does not state the tyres'."""
 _BRAKES, _MOTORS = "suspension_brake_support_tangent", "suspension_drive_support_tangent"
-_KNOWN = sorted({*ALIASES, *DERIVED, *SPECIAL, *PARAMETER.sizes})
+_KNOWN = sorted({*ALIASES, *DERIVED, *SPECIAL, *LATENCY_KEYS, *PARAMETER.sizes})
 _FORMS = ("tyre_", "suspension_")
 """Sections with curves that hardly a set states: what it does not state gets a wide prior."""
-_TOLERANCES_ONLY = (f"{LATENCY}_tolerance", f"{LINE}_tolerance")
+_TOLERANCES_ONLY = tuple(f"{key}_tolerance" for key in (ALL_NODES, LINE, *INSTRUMENTS))
 """Keys of parameters that have a tolerance and no value."""
 _CONSEQUENCES = {
     "ehb": "pressures are compared only where their demand has been zero for a while, and left with right where the "
@@ -142,11 +143,13 @@ def _from_flat(table: Mapping[str, Any], where: str) -> Vehicle:
         nuisances = _merge_axles(nuisances, _THRESHOLD)
     if unlimited:  # a set with every limit is from measurements, also of each wheel
         nuisances = (*nuisances, *side_to_side_variation(vehicle.p, motors="motor" not in unstated))
+    nuisances = (*nuisances, *instruments(stated.tolerances, not unlimited, motors="motor" not in unstated))
     nuisances = (*nuisances, *line_lag(stated.tolerances.get(LINE, LINE_S)))
     suspension = {name for name in PARAMETER.sizes if name.startswith("suspension_")}
     return replace(
         vehicle, nuisances=nuisances, unstated=unstated, unlimited=unlimited,
-        suspension_stated=suspension <= stated.names, node_latency_s=stated.tolerances.get(LATENCY, LATENCY_S),
+        suspension_stated=suspension <= stated.names,
+        latencies=latencies(stated.values, stated.tolerances, measured=not unlimited),
     )  # fmt: skip
 
 
@@ -158,7 +161,8 @@ def _stated(table: Mapping[str, Any], where: str, base: PlantParameters) -> _Sta
             _derive(stem, float(value), key != stem, base, stated)
             continue
         name = ALIASES.get(stem, stem)
-        if name not in SPECIAL and name not in PARAMETER.sizes and key not in _TOLERANCES_ONLY:
+        known = name in SPECIAL or name in PARAMETER.sizes or name in LATENCY_KEYS
+        if not known and key not in _TOLERANCES_ONLY:
             if not isinstance(value, str):
                 near = get_close_matches(stem, _KNOWN, 1)
                 hint = f"; did you mean {near[0]!r}?" if near else ""

@@ -1,6 +1,6 @@
 """Nuisance parameters and their priors: what a vehicle set states, what no set states, and what the logs leave open."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hil.diagnosis.data.log import WHEELS, Floats
-from hil.diagnosis.vehicle.keys import LATENCY_S
+from hil.diagnosis.vehicle.latency import LATENCY_NODES, Latency
 from plant.effects.effect import NODES
 from plant.injection.theta import THETA
 from plant.vectors import PARAMETER, P
@@ -39,9 +39,7 @@ class NuisanceKind(StrEnum):
     LINE_LAG = "line_lag"
     """Lag of the pads behind the pressure sensors, in theta; not negative."""
     LATENCY = "latency"
-    """Latency of a node's frames behind those of the wheel speeds."""
-    DEMAND_LATENCY = "demand_latency"
-    """Latency from a logged demand to its action; not negative."""
+    """Latency of a node's frames behind those of the wheel speeds, or from a logged demand to its action."""
     DISC_TEMPERATURE = "disc_temperature"
     """Temperature of the discs at the start."""
     TOOTH_LAG = "tooth_lag"
@@ -50,7 +48,7 @@ class NuisanceKind(StrEnum):
     """Time over which a toothed wheel's speed is a mean; not negative."""
 
 
-_NOT_NEGATIVE = (NuisanceKind.DEMAND_LATENCY, NuisanceKind.TOOTH_WINDOW, NuisanceKind.LINE_LAG)
+_NOT_NEGATIVE = (NuisanceKind.TOOTH_WINDOW, NuisanceKind.LINE_LAG)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +59,7 @@ class Nuisance:
     ----------
     at : indices in the vector that ``kind`` says.  step : (len(at),) prior standard deviations, in its units.
     bound : largest z; a parameter farther off is a cause to be named.
-    upper_bound : largest z > 0 for which the equation has a meaning.
+    upper_bound, lower_bound : largest z > 0 and smallest z < 0 for which the equation has a meaning.
     """
 
     name: str
@@ -70,11 +68,12 @@ class Nuisance:
     kind: NuisanceKind = NuisanceKind.VEHICLE
     bound: float = 3.0
     upper_bound: float = np.inf
+    lower_bound: float = -np.inf
 
     @property
     def lower(self) -> float:
         """Smallest z."""
-        return 0.0 if self.kind in _NOT_NEGATIVE else -self.bound
+        return 0.0 if self.kind in _NOT_NEGATIVE else max(-self.bound, self.lower_bound)
 
     @property
     def upper(self) -> float:
@@ -238,6 +237,16 @@ _SIDE_TO_SIDE = (
 """Effect and parameter by wheel: zero and gain of a pressure sensor; torque of a motor beside its demand and beside its
 measured value; friction of the pads; radius of a wheel. Their prior sd is that from part to part
 (docs/decisions/nuisance-parameters.md)."""
+INSTRUMENTS = {
+    "motor_torque_scale": ("iwm_gain", "unseen", 0.03), "motor_demand_scale": ("iwm_gain", "gain", 0.03),
+    "ax_scale": ("imu_gain", "gain", 0.02), "ax_zero_mps2": ("imu_bias", "ax_mps2", 0.05),
+    "ground_speed_scale": ("speed_scale", "gain", 0.01), "road_grade": ("road_grade", "grade", 0.005),
+    "wind_mps": ("headwind", "wind_mps", 2.0),
+}  # fmt: skip
+"""Effect, parameter and half-width of what instruments and the road usually differ from what they are taken for, where
+a set does not state it: true beside measured, and measured beside demanded torque of all motors (3 %: an estimate by
+current), scale and zero of the accelerometer (2 %, 0.05 m/s2 within a run), a satellite receiver's speed, a level
+road's slope, a light breeze (Beaufort 2). Sizes: docs/effects.md."""
 _STRAIGHT_AHEAD_RAD = 0.01
 """Prior sd of the steering wheel's angle straight ahead: half a degree. Workshop manuals let the sensor's zero be set
 within 3 to 5 degrees (Hyundai Motor, Grandeur 2006: within 5, nonlinear by 2.5)."""
@@ -263,6 +272,23 @@ def side_to_side_variation(p: Floats, motors: bool) -> list[Nuisance]:
     return [*wheels, *clocks, _in_theta("zero_steering", "steer_lateral", "offset_rad", zero)]
 
 
+def instruments(tolerances: Mapping[str, float], measured: bool, motors: bool) -> list[Nuisance]:
+    """Nuisances of what instruments and the road differ from what they are taken for: one for all wheels or motors.
+
+    ``tolerances``: half-widths by key; what is not stated there has a usual one, or none in a set that is ``measured``,
+    with every limit stated. ``motors``: the motors' torques are compared with their demands.
+    """
+    nuisances = []
+    for key, (effect, parameter, usual) in INSTRUMENTS.items():
+        half_width = tolerances.get(key, 0.0 if measured else usual)
+        if half_width and (motors or key != "motor_demand_scale"):
+            own = THETA.slice(effect, parameter)
+            at = tuple(range(own.start, own.stop))
+            step = (HALF_WIDTH_TO_SIGMA * half_width,) * len(at)
+            nuisances.append(Nuisance(key, at, step, NuisanceKind.SENSOR))
+    return nuisances
+
+
 def line_lag(half_s: float) -> list[Nuisance]:
     """Lag of the pads behind the pressure sensors with half-width ``half_s``, s; none if that is zero."""
     if not half_s:
@@ -282,32 +308,27 @@ def _in_theta(
     return Nuisance(name, (THETA.slice(effect, parameter).start + member,), (step,), kind)
 
 
-LATENCY_NODES = ("imu", "pressure", "motor", "demand", "steering", "yaw_rate")
-"""Nodes whose frames may come later than those of the wheel speeds; demands and the steering wheel may act later than
-they are logged; a yaw rate has a filter of its own and comes that much later than the accelerations."""
-_YAW_RATE_S = 6e-3
-"""Half-width of the yaw rate's latency, s: the delay of a filter of 25 Hz."""
 ZERO_SD = {name: _sd("imu_bias", name) for name in ("ay_mps2", "yaw_rate_rad_s")}
 """Prior sd of the zeros of an inertial unit: a roll of a tenth of a degree, and 0.03 deg/s."""
 DISC_MEASURED_SD_K, DISC_ASSUMED_SD_K = 5.0, 15.0
 """Prior sd of the discs' temperature at the start, K: of a thermocouple, and assumed."""
 
 
-def recording_nuisances(disc_measured: bool, latency_s: float) -> list[Nuisance]:
+def recording_nuisances(disc_measured: bool, latencies: Sequence[Latency]) -> list[Nuisance]:
     """Nuisances of the logs: disc temperature, toothed wheels, latencies and sensor zeros.
 
-    ``disc_measured``: all logs have the discs' temperature at the start. ``latency_s``: half-width of a node's latency.
+    ``disc_measured``: all logs have the discs' temperature at the start. ``latencies``: of each of `LATENCY_NODES`.
     """
-    latencies = []
-    for k, node in enumerate(LATENCY_NODES):
-        half = latency_s if node in NODES else _YAW_RATE_S if node == "yaw_rate" else LATENCY_S
-        kind = NuisanceKind.DEMAND_LATENCY if node == "demand" else NuisanceKind.LATENCY
-        latencies.append(Nuisance(f"late_{node}", (k,), (HALF_WIDTH_TO_SIGMA * half,), kind))
+    late = [
+        Nuisance(f"late_{node}", (k,), (step,), NuisanceKind.LATENCY, lower_bound=(one.least_s - one.value_s) / step)
+        for k, (node, one) in enumerate(zip(LATENCY_NODES, latencies, strict=True))
+        if (step := HALF_WIDTH_TO_SIGMA * one.half_width_s)
+    ]
     disc_sd_k = DISC_MEASURED_SD_K if disc_measured else DISC_ASSUMED_SD_K
     return [
         Nuisance("disc_temperature_k", (0,), (disc_sd_k,), NuisanceKind.DISC_TEMPERATURE),
         Nuisance("tooth_lag", (0,), (0.5,), NuisanceKind.TOOTH_LAG),
         Nuisance("tooth_window", (0,), (1.0,), NuisanceKind.TOOTH_WINDOW),
-        *latencies,
+        *late,
         *(_in_theta(f"zero_{name}", "imu_bias", name, sd) for name, sd in ZERO_SD.items()),
     ]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.diagnosis.data.log import MOTOR_DEMAND, Floats, Log
-from hil.diagnosis.vehicle.keys import LATENCY_S
+from hil.diagnosis.vehicle.latency import Latency, latencies
 from hil.diagnosis.vehicle.priors import BRAKE_K, CONSTANT_EPSILON_W, Nuisance
 from plant.friction import mu_equilibrium
 from plant.injection.theta import THETA
@@ -37,7 +37,7 @@ class Vehicle:
     unlimited : limits that it does not state and that are out of reach.
     straight_line : lateral dynamics are off.
     suspension_stated : the set states every parameter of the suspension.
-    node_latency_s : half-width of the latency of a node's frames behind those of the wheel speeds.
+    latencies : of the frames of each of `LATENCY_NODES` behind those of the wheel speeds.
     """
 
     parameters: PlantParameters
@@ -49,7 +49,7 @@ class Vehicle:
     unlimited: tuple[str, ...] = ()
     straight_line: bool = False
     suspension_stated: bool = True
-    node_latency_s: float = LATENCY_S
+    latencies: tuple[Latency, ...] = latencies({}, {}, measured=True)
 
     @property
     def undiagnosable_effects(self) -> tuple[str, ...]:

@@ -5,7 +5,9 @@ from collections.abc import Mapping
 from importlib import resources
 from typing import Any
 
-from hil.diagnosis.vehicle.keys import ALIASES, DERIVED, LATENCY_S, LINE_S, SPECIAL, UNLIMITED, WIDE
+from hil.diagnosis.vehicle.keys import ALIASES, DERIVED, LINE_S, SPECIAL, UNLIMITED, WIDE
+from hil.diagnosis.vehicle.latency import ALL_NODES, LATENCY_KEYS, MEASURED_S, latencies
+from hil.diagnosis.vehicle.priors import INSTRUMENTS
 from hil.validation.doc_pages.wrap import markdown
 
 _WHAT = {
@@ -25,6 +27,19 @@ _DERIVED_WHAT = {
     "pitch_damping": "share of the critical one; only its tolerance counts",
     "dive_rad_s2_m": "pitch per deceleration; only its tolerance counts",
 }
+_LATENCY_WHAT = (
+    "accelerations and yaw rate", "pressures", "motor torques", "from a logged pressure demand to its action",
+    "from a logged torque demand to its action: stamps, and the dead time of the motor",
+    "from the logged steering angle to its action", "yaw rate, beyond that of the accelerations: a filter of its own",
+    "speed over ground",
+)  # fmt: skip
+_INSTRUMENT_WHAT = {
+    "motor_torque_scale": "true over measured torque of all motors",
+    "motor_demand_scale": "torque over demanded torque of all motors",
+    "ax_scale": "scale of the accelerometer along the car", "ax_zero_mps2": "its zero, m/s2",
+    "ground_speed_scale": "scale of the speed over ground", "road_grade": "slope of the road",
+    "wind_mps": "wind along the road, m/s",
+}  # fmt: skip
 _INTRO = """# Vehicle set
 
 The car as `brakebench explain --vehicle SET.toml` takes it: flat TOML, SI units. Generated from the shipped set and
@@ -55,11 +70,12 @@ brake_gain_rear_nm_pa = 1.7e-4
   (one standard deviation): zeros of the pressures by 7 kPa, their gains by 0.5 %, pads by 1 %, motors by 0.5 % of the
   demanded and of the measured torque, radii by 0.12 %; clocks of the nodes by 50 ppm, and the steering wheel may stand
   half a degree off where the car goes straight.
-- The frames of a node are taken to be sent within {latency:g} ms of the wheel speeds', or within
-  `node_latency_s_tolerance`. Pads may lag behind the sensors of their pressures, as one pole, by {line:g} ms, or by
-  `line_lag_s_tolerance`: 0 where pressures are measured at the callipers. A yaw rate may come 6 ms later than the
-  accelerations. Heat capacity and cooling of the discs may be off by a fifth and nearly a third where they
-  are not stated.
+- Numbers of the car and its instruments are no causes. What differs from what is told is fitted within its tolerance
+  and reported; it is named as a cause where it is some two and a half tolerances off, or begins within the logs. A
+  tolerance moves that line.
+- Stamps are told beside the wheel speeds' ([latencies](#latencies)). Pads may lag behind the sensors of their
+  pressures, as one pole, by {line:g} ms, or by `line_lag_s_tolerance`: 0 where pressures are measured at the callipers.
+  Heat capacity and cooling of the discs may be off by a fifth and nearly a third where they are not stated.
 - Springs, dampers, bars and links (`suspension_`, `vehicle_pitch_inertia_kg_m2`) that a set states may be off by their
   tolerance, at least by a twentieth, others by much more. Links support the torque of motors
   (`suspension_drive_support_tangent`) as they do the brakes' where a set says nothing else: so it is of motors in the
@@ -83,10 +99,10 @@ def page() -> str:
     shipped = _shipped()
     flat = {f"{section}_{name}": entry for section, entries in shipped.items() for name, entry in entries.items()}
     sections = ", ".join(f"`{section}_`" for section in UNLIMITED)
-    lines = [_INTRO.format(sections=sections, latency=1e3 * LATENCY_S, line=1e3 * LINE_S)]
+    lines = [_INTRO.format(sections=sections, line=1e3 * LINE_S)]
     lines += ["## The car's six and their like", "", "| key | also | what |", "|---|---|---|"]
     lines += [f"| {_names(name)} | {what} |" for name, what in _WHAT.items()]
-    lines += _short(flat) + _derived(flat)
+    lines += _short(flat) + _derived(flat) + _latencies() + _instruments()
     for section, entries in shipped.items():
         lines += ["", f"## `{section}_`", "", *_table_head()]
         lines += [f"| `{section}_{name}` | {_row(f'{section}_{name}', entry)} |" for name, entry in entries.items()]
@@ -115,6 +131,32 @@ def _derived(flat: Entries) -> list[str]:
         where = f", {('front', 'rear')[place]}" if pair and place is not None else ""
         times = "" if factor == 1.0 else f" ({factor:.4g} times it)"
         lines.append(f"| `{key}` | `{name}`{where}{times} | {_DERIVED_WHAT.get(key, '')} |")
+    return lines
+
+
+def _latencies() -> list[str]:
+    unstated = latencies({}, {}, measured=False)
+    lines = [
+        "", "## Latencies", "",
+        "How much later than the wheel speeds a node's frames are stamped, or how much later than its stamp a demand",
+        f"acts, s; each with a tolerance. `{ALL_NODES}_tolerance` is that of all but the last two. In a set that",
+        f"states every limit, as measurements do, it is {1e3 * MEASURED_S:g} ms where it is not given.", "",
+        "| key | +- where it is not given | what |", "|---|---|---|",
+    ]  # fmt: skip
+    for key, one, what in zip(LATENCY_KEYS, unstated, _LATENCY_WHAT, strict=True):
+        lines.append(f"| `{key}` | {one.half_width_s:g} | {what} |")
+    return lines
+
+
+def _instruments() -> list[str]:
+    lines = [
+        "", "## Instruments and road", "",
+        "`<key>_tolerance` alone, no value: what is measured is taken as it is, the road as level, the air as still. In a",
+        "set that states every limit nothing of this is free unless it is given.", "",
+        "| key | +- where it is not given | what |", "|---|---|---|",
+    ]  # fmt: skip
+    for key, (_, _, usual) in INSTRUMENTS.items():
+        lines.append(f"| `{key}` | {usual:g} | {_INSTRUMENT_WHAT[key]} |")
     return lines
 
 

@@ -84,6 +84,10 @@ def write(case: Case, folder: Path) -> Path:
     return path
 
 
+_ACTS_LATE_S = 0.004
+"""Half-width of the time from the stamp of a demand, and of the steering wheel's angle, to its action."""
+
+
 def vehicle_toml() -> str:
     """The nominal car as stated: flat numbers, SI, each with the half-width of what the true one may be."""
     lines = [
@@ -102,6 +106,9 @@ def vehicle_toml() -> str:
         lines.append(f"{key}_tolerance = {value * TOLERANCE[name] / float(getattr(NOMINAL, name)):.4f}")
     lines.append("# frames of the other nodes beside the wheel speeds'")
     lines.append(f"node_latency_s_tolerance = {2.0 * USUALLY_LATE_S:.5f}")
+    acting = ("pressure_demand", "motor_demand", "steering")
+    lines += [f"{node}_latency_s_tolerance = {_ACTS_LATE_S}" for node in acting]
+    lines.append("ground_speed_latency_s_tolerance = 0.0")  # stamped when it was true
     lines.append("line_lag_s_tolerance = 0.0")  # its pressures are measured at the callipers
     lines.append("# suspension at the wheel, [front, rear]; linear springs, roll centres on the road")
     for key, (values, half) in _suspension(NOMINAL).items():

@@ -7,7 +7,6 @@ from hil.diagnosis.estimation.aliases import alias_of, resolve_aliases
 from hil.diagnosis.estimation.gauss_newton import Model, Term
 from hil.diagnosis.estimation.terms import candidates, columns
 from hil.diagnosis.simulation.parameter_set import nominal
-from hil.diagnosis.vehicle.keys import LATENCY_S
 from hil.diagnosis.vehicle.load import paper_car
 from hil.diagnosis.vehicle.priors import recording_nuisances
 
@@ -47,7 +46,7 @@ def test_a_term_is_an_alias_of_a_nuisance(name, number, slope):
 @pytest.mark.parametrize("node", ["imu", "pressure", "motor"])
 def test_stamps_of_a_node_that_are_late_are_its_latency(node):
     """Late by 45 ms, of which a latency at its bound had taken 6: nearly all is the term's."""
-    nuisances = (*VEHICLE.nuisances, *recording_nuisances(True, LATENCY_S))
+    nuisances = (*VEHICLE.nuisances, *recording_nuisances(True, VEHICLE.latencies))
     at = next(k for k, nuisance in enumerate(nuisances) if nuisance.name == f"late_{node}")
     z = np.zeros(len(nuisances))
     z[at] = 3.0
@@ -63,7 +62,7 @@ def test_stamps_of_a_node_that_are_late_are_its_latency(node):
 
 def test_stamps_of_the_wheels_are_no_latency():
     """The clock of all others is relative to theirs."""
-    nuisances = (*VEHICLE.nuisances, *recording_nuisances(True, LATENCY_S))
+    nuisances = (*VEHICLE.nuisances, *recording_nuisances(True, VEHICLE.latencies))
     assert alias_of(Term(CANDIDATES["timestamp_offset@wheel"], 0.02), nuisances, BASE) is None
 
 

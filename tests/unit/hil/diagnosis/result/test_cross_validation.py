@@ -28,7 +28,7 @@ def _replayed(name: str, deviations: float) -> tuple[Watched, int]:
     first = log_of_pulses()
     logs = [first, first]  # several manoeuvres, to hold some out
     rig = Simulator(prepare(logs, 0.308), vehicle)
-    nuisances = (*vehicle.nuisances, *recording_nuisances(True, vehicle.node_latency_s))
+    nuisances = (*vehicle.nuisances, *recording_nuisances(True, vehicle.latencies))
     names = [nuisance.name for nuisance in nuisances]
     number = names.index(name)
     off = np.where(np.arange(len(names)) == number, deviations, 0.0)
@@ -49,7 +49,7 @@ def _replayed(name: str, deviations: float) -> tuple[Watched, int]:
 
 def test_no_fold_moves_a_number_farther_than_it_may_go():
     """A demand acted on before it was made spoilt the torque of motors on every manoeuvre held out."""
-    fitter, early = _replayed("late_demand", -0.5)
+    fitter, early = _replayed("late_motor_demand", -0.5)
     assert all(z[early] >= 0.0 for z in fitter.replayed)
     assert all((np.abs(z) <= fitter.bound).all() for z in fitter.replayed)
 

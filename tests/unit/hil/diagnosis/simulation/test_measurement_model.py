@@ -43,7 +43,7 @@ def test_places_outside_are_the_ends():
 def test_the_steering_wheel_may_act_later_than_it_is_logged():
     inputs = INPUT.zeros() + np.zeros((40, 1))
     inputs[:, INPUT.at.steering_wheel_rad] = np.arange(40.0)
-    moved = without_latency(inputs, (0.0, 0.0, 0.0, 0.0, 0.005))
+    moved = without_latency(inputs, (0.0, 0.0, 0.0, 0.0, 0.0, 0.005, 0.0, 0.0))
     assert moved[5:35, INPUT.at.steering_wheel_rad] == pytest.approx(np.arange(5.0, 35.0) - 0.5)
 
 

@@ -8,7 +8,6 @@ import pytest
 from hil.diagnosis.data.log import make_log
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.simulation.parameter_set import nominal
-from hil.diagnosis.vehicle.keys import LATENCY_S
 from hil.diagnosis.vehicle.load import load_vehicle, paper_car
 from hil.diagnosis.vehicle.priors import ZERO_SD, recording_nuisances
 from plant.injection.theta import THETA
@@ -70,7 +69,7 @@ def test_what_single_wheels_are_off_was_there_before_a_cause_of_the_same_kind():
 
 def test_an_inertial_unit_has_zeros_across():
     """0.012 m/s2, a tenth of a degree, were named as a cause."""
-    nuisances = recording_nuisances(True, LATENCY_S)
+    nuisances = recording_nuisances(True, paper_car().latencies)
     base = nominal(paper_car())
     z = np.array([1.0 if one.kind == "sensor" else 0.0 for one in nuisances])
     theta = base.with_nuisances(nuisances, z).theta

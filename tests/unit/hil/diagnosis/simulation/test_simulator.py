@@ -131,7 +131,8 @@ def test_a_standing_car_is_replayed_for_what_acts_on_it(effect, number, value, a
 
 
 @pytest.mark.parametrize("change", [
-    {"latency_s": late("imu", 0.004)}, {"latency_s": late("pressure", 0.004)}, {"latency_s": late("demand", 0.004)},
+    {"latency_s": late("imu", 0.004)}, {"latency_s": late("pressure", 0.004)},
+    {"latency_s": late("pressure_demand", 0.024)},
     {"window_rows2": 4.0}, {"tooth_share": 0.2},
 ])  # fmt: skip
 def test_channels_of_a_baseline_are_not_those_of_other_frames_or_teeth(simulator, change):

@@ -5,8 +5,9 @@ import pytest
 
 from hil.diagnosis.data.log import MOTOR_DEMAND, Log, UnusableError, make_log
 from hil.diagnosis.simulation.parameter_set import nominal
+from hil.diagnosis.vehicle.latency import LATENCY_NODES
 from hil.diagnosis.vehicle.load import load_vehicle, paper_car
-from hil.diagnosis.vehicle.priors import HALF_WIDTH_TO_SIGMA, recording_nuisances
+from hil.diagnosis.vehicle.priors import HALF_WIDTH_TO_SIGMA, INSTRUMENTS, Nuisance, recording_nuisances
 from hil.diagnosis.vehicle.spec import Vehicle, rest_friction
 from plant.injection.theta import THETA
 from plant.vectors import PARAMETER, P
@@ -155,17 +156,50 @@ def test_curves_that_a_set_does_not_state_have_a_wide_bound() -> None:
     assert by_name["tyre_friction_load"].bound > 3.0
 
 
-def test_the_latency_of_a_node_is_as_stated_or_four_milliseconds() -> None:
-    assert load_vehicle(SIX).node_latency_s == 4e-3
-    vehicle = load_vehicle(SIX | {"node_latency_s_tolerance": 1e-3})
-    assert vehicle.node_latency_s == 1e-3
-    assert not any("node_latency" in remark for remark in vehicle.remarks)
-    late = {one.name: one.step[0] for one in recording_nuisances(True, vehicle.node_latency_s) if "late_" in one.name}
-    assert late == {
-        "late_imu": 5e-4, "late_pressure": 5e-4, "late_motor": 5e-4, "late_demand": 2e-3, "late_steering": 2e-3,
-        "late_yaw_rate": 3e-3,
+def _late(vehicle: Vehicle) -> dict[str, Nuisance]:
+    return {one.name: one for one in recording_nuisances(True, vehicle.latencies) if "late_" in one.name}
+
+
+def test_latencies_that_a_set_does_not_state_are_those_of_loggers() -> None:
+    late = _late(load_vehicle(SIX))
+    assert {name: one.step[0] for name, one in late.items()} == {
+        "late_imu": 0.01, "late_pressure": 0.01, "late_motor": 0.01, "late_pressure_demand": 0.0175,
+        "late_motor_demand": 0.0175, "late_steering": 0.0175, "late_yaw_rate": 0.003, "late_ground_speed": 0.1,
     }  # fmt: skip
+    demand = late["late_motor_demand"]
+    assert demand.upper * demand.step[0] == pytest.approx(0.0525)
+    assert demand.lower * demand.step[0] == pytest.approx(-0.02)  # the logger got the frame later than the motor
+
+
+def test_a_tolerance_of_all_nodes_holds_for_demands_and_steering_too() -> None:
+    vehicle = load_vehicle(SIX | {"node_latency_s_tolerance": 1e-3})
+    assert not any("node_latency" in remark for remark in vehicle.remarks)
+    late = _late(vehicle)
+    assert {one.step[0] for name, one in late.items() if name not in ("late_yaw_rate", "late_ground_speed")} == {5e-4}
+    assert late["late_pressure_demand"].lower == 0.0
     assert any("node_latency_s" in remark for remark in load_vehicle(SIX | {"node_latency_s": 1e-3}).remarks)
+
+
+def test_each_node_has_a_nominal_latency_and_a_tolerance_of_its_own() -> None:
+    stated = {"motor_demand_latency_s": 0.015, "imu_latency_s": 0.01, "imu_latency_s_tolerance": 0.004}
+    vehicle = load_vehicle(SIX | stated)
+    by_node = dict(zip(LATENCY_NODES, vehicle.latencies, strict=True))
+    assert (by_node["imu"].value_s, by_node["imu"].half_width_s) == (0.01, 0.004)
+    assert by_node["motor_demand"].half_width_s == pytest.approx(0.003)
+    assert nominal(vehicle).latency_s == (0.01, 0.0, 0.0, 0.0, 0.015, 0.0, 0.0, 0.0)
+    assert "late_motor" not in _late(load_vehicle(SIX | {"motor_latency_s_tolerance": 0.0}))
+
+
+def test_instruments_and_road_are_free_where_no_set_of_measurements_says_otherwise() -> None:
+    def free(table: dict[str, float]) -> dict[str, float]:
+        return {one.name: one.step[0] for one in load_vehicle(table).nuisances if one.name in INSTRUMENTS}
+
+    assert free(SIX)["ax_zero_mps2"] == 0.025
+    assert "motor_demand_scale" not in free(SIX)  # its motors are not compared with their demands
+    assert free(SIX | {"motor_time_constant_s": 0.01})["motor_demand_scale"] == 0.015
+    assert free(SIX | {"road_grade_tolerance": 0.02})["road_grade"] == 0.01
+    assert "wind_mps" not in free(SIX | {"wind_mps_tolerance": 0.0})
+    assert not [one.name for one in paper_car().nuisances if one.name in INSTRUMENTS]
 
 
 def test_the_line_lag_has_the_stated_or_default_tolerance() -> None:
