@@ -151,8 +151,8 @@ def _latencies() -> list[str]:
 def _instruments() -> list[str]:
     lines = [
         "", "## Instruments and road", "",
-        "`<key>_tolerance` alone, no value: what is measured is taken as it is, the road as level, the air as still. In",
-        "a set that states every limit nothing of this is free unless it is given.", "",
+        "`<key>_tolerance` alone, no value: what is measured is taken as it is, the road as level, the air as still.",
+        "In a set that states every limit nothing of this is free unless it is given.", "",
         "| key | +- where it is not given | what |", "|---|---|---|",
     ]  # fmt: skip
     for key, (_, _, usual) in INSTRUMENTS.items():
