@@ -78,3 +78,15 @@ def test_left_and_right_with_different_demands_are_not_compared() -> None:
     assert not front[(t > 3.0) & (t < 7.0)].any()
     assert front[t > 7.1].all()
     assert rear[t > 1.1].all()
+
+
+@pytest.mark.parametrize(("unasked_s", "kept"), [(0.03, True), (0.45, True), (3.0, False)])
+def test_a_release_tail_contradicts_no_demand(unasked_s: float, kept: bool) -> None:
+    """Samples above 5 bar just after a demand has gone, in logs whose brakes hardly act otherwise."""
+    t = np.arange(1000) * 0.01
+    channels = {f"wheel_speed_{w}_rad_s": np.full(len(t), 60.0) for w in WHEELS}
+    demand = np.where((t > 1.9) & (t < 2.0), 2e4, 0.0)  # below what counts as released
+    demand[(t > 1.97) & (t < 2.0)] = 8e5
+    tail = np.where((t > 2.0) & (t < 2.0 + unasked_s), 6e5, 0.0)
+    channels |= {f"pressure_{w}_pa": tail for w in WHEELS} | {f"pressure_demand_{w}_pa": demand for w in WHEELS}
+    assert ("pressure" in prepare([make_log("log", t, channels)], 0.3).groups) == kept
