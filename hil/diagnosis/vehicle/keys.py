@@ -97,6 +97,13 @@ WIDE: Final = {
 }
 """Default half-width of a parameter that a set does not state, as a share of the shipped value."""
 
+LUMPED: Final = {
+    "motor_time_constant_s": 0.7, "ehb_natural_frequency_hz": 0.4, "ehb_damping_ratio": 0.4, "ehb_dead_time_s": 0.5,
+}  # fmt: skip
+"""Least half-width, as a share of the value, of what a set states of an actuator's delay where it does not state every
+limit: dead time, lag and rate limit are told as one of them, which of these the model calls by that name or not. A time
+constant of 25 ms may be a dead time of 14 and a lag of 11."""
+
 UNLIMITED: Final = {
     "ehb": ({"build_rate_pa_s": 5e8, "release_rate_pa_s": 5e8},),
     "motor": (

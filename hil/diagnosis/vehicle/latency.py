@@ -28,6 +28,8 @@ computes its speed for 0.1 to 0.2 s. Times between the stamps of two frames of o
 (comma2k19)."""
 _OWN: Final = ("yaw_rate", "ground_speed")
 """Nodes that `ALL_NODES` leaves alone."""
+_DEAD_TIME_S: Final = 20e-3
+"""What the half-width of a demand has beside that of the frames: the dead time of an actuator, s."""
 _SHARE, _LEAST_S = 0.2, 1e-3
 """Half-width of a latency stated without tolerance: a share of it, and at least."""
 _EARLY_S = 20e-3
@@ -59,11 +61,11 @@ def latencies(values: Mapping[str, Any], tolerances: Mapping[str, float], measur
         key = key_of(node)
         value = float(values.get(key, 0.0))
         default = MEASURED_S if measured and node != "yaw_rate" else _UNSTATED_S[node]
+        is_demand = node.endswith("_demand")
         if every is not None and node not in _OWN:
-            default = every
+            default = every + (_DEAD_TIME_S if is_demand and not measured else 0.0)
         if key in values:
             default = max(_SHARE * abs(value), _LEAST_S)
-        is_demand = node.endswith("_demand")
         least = -_EARLY_S if every is None and not measured else 0.0
         found.append(Latency(value, tolerances.get(key, default), min(least, value) if is_demand else -float("inf")))
     return tuple(found)

@@ -16,6 +16,7 @@ from hil.diagnosis.vehicle.keys import (
     DERIVED,
     LINE,
     LINE_S,
+    LUMPED,
     SPECIAL,
     UNLIMITED,
     WIDE,
@@ -210,10 +211,13 @@ def _tolerance(
         tolerance[name] = max(tolerance[name], WIDE[name] * _largest(parameters, name))
     if "tyre_lky" in missing:
         tolerance["vehicle_slip_angle_share"] = max(tolerance["vehicle_slip_angle_share"], _BALANCE)
-    return tolerance | {
+    tolerance |= {
         name: max(half, shipped.get(name, 0.0)) if name.startswith("suspension") and name not in stated.names else half
         for name, half in stated.tolerances.items()
     }
+    if unlimited:
+        tolerance |= {name: max(tolerance[name], share * _largest(parameters, name)) for name, share in LUMPED.items()}
+    return tolerance
 
 
 def _remarks_on_missing(
