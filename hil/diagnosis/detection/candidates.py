@@ -32,6 +32,7 @@ from hil.diagnosis.estimation.information import (
     marginalise,
     marginalise_from_onset,
 )
+from hil.diagnosis.estimation.model_discrepancy import FORM_SHARE
 from hil.diagnosis.estimation.terms import Candidate, candidates, columns
 from hil.diagnosis.noise.model import Noise, SampleMasks
 from hil.diagnosis.parallel import thread_map
@@ -54,7 +55,9 @@ class CandidateSet:
         self._masks, self._starts = masks, segment_starts(simulator.dataset)
         self._columns = columns(undiagnosable)
         without = undriven(recording.log for recording in simulator.dataset.recordings)
-        listed = candidates(self._columns, without, simulator.vehicle.suspension_stated, unexcited)
+        vehicle = simulator.vehicle
+        form_share = FORM_SHARE if vehicle.unlimited else 0.0
+        listed = candidates(self._columns, without, vehicle.suspension_stated, unexcited, form_share)
         self.candidates = [_with_penalty(one, simulator) for one in listed]
         self.jacobian: Tracks = {}
 

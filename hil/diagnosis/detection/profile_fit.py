@@ -26,7 +26,7 @@ from hil.diagnosis.detection.threshold import (
     DetectionThreshold,
 )
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term, Tracks
-from hil.diagnosis.estimation.model_discrepancy import variance_inflation
+from hil.diagnosis.estimation.model_discrepancy import corrected_gain, variance_inflation
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.noise.model import Noise
 from hil.diagnosis.parallel import thread_map
@@ -97,6 +97,11 @@ def at_bound(term: Term) -> bool:
     """Whether its value is at a bound of the parameter: there it explains more than it can be."""
     parameter = term.candidate.parameter
     return bool(np.isclose(term.value, (parameter.low, parameter.high), rtol=1e-6, atol=0.0).any())
+
+
+def corrected(hypothesis: FittedHypothesis, raw: float) -> float:
+    """A gain in chi-squared of a hypothesis, ``raw`` by noise alone, with the model discrepancy."""
+    return corrected_gain(hypothesis.term.candidate, raw, hypothesis.term.value, hypothesis.term.onset is None)
 
 
 def log_bayes_factor(hypothesis: FittedHypothesis) -> float:
@@ -289,7 +294,7 @@ def fit_shortlist(
 
     first = [item for item in top if biased or beyond(item, item.gain) >= POOR_SHARE * least]
     fitted = fit_each(first)
-    gains = [(fits.reference - c.cost) / variance_inflation(c.term.candidate) for c in fitted]
+    gains = [corrected(c, fits.reference - c.cost) for c in fitted]
     rest = [item for item in top if item not in first]
     if rest and any(beyond(*one) >= least for one in zip(first, gains, strict=True)):
         return [*first, *rest], [*fitted, *fit_each(rest)]

@@ -27,7 +27,7 @@ from hil.diagnosis.detection.threshold import (
 )
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
 from hil.diagnosis.estimation.information import InformationBlocks, Marginal, marginalise, marginalise_from_onset
-from hil.diagnosis.estimation.model_discrepancy import variance_inflation
+from hil.diagnosis.estimation.model_discrepancy import corrected_gain
 from hil.diagnosis.estimation.terms import PRIOR_SD_IN_TYPICAL_SIZES, Candidate
 from hil.diagnosis.noise.model import Noise, SampleMasks
 
@@ -99,7 +99,7 @@ def score(candidate: Candidate, b: float, q: float, current: float = 0.0) -> Sco
     step = b / (q + 1.0 / tau**2)
     step = float(np.clip(current + step, parameter.low, parameter.high)) - current
     raw = 2.0 * b * step - q * step * step
-    gain = raw / variance_inflation(candidate) - candidate.selection_penalty
+    gain = corrected_gain(candidate, raw, current + step) - candidate.selection_penalty
     log_bayes_factor = 0.5 * (raw - candidate.selection_penalty) + log_occam_factor(candidate, q, step)
     max_snr, typical_snr = largest * float(np.sqrt(q)), tau / PRIOR_SD_IN_TYPICAL_SIZES * float(np.sqrt(q))
     return ScoreTest(candidate, current + step, gain, log_bayes_factor, max_snr, typical_snr, q, raw)
@@ -116,7 +116,7 @@ def log_occam_factor(candidate: Candidate, information: float, value: float) -> 
 def rescored(item: ScoreTest, value: float, raw: float, information: float) -> ScoreTest:
     """The test with another value, gain in chi-squared and information."""
     log_bayes_factor = 0.5 * (raw - item.total_penalty) + log_occam_factor(item.candidate, information, value)
-    gain = raw / variance_inflation(item.candidate) - item.total_penalty
+    gain = corrected_gain(item.candidate, raw, value, item.onset is None) - item.total_penalty
     return replace(
         item, value=value, gain=gain, log_bayes_factor=log_bayes_factor, information=information, raw_gain=raw
     )

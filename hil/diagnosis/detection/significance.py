@@ -13,7 +13,7 @@ import numpy as np
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.candidates import CandidateSet
 from hil.diagnosis.detection.nonparametric import BasisFunction
-from hil.diagnosis.detection.profile_fit import FittedHypothesis, at_bound, criterion, log_bayes_factor
+from hil.diagnosis.detection.profile_fit import FittedHypothesis, at_bound, corrected, criterion, log_bayes_factor
 from hil.diagnosis.detection.result import Progress, causes_in
 from hil.diagnosis.detection.threshold import (
     FORM_ERROR,
@@ -25,7 +25,7 @@ from hil.diagnosis.detection.threshold import (
 )
 from hil.diagnosis.estimation.aliases import resolve_aliases
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Tracks
-from hil.diagnosis.estimation.model_discrepancy import variance_inflation, with_uncertainty
+from hil.diagnosis.estimation.model_discrepancy import corrected_gain, variance_inflation, with_uncertainty
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.estimation.uncertainty import standard_deviations
 from hil.diagnosis.noise.model import Noise, SampleMasks, whiten
@@ -133,7 +133,7 @@ def signature_overlap(one: Floats, other: Floats) -> float:
 
 def with_gain(hypothesis: FittedHypothesis, reference: float, discrepancy_factor: float) -> FittedHypothesis:
     """With its gain against the cost ``reference``: divided by both discrepancies, less its penalty."""
-    gain = (reference - hypothesis.cost) / variance_inflation(hypothesis.term.candidate)
+    gain = corrected(hypothesis, reference - hypothesis.cost)
     return replace(
         hypothesis, gain=gain / discrepancy_factor - hypothesis.total_penalty, discrepancy_factor=discrepancy_factor
     )
@@ -159,7 +159,7 @@ def is_significant_given(
     start = fitter.at(better.model.z, (*better.model.terms, hypothesis.term), better.noise)
     both = fitter.fit(start, better.noise, 2, relinearise)
     inflation = nuisance_variance_inflation(fitter, both.z, effective_parameters)
-    gain = (better.cost - both.cost) / variance_inflation(hypothesis.term.candidate)
+    gain = corrected(hypothesis, better.cost - both.cost)
     return gain >= least * _at_most_as_accepted(hypothesis, inflation)
 
 
@@ -191,16 +191,18 @@ def eliminate_backward(
         term = model.terms[k]
         if isinstance(term.candidate, BasisFunction):
             continue
-        discrepancy = variance_inflation(term.candidate)
+        discrepancy, lasting = variance_inflation(term.candidate), term.onset is None
+        form_sd = term.candidate.form_sd if lasting else 0.0
         sd = float(standard_deviations(fitter, model, noise)[k]) * float(np.sqrt(discrepancy))
-        distance = abs(term.value) / sd
+        distance = abs(term.value) / float(np.hypot(sd, form_sd))
         if distance >= needed and causes_in(model) == 1:
             return Elimination(model, tuple(left), tuple(remarks))
         rest = tuple(other for j, other in enumerate(model.terms) if j != k)
         without = fitter.fit(fitter.at(model.z, rest, noise), noise, 5)
         inflation = nuisance_variance_inflation(fitter, model.z, effective_parameters)
-        least = threshold.gain * discrepancy * _at_most_as_accepted(left[k][0], inflation)
-        if distance < needed or without.cost - model.cost < least:
+        least = threshold.gain * _at_most_as_accepted(left[k][0], inflation)
+        gain = corrected_gain(term.candidate, without.cost - model.cost, term.value, lasting)
+        if distance < needed or gain < least:
             why = f"{distance:.1f} standard deviations from zero, {needed:.1f} needed"
             why = "the other causes explain as much" if distance >= needed else why
             remarks.append(f"{term.candidate.name} = {term.value:.3g} is not named: {why}")

@@ -21,6 +21,9 @@ UNSURE, FEW = 2.0, 1.4
 
 A ratio is known from some thirty drives, so the quantile of the threshold is that of Student's distribution with
 thirty degrees of freedom; its square is 1.4 times that of the normal one at a probability of 1.25e-5."""
+FORM_SHARE = 0.06
+"""Standard deviation of an effect that a car of other equations seems to have, in sizes typical of real cars, where the
+set does not state every limit (docs/decisions/detection-threshold.md)."""
 UNLISTED = "unlisted"
 """Name of all nonparametric terms in the tables."""
 Table = Mapping[str, Mapping[str, Mapping[str, float]]]
@@ -37,6 +40,18 @@ def _tables() -> Mapping[str, Table]:
 def variance_inflation(candidate: Candidate) -> float:
     """Variance inflation of a candidate's gain in chi-squared, at least 1."""
     return _variance(candidate.effect.name, candidate.parameter.name, candidate.location, candidate.suspension_stated)
+
+
+def corrected_gain(candidate: Candidate, raw: float, value: float, lasting: bool = True) -> float:
+    """Gain in chi-squared of a candidate's ``value`` with the model discrepancy as further variance.
+
+    The variance of the value is that by noise, times `variance_inflation`, and that of the model's form, ``form_sd``:
+    1 / gain = inflation / raw + (form_sd / value)^2. So a value that the data determine however well gains no more than
+    its distance from zero in ``form_sd`` (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63, 425: a discrepancy does not
+    shrink with the number of samples). A cause that is not ``lasting`` begins within the logs: no form error does.
+    """
+    form = candidate.form_sd / value if lasting and value else 0.0
+    return raw / (variance_inflation(candidate) + max(raw, 0.0) * form**2)
 
 
 def variance_inflation_nonparametric(name: str, location: str) -> float:

@@ -64,7 +64,8 @@ class Candidate:
     """An effect parameter at a location; its ``columns`` move together.
 
     ``locations`` is how many parameters and locations its effect has, ``suspension_stated`` that the vehicle set states
-    the suspension, ``selection_penalty`` what its gain loses as the data chose more of it than its value.
+    the suspension, ``form_sd`` what of it the form of the model may imitate (in its unit), ``selection_penalty`` what
+    its gain loses as the data chose more of it than its value.
     """
 
     effect: Effect
@@ -73,6 +74,7 @@ class Candidate:
     columns: tuple[int, ...]
     locations: int
     suspension_stated: bool = field(default=True, kw_only=True)
+    form_sd: float = field(default=0.0, kw_only=True)
     selection_penalty: float = field(default=0.0, kw_only=True)
 
     @property
@@ -84,12 +86,7 @@ class Candidate:
     @property
     def prior_sd(self) -> float:
         """Prior standard deviation of the value."""
-        parameter = self.parameter
-        return (
-            PRIOR_SD_IN_TYPICAL_SIZES * abs(parameter.typical)
-            if parameter.typical
-            else 0.5 * (parameter.high - parameter.low)
-        )
+        return PRIOR_SD_IN_TYPICAL_SIZES * typical_size(self.parameter)
 
     def members(self) -> tuple[int, ...]:
         """Members of the effect's scope that it moves."""
@@ -104,6 +101,11 @@ class Candidate:
         return replace(parameters, theta=theta)
 
 
+def typical_size(parameter: Parameter) -> float:
+    """Size typical of real cars, in its unit; a third of the range of what has none."""
+    return abs(parameter.typical) or 0.5 * (parameter.high - parameter.low) / PRIOR_SD_IN_TYPICAL_SIZES
+
+
 def columns(without: Collection[str] = ()) -> list[Column]:
     """Every strength parameter of every effect at every member, but for the effects ``without``."""
     listed = []
@@ -116,12 +118,14 @@ def columns(without: Collection[str] = ()) -> list[Column]:
 
 
 def candidates(
-    of: list[Column], undriven: Collection[int] = (), sprung: bool = True, quiet: Collection[str] = ()
-) -> list[Candidate]:
+    of: list[Column], undriven: Collection[int] = (), sprung: bool = True, quiet: Collection[str] = (),
+    form_share: float = 0.0,
+) -> list[Candidate]:  # fmt: skip
     """All locations of all strength parameters that have columns.
 
     Motor effects have no location with an ``undriven`` wheel, sensing effects none at ``quiet`` nodes, whose channels
-    show nothing. ``sprung`` says that the vehicle set states the suspension.
+    show nothing. ``sprung`` says that the vehicle set states the suspension, ``form_share`` what share of a typical
+    size the form of the model may imitate.
     """
     index: Mapping[tuple[str, str, int], int] = {
         (column.effect.name, column.parameter.name, column.member): k for k, column in enumerate(of)
@@ -138,7 +142,13 @@ def candidates(
                 at = tuple(index[effect.name, parameter.name, member] for member in members)
                 listed.append(
                     Candidate(
-                        effect, parameter, location, at, len(groups) * len(effect.strengths), suspension_stated=sprung
+                        effect,
+                        parameter,
+                        location,
+                        at,
+                        len(groups) * len(effect.strengths),
+                        suspension_stated=sprung,
+                        form_sd=form_share * typical_size(parameter),
                     )
                 )
     return listed

@@ -20,7 +20,8 @@ _TWO_SIDED_95 = 1.96
 
 def half_width(candidate: Candidate, value: float, sd: float) -> float:
     """Half of the 95 % interval of a value, in its unit, whose standard deviation by noise is ``sd``."""
-    return _TWO_SIDED_95 * float(np.sqrt(variance_inflation(candidate) * sd**2 + (FORM_SD_SHARE * value) ** 2))
+    by_form = np.hypot(FORM_SD_SHARE * value, candidate.form_sd)
+    return _TWO_SIDED_95 * float(np.sqrt(variance_inflation(candidate) * sd**2 + by_form**2))
 
 
 def intervals(fitter: Fitter, model: Model, noise: Noise) -> list[tuple[float, float]]:
