@@ -19,7 +19,7 @@ from hil.diagnosis.data.read import from_frame, read_logs
 from hil.diagnosis.detection.result import Diagnosis, Progress, Settings
 from hil.diagnosis.detection.stepwise import diagnose
 from hil.diagnosis.result.answer import Answer, answer
-from hil.diagnosis.result.cross_validation import held_out_error
+from hil.diagnosis.result.cross_validation import confirmed, held_out_error
 from hil.diagnosis.result.residual_patterns import residual_patterns
 from hil.diagnosis.sensor_consistency.check import Consistency, check, why_not_simulatable
 from hil.diagnosis.simulation.parameter_set import ParameterSet, nominal
@@ -65,6 +65,7 @@ def explain(
     with threadpool_limits(1, "blas"):  # simulations fill the processors; linear algebra beside them only waits
         diagnosis = diagnose(dataset, car, base, settings, report)
         report("held-out error by cross-validation")
+        diagnosis = confirmed(diagnosis, report)
         errors, patterns = held_out_error(diagnosis), residual_patterns(diagnosis)
     extension = None if folder is None else _write_extension(diagnosis, nominal(car), folder)
     of_logs = (f"{one.log.name}: {text}" for one in dataset.recordings for text in one.log.remarks)

@@ -7,12 +7,20 @@ import numpy as np
 
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.profile_fit import FittedHypothesis, delta_criterion
-from hil.diagnosis.detection.result import Diagnosis
+from hil.diagnosis.detection.result import Diagnosis, Progress
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term, Tracks
 from hil.diagnosis.estimation.information import information_blocks
 from hil.diagnosis.noise.model import Noise, SampleMasks
-from hil.diagnosis.result.statistics import FOLDS, bootstrap_interval, root_mean_square, squares_by_segment
+from hil.diagnosis.result.statistics import (
+    FOLDS,
+    bootstrap_interval,
+    root_mean_square,
+    squares_by_segment,
+    surely_positive,
+)
 
+_WORSE = 1.01
+"""Factor of a channel's held-out error beyond which a cause makes it larger, if the segments agree."""
 _TEMPERING = 1.5
 """Divisor of the criterion differences: two hypotheses differ less than an exact noise model would say."""
 
@@ -84,6 +92,50 @@ def _changed(now: Term, without: Term, of_all: Term) -> Term:
     """A term as fitted, changed by the difference of the steps without the fold and with all segments."""
     parameter = now.candidate.parameter
     return replace(now, value=float(np.clip(now.value + without.value - of_all.value, parameter.low, parameter.high)))
+
+
+def confirmed(diagnosis: Diagnosis, progress: Progress) -> Diagnosis:
+    """Without the causes that manoeuvres contradict which no fit saw, the cause accepted last first.
+
+    A cause is contradicted where the held-out residuals are less likely with it than with the nuisance parameters
+    alone, or where it makes the error of a channel larger.
+    """
+    fitter, noise = diagnosis.fitter, diagnosis.noise
+    tuned = held_out_residual(fitter, noise, diagnosis.base) if diagnosis.final.terms else {}
+    none = np.zeros(len(fitter.nuisances))
+    while diagnosis.final.terms:
+        after = held_out_residual(fitter, noise, diagnosis.final)
+        why = _channel_made_worse(after, tuned, fitter.masks)
+        if why is None and fitter.cost(after, none, noise) < fitter.cost(tuned, none, noise):
+            break
+        diagnosis = _without_last(diagnosis, why or "held-out manoeuvres are less likely with it than without")
+        progress(diagnosis.remarks[-1])
+    return diagnosis
+
+
+def _channel_made_worse(after: Tracks, tuned: Tracks, masks: SampleMasks) -> str | None:
+    """The channel whose held-out error a model makes larger, in words; None where there is none."""
+    for name in masks.names:
+        squares, others = _squares(after[name], masks, name), _squares(tuned[name], masks, name)
+        error, before = root_mean_square(squares), root_mean_square(others)
+        if error > _WORSE * before and surely_positive((squares - others)[:, 0]):
+            return f"it makes the held-out error of {name} larger, {before:.3g} to {error:.3g}"
+    return None
+
+
+def _without_last(diagnosis: Diagnosis, why: str) -> Diagnosis:
+    """Without the cause accepted last, which may have several terms."""
+    last = diagnosis.hypotheses[-1]
+    kept = [k for k, listed in enumerate(diagnosis.hypotheses) if listed is not last]
+    terms = diagnosis.final.terms
+    names = ", ".join(f"{one.candidate.name} = {one.value:.3g}" for k, one in enumerate(terms) if k not in kept)
+    remarks = (*diagnosis.remarks, f"{names} is not named: {why}")
+    hypotheses = tuple(diagnosis.hypotheses[k] for k in kept)
+    diagnosis = replace(diagnosis, hypotheses=hypotheses, remarks=remarks)
+    if not kept:
+        return replace(diagnosis, final=diagnosis.base, noise=diagnosis.first_noise)
+    start = diagnosis.fitter.at(diagnosis.final.z, [terms[k] for k in kept], diagnosis.noise)
+    return replace(diagnosis, final=diagnosis.fitter.fit(start, diagnosis.noise, 5))
 
 
 def held_out_error(diagnosis: Diagnosis) -> list[HeldOutError]:
