@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
+from hil.diagnosis.detection.agreement import agrees
 from hil.diagnosis.detection.candidates import CandidateSet
 from hil.diagnosis.detection.nonparametric_search import NonparametricSearch, SelectionStep
 from hil.diagnosis.detection.onset import add_same_onset_alternatives, estimate_onsets_of_best
@@ -204,6 +205,7 @@ class ForwardStep:
             reference = min(reference, self._fitter.fit(model, noise, 3).cost)
             fitted = with_gains()
         significant = [c for c in fitted if is_significant(c, threshold.gain, self._fitter, effective_parameters)]
+        significant = [c for c in significant if agrees(self._fitter, c, threshold.gain)]
         significant.sort(key=criterion)
         return SelectionStep(
             model, noise, reference, threshold, fits, fitted, significant, allowance, discrepancy, self._biased
