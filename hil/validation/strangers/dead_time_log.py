@@ -99,7 +99,7 @@ def log(script: Script, numbers: Numbers, drawn: Drawn, seed: Sequence[int], noi
         return np.asarray(np.round((row_s + LEAD_S - drawn.ages_s[node]) / STEP_S), np.int64)
 
     now = np.asarray(np.round((row_s + LEAD_S) / STEP_S), np.int64)
-    table: dict[str, Vector] = {"t_s": row_s}
+    table: dict[str, Vector] = {"t_s": np.asarray(row_s)}
     scale = drawn.pressure_scale
     for i, w in enumerate(WHEELS):
         table[f"wheel_speed_{w}_rad_s"] = motion.omega_rad_s[at("wheel"), i]

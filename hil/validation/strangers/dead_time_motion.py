@@ -115,7 +115,7 @@ def move(
     omegas, pressures, torques, discs, loads = (
         np.zeros((n, 4)), np.zeros((n, 4)), np.zeros((n, 4)), np.zeros((n, 4)), np.zeros((n, 4)),
     )  # fmt: skip
-    stands = False
+    stands, gained = False, 0.0
     for k in range(n):
         air = 0.5 * car.air_density_kg_m3 * car.frontal_area_m2 * (v + car.wind_mps) * abs(v + car.wind_mps)
         angle = steer[k] / car.steering_ratio
@@ -161,17 +161,18 @@ def move(
             force_x += cos * long_n - sin * lat_n
             force_y += sin * long_n + cos * lat_n
             moment += x * (sin * long_n + cos * lat_n) - y * (cos * long_n - sin * lat_n)
-            # wheel; the tyre's force is taken at the end of the step, or the wheel's 0.1 ms would need smaller ones
+            # wheel; tyre stiffer than the step allows, so its force is that at the end: d(slip) = R d(omega) - d(v)
             against = pads + corners.drag_nm[i] + car.rolling_resistance * load[i] * radius
-            net = corners.motor_gain[i] * torque[i] - against - radius * long_n
-            stiff = dt * radius * radius * secant * car.slip_stiffness / reference
-            omega[i] = max(omega[i] + dt * net / (car.wheel_inertia_kg_m2 + stiff), 0.0)
+            stiff = dt * radius * secant * car.slip_stiffness / reference
+            net = corners.motor_gain[i] * torque[i] - against - radius * long_n + stiff * gained
+            omega[i] = max(omega[i] + dt * net / (car.wheel_inertia_kg_m2 + stiff * radius), 0.0)
         felt_x = (force_x - car.drag_coefficient * air) / car.mass_kg + gust[k]
         felt_y = force_y / car.mass_kg
         if stands:
             felt_x, felt_y = slope[k], 0.0
         else:
-            v, side = v + dt * (felt_x - slope[k] + side * yaw), side + dt * (felt_y - v * yaw)
+            gained = felt_x - slope[k] + side * yaw
+            v, side = v + dt * gained, side + dt * (felt_y - v * yaw)
             yaw += dt * moment / car.yaw_inertia_kg_m2
             if v < STANDING_MPS:
                 stands, v, side, yaw = True, 0.0, 0.0, 0.0
