@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from hil.validation.strangers.car import Noise, Vector
-from hil.validation.strangers.dead_time_motion import STEP_S, Corners, Motion, Numbers, move
-from hil.validation.strangers.dead_time_script import CYCLE_S, Script
+from hil.validation.strangers.dead_time.motion import STEP_S, Corners, Motion, Numbers, move
+from hil.validation.strangers.dead_time.script import CYCLE_S, Script
 
 WHEELS = ("fl", "fr", "rl", "rr")
 RADIUS_M, GAIN_FRONT, GAIN_REAR = 0.335, 3.3e-4, 1.65e-4
@@ -20,7 +20,8 @@ NODES = ("wheel", "imu", "pressure", "motor", "ground")
 WHEEL_PADS, WHEEL_RADIUS, WHEEL_MOTOR, WHEEL_GAIN, WHEEL_ZERO_PA = 0.01, 0.0012, 0.005, 0.005, 7e3
 """By how much wheels differ (one standard deviation, docs/vehicle-set.md); those of this car by `ALIKE` of it."""
 ALIKE = 0.4
-AX_ZERO_MPS2, YAW_ZERO_RAD_S = 0.025, 0.001
+AX_ZERO_MPS2, YAW_ZERO_RAD_S, AX_SCALE, GROUND_SCALE = 0.025, 0.001, 0.01, 0.005
+"""What sensors as bought err by (one standard deviation); these by `ALIKE` of it."""
 SENSORS = (
     (tuple(f"wheel_speed_{w}_rad_s" for w in WHEELS), 0.025, 0.0, 0.02),
     (("ax_mps2",), 0.04, 0.01, 0.01),
@@ -45,7 +46,8 @@ class Drawn:
     pressure_scale: Vector
     ax_zero_mps2: float
     yaw_zero_rad_s: float
-    ax_scale: float = 1.0
+    ax_scale: float
+    ground_scale: float
 
 
 def _noise(rng: np.random.Generator) -> Noise:
@@ -71,7 +73,8 @@ def draw(seed: int) -> Drawn:
         ages, float(rng.uniform(0.0, CYCLE_S)), _noise(rng),
         Corners(RADIUS_M * spread[0], gains * spread[1], np.zeros(4), spread[2]),
         ALIKE * WHEEL_ZERO_PA * rng.standard_normal(4), 1.0 + ALIKE * WHEEL_GAIN * rng.standard_normal(4),
-        ALIKE * AX_ZERO_MPS2 * float(rng.standard_normal()), ALIKE * YAW_ZERO_RAD_S * float(rng.standard_normal()),
+        *(ALIKE * size * float(rng.standard_normal()) for size in (AX_ZERO_MPS2, YAW_ZERO_RAD_S)),
+        *(1.0 + ALIKE * size * float(rng.standard_normal()) for size in (AX_SCALE, GROUND_SCALE)),
     )  # fmt: skip
 
 
@@ -110,7 +113,7 @@ def log(script: Script, numbers: Numbers, drawn: Drawn, seed: Sequence[int], noi
     table["ax_mps2"] = drawn.ax_scale * motion.force_mps2[at("imu")] + drawn.ax_zero_mps2
     table["ay_mps2"] = motion.side_mps2[at("imu")]
     table["yaw_rate_rad_s"] = motion.yaw_rate_rad_s[at("imu")] + drawn.yaw_zero_rad_s
-    table["speed_mps"] = motion.speed_mps[at("ground")]
+    table["speed_mps"] = drawn.ground_scale * motion.speed_mps[at("ground")]
     table["steer_rad"] = steer[now]
     return _measured(table, drawn.noise, rng) if noisy else table
 

@@ -17,10 +17,12 @@ from dataclasses import replace
 import numpy as np
 
 from hil.validation.strangers.car import Cause, Hidden, Noise, Tolerated, Vector, Vehicle
-from hil.validation.strangers.dead_time_log import (
+from hil.validation.strangers.dead_time.log import (
+    AX_SCALE,
     AX_ZERO_MPS2,
     GAIN_FRONT,
     GAIN_REAR,
+    GROUND_SCALE,
     NODES,
     RADIUS_M,
     WHEEL_GAIN,
@@ -34,11 +36,10 @@ from hil.validation.strangers.dead_time_log import (
     draw,
     log,
 )
-from hil.validation.strangers.dead_time_motion import Numbers
-from hil.validation.strangers.dead_time_script import scripts
+from hil.validation.strangers.dead_time.motion import Numbers
+from hil.validation.strangers.dead_time.script import scripts
 
 TRUE = Numbers()
-FRONT = np.array([1.0, 1.0, 0.0, 0.0])
 STATED = {
     "mass_kg": 18.0, "wheelbase_m": 0.01, "cog_to_front_axle_m": 0.02, "rolling_radius_m": 0.0015,
     "brake_gain_front_nm_pa": 0.025 * GAIN_FRONT, "brake_gain_rear_nm_pa": 0.025 * GAIN_REAR,
@@ -59,7 +60,32 @@ USUAL = {
     "ehb_pole_s": 0.02, "motor_dead_time_s": 0.006, "motor_lag_s": 0.006,
 }  # fmt: skip
 """Half-widths of what is not stated: docs/vehicle-set.md; of the last three, a choice."""
-LATE_S = 0.002  # of a node beside another: half of what docs/vehicle-set.md takes
+LATE_S, GROUND_LATE_S = 0.01, 0.1
+UNLIKE = {
+    "pads": WHEEL_PADS, "radius": WHEEL_RADIUS, "motor": WHEEL_MOTOR, "pressure_scale": WHEEL_GAIN,
+    "pressure_zero": WHEEL_ZERO_PA,
+}  # fmt: skip
+UNTOLD = {
+    "ax_zero_mps2": AX_ZERO_MPS2, "ax_scale": AX_SCALE, "yaw_zero_rad_s": YAW_ZERO_RAD_S, "ground_scale": GROUND_SCALE,
+    "motor_all": 0.015, "grade": 0.0025, "wind_mps": 1.0,
+}  # fmt: skip
+"""What nobody states and everybody knows as well as this (one standard deviation), as the stamps above."""
+WHERE = {
+    **{w: np.array([float(w == own) for own in WHEELS]) for w in WHEELS},
+    "front": np.array([1.0, 1.0, 0.0, 0.0]), "rear": np.array([0.0, 0.0, 1.0, 1.0]),
+}  # fmt: skip
+CORNERS = {"pads": "brake_gain_nm_pa", "radius": "radius_m", "motor": "motor_gain"}
+AS_SHARE = {
+    "rolling_radius_m": "radius_all", "brake_gain_front_nm_pa": "pads_front", "brake_gain_rear_nm_pa": "pads_rear",
+}  # fmt: skip
+"""Stated numbers that are changed by a share."""
+CHANGES = {
+    "front_pads_weak": "pads_front", "wheel_pads_weak": "pads_fl", "front_pads_fade": "fade_front_1_k",
+    "brake_drags": "drag_rr", "loaded": "mass_kg", "rear_motors_weak": "motor_rear", "wheel_radius": "radius_fr",
+    "accelerometer_zero": "ax_zero_mps2", "accelerometer_scale": "ax_scale", "pressure_scale": "pressure_scale_rl",
+    "headwind": "wind_mps", "friction_by_speed": "friction_speed_front_s_m",
+}  # fmt: skip
+"""What of the car each cause changes."""
 _PADS = ("pad_mu_gain", "stuck_corner", "caliper_asymmetry")
 """Of pads that give too little: a share less, driven forward, is the same under each of these names."""
 
@@ -115,9 +141,9 @@ class DeadTime:
         """Six logs; the script, the noise and all that a seed draws do not depend on what is hidden."""
         numbers, drawn = TRUE, draw(seed)
         if hidden is not None:
-            numbers, drawn = _with_cause(numbers, drawn, hidden)
+            numbers, drawn = _changed(numbers, drawn, CHANGES[hidden.cause], hidden.size)
         if off is not None:
-            numbers, drawn = _with_number(numbers, drawn, off)
+            numbers, drawn = _changed(numbers, drawn, off.name, off.deviation)
         return [
             log(script, numbers, drawn, [seed, 3, k], noisy)
             for k, script in enumerate(scripts(np.random.default_rng([seed, 2])))
@@ -128,19 +154,20 @@ class DeadTime:
         return draw(seed).noise
 
     def tolerated(self, stated: Vehicle) -> Sequence[Tolerated]:
-        """Half of each half-width, what differs from wheel to wheel, ages of the nodes, zeros of the inertial unit."""
+        """Half of each half-width; what differs from wheel to wheel; how well sensors, stamps and road are known."""
         halves = dict(USUAL)
         for key in STATED:
             if key in stated:
                 told = stated.get(f"{key}_tolerance", SIX_WITHIN * _true(key))
                 halves[key] = float(told) if not isinstance(told, list) else float(max(told))
         halves.pop("motor_time_constant_s", None)  # dead time and lag stand for it
-        found = [Tolerated(key, 0.5 * half) for key, half in halves.items()]
-        for what, size in (("radius", WHEEL_RADIUS), ("pads", WHEEL_PADS), ("motor", WHEEL_MOTOR),
-                           ("pressure_scale", WHEEL_GAIN), ("pressure_zero", WHEEL_ZERO_PA)):  # fmt: skip
-            found += [Tolerated(f"{what}_{w}", size) for w in WHEELS]
-        found += [Tolerated(f"late_{node}", LATE_S) for node in NODES]
-        return [*found, Tolerated("ax_zero", AX_ZERO_MPS2), Tolerated("yaw_zero", YAW_ZERO_RAD_S)]
+        found = [
+            Tolerated(AS_SHARE.get(key, key), 0.5 * half / (_true(key) if key in AS_SHARE else 1.0))
+            for key, half in halves.items()
+        ]
+        found += [Tolerated(f"{what}_{w}", size) for what, size in UNLIKE.items() for w in WHEELS]
+        found += [Tolerated(f"late_{node}", GROUND_LATE_S if node == "ground" else LATE_S) for node in NODES]
+        return found + [Tolerated(name, size) for name, size in UNTOLD.items()]
 
 
 def _true(key: str) -> float:
@@ -149,59 +176,22 @@ def _true(key: str) -> float:
     return own[key] if key in own else float(getattr(TRUE, key))
 
 
-def _with_cause(numbers: Numbers, drawn: Drawn, hidden: Hidden) -> tuple[Numbers, Drawn]:
-    name, size, corners = hidden.cause, hidden.size, drawn.corners
-    if name == "front_pads_weak":
-        return numbers, _cornered(drawn, brake_gain_nm_pa=corners.brake_gain_nm_pa * (1.0 + size * FRONT))
-    if name == "wheel_pads_weak":
-        return numbers, _cornered(drawn, brake_gain_nm_pa=corners.brake_gain_nm_pa * (1.0 + size * _one("fl")))
-    if name == "brake_drags":
-        return numbers, _cornered(drawn, drag_nm=corners.drag_nm + size * _one("rr"))
-    if name == "rear_motors_weak":
-        return numbers, _cornered(drawn, motor_gain=corners.motor_gain * (1.0 + size * (1.0 - FRONT)))
-    if name == "wheel_radius":
-        return numbers, _cornered(drawn, radius_m=corners.radius_m * (1.0 + size * _one("fr")))
-    if name == "accelerometer_zero":
-        return numbers, replace(drawn, ax_zero_mps2=drawn.ax_zero_mps2 + size)
-    if name == "accelerometer_scale":
-        return numbers, replace(drawn, ax_scale=drawn.ax_scale * (1.0 + size))
-    if name == "pressure_scale":
-        return numbers, replace(drawn, pressure_scale=drawn.pressure_scale * (1.0 + size * _one("rl")))
-    if name == "loaded":
-        return numbers._replace(mass_kg=numbers.mass_kg + size), drawn
-    field = {"front_pads_fade": "fade_front_1_k", "headwind": "wind_mps",
-             "friction_by_speed": "friction_speed_front_s_m"}[name]  # fmt: skip
-    return numbers._replace(**{field: size}), drawn
-
-
-def _with_number(numbers: Numbers, drawn: Drawn, off: Tolerated) -> tuple[Numbers, Drawn]:
-    name, by, corners = off.name, off.deviation, drawn.corners
-    if name in Numbers._fields:
-        return numbers._replace(**{name: getattr(numbers, name) + by}), drawn
-    if name == "rolling_radius_m":
-        return numbers, _cornered(drawn, radius_m=corners.radius_m + by)
-    if name in ("brake_gain_front_nm_pa", "brake_gain_rear_nm_pa"):
-        axle = FRONT if "front" in name else 1.0 - FRONT
-        return numbers, _cornered(drawn, brake_gain_nm_pa=corners.brake_gain_nm_pa + by * axle)
-    if name == "ax_zero":
-        return numbers, replace(drawn, ax_zero_mps2=drawn.ax_zero_mps2 + by)
-    if name == "yaw_zero":
-        return numbers, replace(drawn, yaw_zero_rad_s=drawn.yaw_zero_rad_s + by)
-    what, where = name.rsplit("_", 1)
-    if what == "late":
+def _changed(numbers: Numbers, drawn: Drawn, what: str, by: float) -> tuple[Numbers, Drawn]:
+    """The car with one thing changed: a number by so much, or ``thing_where`` of wheels and nodes, by a share."""
+    if what in Numbers._fields:
+        return numbers._replace(**{what: getattr(numbers, what) + by}), drawn
+    corners = drawn.corners
+    thing, where = what.rsplit("_", 1)
+    at = WHERE.get(where, np.ones(4))
+    if thing == "late":
         return numbers, replace(drawn, ages_s={**drawn.ages_s, where: drawn.ages_s[where] + by})
-    if what == "pressure_zero":
-        return numbers, replace(drawn, pressure_zero_pa=drawn.pressure_zero_pa + by * _one(where))
-    factor = 1.0 + by * _one(where)
-    if what == "pressure_scale":
-        return numbers, replace(drawn, pressure_scale=drawn.pressure_scale * factor)
-    field = {"radius": "radius_m", "pads": "brake_gain_nm_pa", "motor": "motor_gain"}[what]
-    return numbers, _cornered(drawn, **{field: getattr(corners, field) * factor})
-
-
-def _cornered(drawn: Drawn, **changed: Vector) -> Drawn:
-    return replace(drawn, corners=drawn.corners._replace(**changed))
-
-
-def _one(wheel: str) -> Vector:
-    return np.array([float(w == wheel) for w in WHEELS])
+    if thing == "pressure_zero":
+        return numbers, replace(drawn, pressure_zero_pa=drawn.pressure_zero_pa + by * at)
+    if thing == "pressure_scale":
+        return numbers, replace(drawn, pressure_scale=drawn.pressure_scale * (1.0 + by * at))
+    if thing == "drag":
+        return numbers, replace(drawn, corners=corners._replace(drag_nm=corners.drag_nm + by * at))
+    if thing in CORNERS:
+        field = CORNERS[thing]
+        return numbers, replace(drawn, corners=corners._replace(**{field: getattr(corners, field) * (1.0 + by * at)}))
+    return numbers, replace(drawn, **{what: getattr(drawn, what) + by})

@@ -56,6 +56,7 @@ class Numbers(NamedTuple):
     disc_cooling_ws_m_k: float = 0.33
     ambient_k: float = 293.0
     wind_mps: float = 0.0
+    grade: float = 0.0
     fade_front_1_k: float = 0.0
     fade_start_k: float = 573.0
     friction_speed_front_s_m: float = 0.0
@@ -119,6 +120,7 @@ def move(
     for k in range(n):
         air = 0.5 * car.air_density_kg_m3 * car.frontal_area_m2 * (v + car.wind_mps) * abs(v + car.wind_mps)
         angle = steer[k] / car.steering_ratio
+        rises = slope[k] + G_MPS2 * car.grade
         force_x, force_y, moment = 0.0, 0.0, 0.0
         for i in range(4):
             is_front, left = i < 2, 1.0 if i % 2 == 0 else -1.0
@@ -169,9 +171,9 @@ def move(
         felt_x = (force_x - car.drag_coefficient * air) / car.mass_kg + gust[k]
         felt_y = force_y / car.mass_kg
         if stands:
-            felt_x, felt_y = slope[k], 0.0
+            felt_x, felt_y = rises, 0.0
         else:
-            gained = felt_x - slope[k] + side * yaw
+            gained = felt_x - rises + side * yaw
             v, side = v + dt * gained, side + dt * (felt_y - v * yaw)
             yaw += dt * moment / car.yaw_inertia_kg_m2
             if v < STANDING_MPS:
