@@ -30,7 +30,8 @@ class Visibility:
 
     def __init__(self, car: StrangerCar, seed: int, stated: Vehicle) -> None:
         self._car, self._seed = car, seed
-        self._base, self._noise = car.drive(seed, noisy=False), car.noise(seed)
+        self._base = car.drive(seed, noisy=False)
+        self._whitener = Whitener(self._base, car.noise(seed))
         off = [car.drive(seed, noisy=False, off=number) for number in car.tolerated(stated)]
         self._imitations = np.stack([self._whitened(tables) for tables in off], axis=1)
         self._inner = self._imitations.T @ self._imitations + np.eye(self._imitations.shape[1])
@@ -57,7 +58,7 @@ class Visibility:
         return middle, found
 
     def _whitened(self, tables: Sequence[Table]) -> Vector:
-        return whitened(difference(tables, self._base), self._base, self._noise)
+        return self._whitener(difference(tables, self._base))
 
 
 def difference(one: Sequence[Table], other: Sequence[Table]) -> list[dict[str, Vector]]:
@@ -93,35 +94,44 @@ def _rolling(table: Table) -> int:
     return len(slow) if slow[0] or not slow.any() else int(np.argmax(slow))
 
 
-def whitened(differences: Sequence[Table], base: Sequence[Table], noise: Noise) -> Vector:
-    """Innovations of difference tables under the noise: independent, standard deviation 1; 0 where nothing is measured.
+class Whitener:
+    """Turns difference tables into innovations under a drive's noise: independent, standard deviation 1.
 
     `SHARED` channels go through one Kalman filter (speed, gust, slope, own coloured noise of each), all others with
-    white noise through one of their own.
+    white noise through one of their own. Its gains do not depend on what is shown, and are found once.
     """
-    parts = []
-    radius_m = _radius_m(base)
-    for apart, table in zip(differences, base, strict=True):
-        step_s = float(np.median(np.diff(table["t_s"])))
-        speed = _speed(table)
-        present = [name for name in SHARED if name in apart and name in noise.white]
-        shown = np.full((len(speed), len(SHARED)), np.nan)
-        white, drift, keep = np.ones(len(SHARED)), np.zeros(len(SHARED)), np.zeros(len(SHARED))
-        for name in present:
-            at = SHARED.index(name)
-            shown[:, at], white[at] = apart[name], noise.white[name]
-            drift[at], keep[at] = _coloured(noise, name, step_s)
+
+    def __init__(self, base: Sequence[Table], noise: Noise) -> None:
+        self._base, self._noise = base, noise
+        self._radius_m = _radius_m(base)
+        self._filters = [self._filter(table) for table in base]
+
+    def __call__(self, differences: Sequence[Table]) -> Vector:
+        """Innovations of all channels and logs; 0 where nothing is measured."""
+        parts = []
+        for apart, table, (keep, moving, step_s, gains, deviations) in zip(
+            differences, self._base, self._filters, strict=True
+        ):
+            missing = np.full(len(moving), np.nan)
+            shown = np.stack([apart.get(name, missing) for name in SHARED], axis=1)
+            parts.append(_shared_innovations(shown, keep, moving, step_s, self._radius_m, gains, deviations).ravel())
+            wheels = np.nan_to_num([apart[name] for name in WHEELS]).mean(axis=0)
+            faster = wheels / np.maximum(_speed(table), 1.0)
+            for name, white in self._noise.white.items():
+                if name not in SHARED and name in apart:
+                    answer = BY_SPEED.get(name, 0.0) * faster * np.nan_to_num(table[name])
+                    parts.append(_innovations(apart[name] - answer, white, *_coloured(self._noise, name, step_s)))
+        return np.concatenate(parts)
+
+    def _filter(self, table: Table) -> tuple[Vector, Vector, float, Vector, Vector]:
+        noise, step_s = self._noise, float(np.median(np.diff(table["t_s"])))
+        moving = (_speed(table) > MOVES_RAD_S).astype(np.float64)
         slow = [(size, exp(-step_s / tau_s)) for size, tau_s in (noise.gust_mps2, noise.slope_mps2)]
-        moving = (speed > MOVES_RAD_S).astype(np.float64)
-        parts.append(_shared_innovations(shown, white, drift, keep, np.array(slow), moving, step_s, radius_m).ravel())
-        wheels = np.nan_to_num([apart[name] for name in WHEELS]).mean(axis=0)
-        faster = wheels / np.maximum(speed, 1.0)
-        for name in noise.white:
-            if name in SHARED or name not in apart:
-                continue
-            answer = BY_SPEED.get(name, 0.0) * faster * np.nan_to_num(table[name])
-            parts.append(_innovations(apart[name] - answer, noise.white[name], *_coloured(noise, name, step_s)))
-    return np.concatenate(parts)
+        size, keep = np.array([(START_MPS, 1.0), *slow, *(_coloured(noise, name, step_s) for name in SHARED)]).T
+        there = np.stack([np.isfinite(table[name]) if name in table else moving < 0.0 for name in SHARED], axis=1)
+        white = np.array([noise.white.get(name, np.inf) for name in SHARED])
+        gains, deviations = _gains(there & np.isfinite(white), white, size, keep, moving, step_s, self._radius_m)
+        return keep, moving, step_s, gains, deviations
 
 
 def _radius_m(base: Sequence[Table]) -> float:
@@ -158,56 +168,73 @@ def _innovations(z: Vector, white: float, drift: float, keep: float) -> Vector:
 
 
 @njit(cache=True, error_model="numpy")
-def _shared_innovations(
-    shown: NDArray[np.float64], white: Vector, drift: Vector, keep: Vector, slow: NDArray[np.float64], moving: Vector,
-    step_s: float, radius_m: float,
-) -> Vector:  # fmt: skip
-    """Normalised innovations of `SHARED`, (n, 6). States: speed, gust, slope, coloured noise of each channel."""
-    n, m = shown.shape[0], 9
-    out, x, h, g = np.zeros((n, 6)), np.zeros(m), np.zeros(m), np.zeros(m)
-    left, size = np.ones(m), np.zeros(m)
-    for i in range(2):
-        size[1 + i], left[1 + i] = slow[i, 0], slow[i, 1]
-    for i in range(6):
-        size[3 + i], left[3 + i] = drift[i], keep[i]
-    p = np.diag(size**2)
-    p[0, 0] = START_MPS**2
+def _sees(j: int, moving: float, radius_m: float, h: Vector) -> None:
+    """What channel ``j`` of `SHARED` sees of the states: speed, gust, slope, coloured noise of each channel."""
+    h[:] = 0.0
+    h[3 + j] = 1.0
+    if j == 4:
+        h[1] = moving
+    else:
+        h[0] = 1.0 / radius_m if j < 4 else 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def _gains(
+    there: NDArray[np.bool_], white: Vector, size: Vector, keep: Vector, moving: Vector, step_s: float, radius_m: float
+) -> tuple[Vector, Vector]:
+    """Kalman gains (n, 6, 9) and standard deviations of the innovations (n, 6); inf where no sample is ``there``."""
+    n, m = moving.size, size.size
+    gains, deviations = np.zeros((n, 6, m)), np.full((n, 6), np.inf)
+    h, g, p = np.zeros(m), np.zeros(m), np.diag(size**2)
     for k in range(n):
         for j in range(6):
-            z = shown[k, j]
-            if z != z:
+            if not there[k, j]:
                 continue
-            h[:] = 0.0
-            h[3 + j] = 1.0
-            if j < 4:
-                h[0] = 1.0 / radius_m
-            elif j == 4:
-                h[1] = moving[k]
-            else:
-                h[0] = 1.0
+            _sees(j, moving[k], radius_m, h)
             s = white[j] * white[j]
             for a in range(m):
                 g[a] = 0.0
                 for b in range(m):
                     g[a] += p[a, b] * h[b]
                 s += h[a] * g[a]
-                z -= h[a] * x[a]
-            out[k, j] = z / s**0.5
+            deviations[k, j] = s**0.5
+            gains[k, j] = g / s
             for a in range(m):
-                x[a] += g[a] * z / s
                 for b in range(m):
                     p[a, b] -= g[a] * g[b] / s
         step = step_s * moving[k]
-        x[0] += step * (x[1] - x[2])
         for b in range(m):
             p[0, b] += step * (p[1, b] - p[2, b])
         for a in range(m):
             p[a, 0] += step * (p[a, 1] - p[a, 2])
         for i in range(1, m):
-            x[i] *= left[i]
             for b in range(m):
-                p[i, b] *= left[i]
-                p[b, i] *= left[i]
-            p[i, i] += (1.0 - left[i] ** 2) * size[i] ** 2
+                p[i, b] *= keep[i]
+                p[b, i] *= keep[i]
+            p[i, i] += (1.0 - keep[i] ** 2) * size[i] ** 2
         p[0, 0] += 1e-14
+    return gains, deviations
+
+
+@njit(cache=True, error_model="numpy")
+def _shared_innovations(
+    shown: Vector, keep: Vector, moving: Vector, step_s: float, radius_m: float, gains: Vector, deviations: Vector
+) -> Vector:
+    """Normalised innovations of `SHARED`, (n, 6); where a log's motion ends, nothing is shown from there on."""
+    n, m = moving.size, keep.size
+    out, x, h = np.zeros((n, 6)), np.zeros(m), np.zeros(m)
+    for k in range(n):
+        for j in range(6):
+            z = shown[k, j]
+            if z != z:
+                continue
+            _sees(j, moving[k], radius_m, h)
+            for a in range(m):
+                z -= h[a] * x[a]
+            out[k, j] = z / deviations[k, j]
+            for a in range(m):
+                x[a] += gains[k, j, a] * z
+        x[0] += step_s * moving[k] * (x[1] - x[2])
+        for i in range(1, m):
+            x[i] *= keep[i]
     return out

@@ -56,7 +56,7 @@ USUAL = {
     "frontal_area_m2": 0.1, "rolling_resistance": 0.0044, "yaw_inertia_kg_m2": 585.0, "steering_ratio": 2.0,
     "threshold_pressure_pa": 5e4, "ehb_dead_time_s": 0.02, "air_density_kg_m3": 0.07,
     "slip_stiffness": 0.4 * TRUE.slip_stiffness, "cornering_stiffness": 0.4 * TRUE.cornering_stiffness,
-    "tyre_friction": 0.2 * TRUE.tyre_friction, "lift_front": 0.05, "lift_rear": 0.05, "disc_front_j_k": 400.0,
+    "tyre_friction": 0.2 * TRUE.tyre_friction, "lift_front": 0.05, "lift_rear": 0.05,
     "ehb_pole_s": 0.02, "motor_dead_time_s": 0.006, "motor_lag_s": 0.006,
 }  # fmt: skip
 """Half-widths of what is not stated: docs/vehicle-set.md; of the last three, a choice."""
@@ -128,7 +128,7 @@ class DeadTime:
             half = SIX_WITHIN * true if six else half
             value = true + half * float(np.clip(0.5 * rng.standard_normal(), -1.0, 1.0))
             if key in SIX or not six:
-                said[key] = float(f"{value:.4g}")
+                said[key] = float(f"{value:.5g}")
                 if not six:
                     said[f"{key}_tolerance"] = float(f"{half:.3g}")
         if not six:
