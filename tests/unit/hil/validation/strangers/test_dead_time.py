@@ -14,6 +14,12 @@ FREE = Numbers(drag_coefficient=0.0, rolling_resistance=0.0, lift_front=0.0, lif
 EVEN = Corners(np.full(4, RADIUS_M), np.repeat([GAIN_FRONT, GAIN_REAR], 2), np.zeros(4), np.ones(4))
 
 
+@pytest.fixture(scope="module")
+def clean():
+    """A drive without noise."""
+    return CAR.drive(4, noisy=False)
+
+
 def _moved(car=FREE, seconds=4.0, pressure=0.0, torque=0.0, steer=0.0, speed=20.0, slope=0.0, corners=EVEN):
     n = round(seconds / STEP_S)
     wheels = np.ones((n, 4))
@@ -111,19 +117,19 @@ def test_a_drive_is_six_logs_of_two_minutes_that_follow_from_the_seed() -> None:
         assert all(np.isfinite(values).all() for values in a.values())
 
 
-def test_noise_is_what_the_car_says() -> None:
-    noisy, clean, noise = CAR.drive(4), CAR.drive(4, noisy=False), CAR.noise(4)
+def test_noise_is_what_the_car_says(clean) -> None:
+    noisy, noise = CAR.drive(4), CAR.noise(4)
     for name, size in noise.white.items():
         apart = noisy[3][name] - clean[3][name]
         assert np.std(np.diff(apart)) / 2**0.5 == pytest.approx(size, rel=0.08)
 
 
 @pytest.mark.parametrize("name", CAR.causes)
-def test_every_cause_changes_logs_but_no_demand(name) -> None:
+def test_every_cause_changes_logs_but_no_demand(name, clean) -> None:
     cause = CAR.causes[name]
     hidden = CAR.drive(4, Hidden(name, cause.largest), noisy=False)
     apart = False
-    for one, other in zip(hidden, CAR.drive(4, noisy=False), strict=True):
+    for one, other in zip(hidden, clean, strict=True):
         rows = min(len(one["t_s"]), len(other["t_s"]))
         same = {key: np.array_equal(one[key][:rows], other[key][:rows]) for key in one}
         assert all(same[key] for key in same if "demand" in key or key == "steer_rad")
@@ -156,11 +162,11 @@ class _Certain:
         return 0.0
 
 
-def test_every_tolerated_number_changes_logs() -> None:
-    base = CAR.drive(4, noisy=False)
+@pytest.mark.slow
+def test_every_tolerated_number_changes_logs(clean) -> None:
     for number in CAR.tolerated(CAR.stated(np.random.default_rng(0))):
         off = CAR.drive(4, noisy=False, off=Tolerated(number.name, 3.0 * number.deviation))
         assert any(
             len(a["t_s"]) != len(b["t_s"]) or any(not np.array_equal(a[name], b[name]) for name in a)
-            for a, b in zip(off, base, strict=True)
+            for a, b in zip(off, clean, strict=True)
         ), number.name
