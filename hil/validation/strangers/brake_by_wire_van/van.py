@@ -1,0 +1,96 @@
+"""A laden van: one motor on the rear axle, electro-mechanical brakes, a 50 Hz log from the bus."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from hil.validation.strangers.brake_by_wire_van.causes import CAUSES, with_hidden
+from hil.validation.strangers.brake_by_wire_van.course import GUST_MPS, GUST_S, REST_S, Course, courses, slope_mps2
+from hil.validation.strangers.brake_by_wire_van.logger import SLOW, STEP, WHITE, Logger, logged, true_logger
+from hil.validation.strangers.brake_by_wire_van.motion import OMEGA, STATES, VX, run
+from hil.validation.strangers.brake_by_wire_van.numbers import (
+    FRONT_GAIN_NM_PA,
+    RADIUS_M,
+    REAR_GAIN_NM_PA,
+    WHEELS,
+    Numbers,
+    true_numbers,
+)
+from hil.validation.strangers.brake_by_wire_van.papers import TOLERATED, stated, with_off
+from hil.validation.strangers.car import Cause, Hidden, Noise, Tolerated
+from hil.validation.strangers.signals import Vector
+
+_USUAL_MPS = 16.0
+CONTROL = np.array([FRONT_GAIN_NM_PA, REAR_GAIN_NM_PA, RADIUS_M])
+
+
+class BrakeByWireVan:
+    """A stranger's car (`hil.validation.strangers.car.StrangerCar`)."""
+
+    @property
+    def name(self) -> str:
+        """Short name."""
+        return "brake_by_wire_van"
+
+    @property
+    def causes(self) -> Mapping[str, Cause]:
+        """What can be hidden."""
+        return CAUSES
+
+    def stated(self, rng: np.random.Generator) -> dict[str, float | list[float]]:
+        """The set that the owner writes."""
+        return stated(rng)
+
+    def drive(
+        self, seed: int, hidden: Hidden | None = None, noisy: bool = True, off: Tolerated | None = None
+    ) -> Sequence[dict[str, Vector]]:
+        """Four to six logs, 90 to 130 s together."""
+        car, logger = with_off(with_hidden(truth(seed), hidden), off)
+        driven = courses(np.random.default_rng([seed, 2]))
+        sensing = [np.random.default_rng([seed, 3, k]) if noisy else None for k in range(len(driven))]
+        return [
+            logged(motion(car, course), course.asked_nm, car, logger, rng)
+            for course, rng in zip(driven, sensing, strict=True)
+        ]
+
+    def noise(self, seed: int) -> Noise:
+        """Noise of the columns, and what wind and road do."""
+        stems = {
+            "wheel_speed_{}_rad_s": "wheel",
+            "pressure_{}_pa": "pressure",
+            "pressure_demand_{}_pa": "pressure_demand",
+        }
+        kinds = {stem.format(wheel): kind for stem, kind in stems.items() for wheel in WHEELS}
+        rear = {"motor_torque_{}_nm": "motor", "motor_torque_demand_{}_nm": "motor_demand"}
+        kinds |= {stem.format(wheel): kind for stem, kind in rear.items() for wheel in WHEELS[2:]}
+        kinds |= {"ax_mps2": "ax", "ay_mps2": "ay", "yaw_rate_rad_s": "yaw", "steer_rad": "steer"}
+        kinds |= {"pedal": "pedal", "throttle": "throttle"}
+        car, _ = truth(seed)
+        hills = [course.hill for course in courses(np.random.default_rng([seed, 2]))]
+        return Noise(
+            white={name: float(np.hypot(WHITE[kind], STEP[kind] / 12**0.5)) for name, kind in kinds.items()},
+            coloured={name: SLOW[kind] for name, kind in kinds.items() if kind in SLOW},
+            gust_mps2=(2.0 * car.drag_kg_m * _USUAL_MPS * GUST_MPS / car.mass_kg, GUST_S),
+            slope_mps2=slope_mps2(hills, _USUAL_MPS),
+        )
+
+    def tolerated(self, seed: int) -> Sequence[Tolerated]:
+        """Numbers that nobody knows exactly; alike for all seeds."""
+        return [Tolerated(name, deviation) for name, (deviation, _) in TOLERATED.items()]
+
+
+def truth(seed: int) -> tuple[Numbers, Logger]:
+    """The van and the logger of a seed, with nothing hidden."""
+    rng = np.random.default_rng([seed, 1])
+    return true_numbers(rng), true_logger(rng)
+
+
+def motion(car: Numbers, course: Course) -> Vector:
+    """The true motion of one log, lead included, (n, `hil.validation.strangers.brake_by_wire_van.motion.ROW`)."""
+    start = np.zeros(STATES)
+    start[VX] = course.speed_mps
+    start[OMEGA : OMEGA + 4] = course.speed_mps / car.radius_m
+    found: Vector = run(
+        start, car, course.asked_nm, course.curvature, course.hand_rad, course.wind_mps, course.hill, CONTROL, REST_S
+    )
+    return found
