@@ -51,6 +51,11 @@ class MovedNumber:
     at_bound: bool
 
     @property
+    def words(self) -> str:
+        """What it is, and where."""
+        return ", ".join(filter(None, (self.quantity.what, self.quantity.location)))
+
+    @property
     def beyond_tolerance(self) -> bool:
         """It is stated, and left its tolerance."""
         return self.stated and abs(self.deviations) > _TOLERANCE_DEVIATIONS
@@ -143,6 +148,7 @@ def _half_width(nuisance: Nuisance, what: Quantity, base: ParameterSet) -> float
 
 
 def _read(nuisance: Nuisance, parameters: ParameterSet) -> list[float]:
+    values: Sequence[float] | Floats
     match nuisance.kind:
         case NuisanceKind.VEHICLE | NuisanceKind.SIGNED:
             values = parameters.p[list(nuisance.at)]

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hil.diagnosis.data.log import UnusableError
+from hil.diagnosis.vehicle.key_names import stated_keys
 from hil.diagnosis.vehicle.keys import (
     ALIASES,
     DERIVED,
@@ -23,7 +24,6 @@ from hil.diagnosis.vehicle.keys import (
     WIDE,
     split_name,
 )
-from hil.diagnosis.vehicle.key_names import stated_keys
 from hil.diagnosis.vehicle.priors import (
     Nuisance,
     line_lag,

@@ -1,4 +1,4 @@
-"""Plain words of the numbers that a fit moves, by their name in the plant, in theta, or by node; units of short keys."""
+"""Plain words of the numbers that a fit moves, by name in the plant, in theta or by node; units of short keys."""
 
 from typing import Final
 
