@@ -80,6 +80,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _unusable(why: str) -> dict[str, object]:
     return {
-        "verdict": "unusable", "why": why, "causes": [], "rivals": [], "undetectable_effects": [],
+        "verdict": "unusable", "why": why, "headline": why, "causes": [], "rivals": [], "moved_numbers": [],
+        "goodness_of_fit": None, "undetectable_effects": [],
         "discriminating_manoeuvres": [], "residual_patterns": [], "held_out_error": {}, "extension": None,
     }  # fmt: skip

@@ -50,11 +50,14 @@ def run(args: argparse.Namespace) -> int:
     scenario, out = args.scenario, args.out
     if args.extend is not None:
         from hil.bench.run import new_folder
-        from hil.diagnosis.result.extended_scenario import extended_scenario
+        from hil.diagnosis.result.extended_scenario import effects_after_end, extended_scenario
 
         folder = Path(out) if out else new_folder(Path(scenario).stem)
         folder.mkdir(parents=True, exist_ok=True)
-        scenario, out = str(extended_scenario(scenario, args.extend, folder)), str(folder)
+        extended = extended_scenario(scenario, args.extend, folder)
+        for remark in effects_after_end(extended):
+            print(remark, file=sys.stderr)
+        scenario, out = str(extended), str(folder)
     outcome = run_scenario(
         scenario,
         args.bus,

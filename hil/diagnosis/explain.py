@@ -1,12 +1,10 @@
 """`explain`: takes measured logs and a vehicle set, gives the answer. The call behind ``brakebench explain``."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from dbc.database import parse_database
@@ -16,14 +14,14 @@ from hil.diagnosis.data.log import Log
 from hil.diagnosis.data.masks import is_straight_line
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.data.read import from_frame, read_logs
-from hil.diagnosis.detection.result import Diagnosis, Progress, Settings
+from hil.diagnosis.detection.result import Progress, Settings
 from hil.diagnosis.detection.stepwise import diagnose
 from hil.diagnosis.result.answer import Answer, answer
 from hil.diagnosis.result.cross_validation import confirmed, held_out_error
+from hil.diagnosis.result.extended_car import extended_car, write_extended_car
 from hil.diagnosis.result.residual_patterns import residual_patterns
 from hil.diagnosis.sensor_consistency.check import Consistency, check, why_not_simulatable
-from hil.diagnosis.simulation.parameter_set import ParameterSet, nominal
-from hil.diagnosis.vehicle.extension_file import load_extension, write_extension
+from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.vehicle.load import load_vehicle
 from hil.diagnosis.vehicle.spec import Vehicle
 
@@ -61,32 +59,16 @@ def explain(
         return check(read, car, why, extend, folder, report)
     car = (car.without_lateral_dynamics() if is_straight_line(read) else car).with_motor_limits_from(read)
     dataset = prepare(read, radius_m, car.unstated)
-    base = nominal(car) if extend is None else nominal(car).with_extension(load_extension(Path(extend)))
+    base, notes = (nominal(car), []) if extend is None else extended_car(car, Path(extend), dataset)
     with threadpool_limits(1, "blas"):  # simulations fill the processors; linear algebra beside them only waits
         diagnosis = diagnose(dataset, car, base, settings, report)
         report("held-out error by cross-validation")
         diagnosis = confirmed(diagnosis, report)
         errors, patterns = held_out_error(diagnosis), residual_patterns(diagnosis)
-    extension = None if folder is None else _write_extension(diagnosis, nominal(car), folder)
+    extension = None if folder is None else write_extended_car(diagnosis, folder)
     of_logs = (f"{one.log.name}: {text}" for one in dataset.recordings for text in one.log.remarks)
-    remarks = [*car.remarks, *of_logs, *diagnosis.remarks]
+    remarks = [*car.remarks, *notes, *of_logs, *diagnosis.remarks]
     return answer(diagnosis, errors, patterns, extension, remarks, folder)
-
-
-def _write_extension(diagnosis: Diagnosis, without: ParameterSet, folder: Path) -> str:
-    """Write the causes and the estimated nuisances as ``extension.toml``; its path.
-
-    Sensor zeros belong to these logs alone and are left out.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "extension.toml"
-    fitter, final = diagnosis.fitter, diagnosis.final
-    causes = fitter.parameter_set(np.zeros_like(final.z), final.terms).theta
-    extended = replace(fitter.parameter_set(final.z, final.terms), theta=causes)
-    names = ", ".join(term.candidate.name for term in final.terms) or "no effect"
-    note = f"Estimated from {len(diagnosis.dataset.recordings)} logs: {names}"
-    write_extension(path, extended.extension_of(without), note)
-    return str(path)
 
 
 def shipped(path: Path, kind: str) -> Path:

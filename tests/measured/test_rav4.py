@@ -44,9 +44,9 @@ def _with(log: Log, **changed) -> Log:
 
 
 def test_the_accelerometers_read_the_wrong_way_round(answer):
-    along = _cause(answer, "wrong_scale", "ax_mps2")["parameters"]["factor"]
+    along = _cause(answer, "wrong_scale", "ax_mps2")["parameters"]["gain"]
     assert along["ci95"][0] < -2.0 < along["ci95"][1] < -1.5
-    across = _cause(answer, "wrong_scale", "ay_mps2")["parameters"]["factor"]
+    across = _cause(answer, "wrong_scale", "ay_mps2")["parameters"]["gain"]
     assert across["ci95"][1] < -1.0
     assert answer["verdict"] == "named"
 
@@ -115,5 +115,5 @@ def test_a_larger_wheel_is_named(log, answer):
 
 def test_a_wrong_unit_of_the_accelerometer_is_named(log, answer):
     found = _again(_with(log, ax_mps2=log.channels["ax_mps2"] / 9.80665), Path(answer["extension"]))
-    factor = _cause(found, "wrong_scale", "ax_mps2")["parameters"]["factor"]
+    factor = _cause(found, "wrong_scale", "ax_mps2")["parameters"]["gain"]
     assert factor["ci95"][0] < 1.0 / 9.80665 - 1.0 < factor["ci95"][1]

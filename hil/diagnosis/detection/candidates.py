@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from hil.diagnosis.data.axle_torques import undriven
+from hil.diagnosis.data.dataset import Dataset
 from hil.diagnosis.detection.score_test import (
     OnsetTime,
     ScoreTest,
@@ -39,9 +40,20 @@ from hil.diagnosis.parallel import thread_map
 from hil.diagnosis.simulation.hot_spots import phase_penalty
 from hil.diagnosis.simulation.simulator import Simulator
 
+_BACKWARD_MPS = -0.5
+"""Speed below which a car moves backward: beyond the noise of a wheel speed at rest."""
+
+
+def inseparable_forward(dataset: Dataset) -> dict[str, str]:
+    """Effects that are the same as another one where no log moves backward, by that other one; empty where one does."""
+    backward = any((recording.speed_mps < _BACKWARD_MPS).any() for recording in dataset.recordings)
+    return {} if backward else {"caliper_asymmetry": "pad_mu_gain"}
+
 
 class CandidateSet:
     """All candidates of a dataset; ``jacobian`` are the signatures where `linearise_at` was called last.
+
+    Effects that are another one in these logs (`inseparable_forward`) are no candidates, but rivals of that one.
 
     Parameters
     ----------
@@ -53,7 +65,7 @@ class CandidateSet:
         self, simulator: Simulator, masks: SampleMasks, undiagnosable: Sequence[str], unexcited: Sequence[str] = ()
     ) -> None:
         self._masks, self._starts = masks, segment_starts(simulator.dataset)
-        self._columns = columns(undiagnosable)
+        self._columns = columns((*undiagnosable, *inseparable_forward(simulator.dataset)))
         without = undriven(recording.log for recording in simulator.dataset.recordings)
         vehicle = simulator.vehicle
         form_share = FORM_SHARE if vehicle.unlimited else 0.0

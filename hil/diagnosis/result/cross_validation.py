@@ -24,6 +24,10 @@ _WORSE = 1.01
 _TEMPERING = 1.5
 """Divisor of the criterion differences: two hypotheses differ less than an exact noise model would say."""
 
+_CLEARLY = 0.05
+"""Share by which an error is clearly less or more: of ten in 120 that lose 1 to 10 % by the true cause (docs/trials.md)
+most lose less."""
+
 
 @dataclass(frozen=True)
 class HeldOutError:
@@ -42,6 +46,16 @@ class HeldOutError:
     high: float
     tuned: float
     best_wrong: float | None
+
+    @property
+    def improves_on_tuning(self) -> bool:
+        """Clearly less than with nuisance parameters alone."""
+        return self.after < (1.0 - _CLEARLY) * self.tuned
+
+    @property
+    def worse_than_tuning(self) -> bool:
+        """Clearly more than with nuisance parameters alone."""
+        return self.after > (1.0 + _CLEARLY) * self.tuned
 
 
 def best_wrong(diagnosis: Diagnosis) -> FittedHypothesis | None:

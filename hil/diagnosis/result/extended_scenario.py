@@ -6,13 +6,16 @@ from pathlib import Path
 from typing import Any
 
 from hil.diagnosis.data.log import UnusableError
-from hil.diagnosis.vehicle.extension_file import load_extension, toml_key, toml_value
+from hil.diagnosis.vehicle.extension_file import ONSET_LOG, effect_tables, load_extension, toml_key, toml_value
 from hil.diagnosis.vehicle.keys import split_name
-from hil.scenario.scenario import find_scenario
+from hil.scenario.scenario import find_scenario, load_scenario
+from plant.injection.theta import THETA
 
 
 def extended_scenario(name: str, extension: Path, folder: Path) -> Path:
     """Write a scenario's file again into ``folder``, with the effects and parameters of an extension file.
+
+    An effect that begins so many seconds into a log begins at that time of the scenario.
 
     Parameters
     ----------
@@ -25,7 +28,7 @@ def extended_scenario(name: str, extension: Path, folder: Path) -> Path:
     """
     load_extension(extension)  # refuses values that no car has
     extended = tomllib.loads(extension.read_text(encoding="utf-8"))
-    effects, parameters = extended.get("effects", {}), extended.get("parameters", {})
+    effects, parameters = effect_tables(extension), extended.get("parameters", {})
     if not (effects or parameters or extended.get("laws")):
         raise UnusableError(
             f"{extension}: nothing to simulate: no [effects] and no [parameters]; it describes sensors that the "
@@ -34,8 +37,8 @@ def extended_scenario(name: str, extension: Path, folder: Path) -> Path:
     source = find_scenario(name)
     scenario = tomllib.loads(source.read_bytes().decode("utf-8"))
     own = scenario.setdefault("effects", {})
-    for effect, values in effects.items():
-        own[effect] = own.get(effect, {}) | values
+    for effect, entries in effects.items():
+        own[effect] = own.get(effect, {}) | {key: value for key, value in entries.items() if key != ONSET_LOG}
     if extended.get("laws"):
         own["laws"] = [*own.get("laws", []), *extended["laws"]]
     plant = scenario.setdefault("plant", {})
@@ -51,6 +54,19 @@ def extended_scenario(name: str, extension: Path, folder: Path) -> Path:
     ]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
+
+
+def effects_after_end(scenario: Path) -> list[str]:
+    """Remarks on effects that begin after a scenario's end."""
+    loaded = load_scenario(str(scenario))
+    end_s = loaded.manoeuvre.duration_s
+    begins = {name: float(loaded.effects.number(name, "onset_s")[0]) for name in loaded.effects.on}
+    return [
+        f"{THETA.effect(name).title}: begins at {begin_s:g} s, the scenario ends at {end_s:g} s: this run is "
+        f"without it; take out or change onset_s of [effects.{name}] in the extension"
+        for name, begin_s in begins.items()
+        if begin_s >= end_s
+    ]
 
 
 def _copy_tables(value: Any, source: Path | Traversable, folder: Path) -> None:

@@ -9,21 +9,16 @@ from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.profile_fit import FittedHypothesis, delta_chi2
 from hil.diagnosis.detection.threshold import INDISTINGUISHABLE
 from hil.diagnosis.estimation.gauss_newton import Model
+from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.result.answer import Answer
-from hil.diagnosis.result.cross_validation import HeldOutError, probabilities
-from hil.diagnosis.result.page_parts import EXTENDED, NOMINAL, binned_curve, comparison_panels, limits, rounded
-from hil.diagnosis.result.residual_patterns import UNITS, WORDS
-from hil.report.report import Chart, Curve, Number, Panel, Report, Section, Table, Verdict
+from hil.diagnosis.result.cross_validation import probabilities
+from hil.diagnosis.result.page_parts import EXTENDED, NOMINAL, binned_curve, comparison_panels, limits
+from hil.diagnosis.result.page_tables import goodness_of_fit, held_out, moved, numbers, scaled
+from hil.diagnosis.result.phrases import place
+from hil.report.report import Chart, Curve, Panel, Report, Section, Table, Verdict
 from hil.report.units import BAR, Display, Unit
 from plant.injection_points import INJECTION_POINTS
 
-_SENTENCE = {
-    "none": "Nothing beyond noise and the stated tolerances.",
-    "named": "A listed cause explains what the simulation missed.",
-    "cannot_tell_apart": "Several causes explain these data equally well.",
-    "unlisted": "No listed cause explains the data; a nonparametric term shows where it acts.",
-    "not_testable": "These manoeuvres excite too little to conclude anything.",
-}
 _SHOWN: dict[str, Unit] = {"wheel": Display("km/h", 3.6), "pressure": BAR, "motor": "N m"}
 _VARIABLES: dict[str, Unit] = {
     "speed": Display("km/h", 3.6), "wheel_speed": "rad/s", "pressure": BAR, "disc_temperature": "K",
@@ -44,11 +39,11 @@ def build_report(answer: Answer, sources: Sequence[str]) -> Report:
     return Report(
         title="Measured data against the simulation",
         verdict={"none": Verdict.PASSED, "named": None}.get(verdict, Verdict.INCONCLUSIVE),
-        reason=_headline(content),
-        numbers=tuple(_numbers(answer)),
+        reason=content["headline"],
+        numbers=tuple(numbers(answer)),
         sections=(
-            _comparison(answer), _patterns(answer), *_curves(answer), _candidates(answer), _held_out(answer),
-            _limits(answer),
+            _comparison(answer), moved(answer), *goodness_of_fit(answer), _patterns(answer), *_curves(answer),
+            _candidates(answer), held_out(answer), _limits(answer),
         ),
         provenance={
             "logs": list(sources), "segments": len(diagnosis.dataset.segments),
@@ -56,36 +51,6 @@ def build_report(answer: Answer, sources: Sequence[str]) -> Report:
             "extension": content["extension"] or "not written", "remarks": content["remarks"],
         },
     )  # fmt: skip
-
-
-def _headline(content: dict[str, object]) -> str:
-    causes = content["causes"]
-    text = _SENTENCE[str(content["verdict"])]
-    if isinstance(causes, list) and causes:
-        named = "; ".join(f"{c['title'] if c['curve'] else c['effect']} ({c['location']})" for c in causes)
-        text = f"{named}: {text[0].lower()}{text[1:]}"
-    return text
-
-
-def _numbers(answer: Answer) -> list[Number]:
-    numbers = [Number("Verdict", answer.json["verdict"].replace("_", " "))]
-    for cause in answer.json["causes"]:
-        for name, entry in cause["parameters"].items():
-            low, high = entry["ci95"]
-            which = f" {name}" if len(cause["parameters"]) > 1 else ""
-            label = f"{cause['effect']}{which}, {cause['location']}"
-            numbers.append(Number(label, entry["value"], entry["unit"], note=f"95 %: {low:.4g} to {high:.4g}"))
-        numbers.append(Number("its probability", 100.0 * cause["probability"], "%"))
-    best = _best_reduced(answer.held_out)
-    if best is not None and best.before > 0.0:
-        note = f"{WORDS[best.channel]}, on manoeuvres no fit saw"
-        numbers.append(Number("Held-out error removed", 100.0 * (1.0 - best.after / best.before), "%", note=note))
-    return numbers
-
-
-def _best_reduced(errors: Sequence[HeldOutError]) -> HeldOutError | None:
-    shown = [g for g in errors if g.channel in ("wheel.mean", "ax", "gps", "pressure.mean", "motor.mean")]
-    return max(shown, key=lambda g: 1.0 - g.after / max(g.before, 1e-12), default=None)
 
 
 def _joined_time(answer: Answer) -> tuple[Floats, Floats]:
@@ -139,8 +104,8 @@ def _patterns(answer: Answer) -> Section:
     rows = tuple(
         (
             w.channel,
-            *_scaled(w.rms, w.track),
-            *_scaled(w.noise, w.track)[:1],
+            *scaled(w.rms, w.track),
+            *scaled(w.noise, w.track)[:1],
             round(w.rms / max(w.noise, 1e-12), 1),
             w.pattern,
         )
@@ -150,13 +115,6 @@ def _patterns(answer: Answer) -> Section:
         "What the nominal simulation misses", ("channel", "rms", "unit", "noise", "rms/noise", "correlates with"), rows
     )
     return Section("What is wrong", tables=(table,), charts=tuple(_residual_charts(answer)))
-
-
-def _scaled(value: float, track: str) -> tuple[float, str]:
-    group = track.split(".")[0]
-    if group == "pressure":
-        return rounded(value * 1e-5), "bar"
-    return rounded(value), UNITS[group]
 
 
 def _residual_charts(answer: Answer) -> list[Chart]:
@@ -197,7 +155,7 @@ def _curves(answer: Answer) -> list[Section]:
             f"added to {cause['injection_point']}" if cause["adds"] else f"change of {cause['injection_point']}, share"
         )
         chart = Chart(
-            f"{cause['title']}, {cause['location']}", variable.replace("_", " "), unit, label, added, (curve,)
+            f"{cause['title']}, {place(cause['location'])}", variable.replace("_", " "), unit, label, added, (curve,)
         )
         sections.append(Section("Nonparametric term", charts=(chart,), text="The band is its 95 % interval."))
     return sections
@@ -212,7 +170,7 @@ def _candidates(answer: Answer) -> Section:
         chances = probabilities(listed)
         rows = tuple(
             (
-                c.term.candidate.effect.title, c.term.candidate.name, float(f"{c.term.value:.4g}"),
+                _shown(c.term.candidate), c.term.candidate.name, float(f"{c.term.value:.4g}"),
                 c.term.candidate.parameter.unit, round(delta_chi2(c, listed[0]), 1), round(100.0 * p, 1),
             )
             for c, p in zip(listed, chances, strict=True)
@@ -227,12 +185,13 @@ def _candidates(answer: Answer) -> Section:
         )
     top = sorted(diagnosis.scores, key=lambda s: -s.gain)[:15]
     screened = tuple(
-        (s.candidate.name, round(s.gain, 1), float(f"{s.value:.4g}"), s.candidate.parameter.unit) for s in top
+        (_shown(s.candidate), s.candidate.name, round(s.gain, 1), float(f"{s.value:.4g}"), s.candidate.parameter.unit)
+        for s in top
     )
     tables.append(
         Table(
             "Score test: one linear step each, nuisance parameters marginalised",
-            ("candidate", "Δχ²", "value", "unit"),
+            ("candidate", "name", "Δχ²", "value", "unit"),
             screened,
             note=f"Detection threshold: Δχ² {diagnosis.detection_threshold:.0f}.",
         )
@@ -244,9 +203,16 @@ def _candidates(answer: Answer) -> Section:
         np.full(2, diagnosis.detection_threshold),
         style="demand",
     )
-    names = tuple(s.candidate.name for s in top)
+    names = tuple(_shown(s.candidate) for s in top)
     alone = Chart("Score test: gain of each candidate alone", "candidate", "", "Δχ²", "", (bars, limit), names)
     return Section("Candidates", tables=tuple(tables), charts=(*charts, alone) if top else ())
+
+
+def _shown(candidate: Candidate) -> str:
+    """A candidate for people: title, which of several numbers, and place."""
+    which = "" if len(candidate.effect.strengths) == 1 else f": {candidate.parameter.name.replace('_', ' ')}"
+    where = "" if candidate.location == "car" else f", {place(candidate.location)}"
+    return f"{candidate.effect.title}{which}{where}"
 
 
 def _differences(title: str, listed: Sequence[FittedHypothesis]) -> list[Chart]:
@@ -256,44 +222,8 @@ def _differences(title: str, listed: Sequence[FittedHypothesis]) -> list[Chart]:
     rows = np.arange(1.0, len(listed) + 1.0)
     fitted = Curve("fitted", rows, np.array([delta_chi2(c, listed[0]) for c in listed]), style="points", group="fl")
     rivals = Curve("rivals below", np.array([0.5, len(listed) + 0.5]), np.full(2, INDISTINGUISHABLE), style="demand")
-    names = tuple(c.term.candidate.name for c in listed)
+    names = tuple(_shown(c.term.candidate) for c in listed)
     return [Chart(title, "candidate", "", "Δχ² to the best", "", (fitted, rivals), names)]
-
-
-def _held_out(answer: Answer) -> Section:
-    rows = tuple(
-        (
-            WORDS[g.channel], *_scaled(g.before, g.channel)[:1], *_scaled(g.tuned, g.channel)[:1],
-            None if g.best_wrong is None else _scaled(g.best_wrong, g.channel)[0], _scaled(g.after, g.channel)[0],
-            f"{_scaled(g.low, g.channel)[0]:.3g} to {_scaled(g.high, g.channel)[0]:.3g}",
-            _scaled(g.after, g.channel)[1],
-        )
-        for g in answer.held_out
-    )  # fmt: skip
-    table = Table(
-        "Open-loop error on manoeuvres that no fit saw (root mean square)",
-        ("channel", "nominal", "nuisances alone", "best wrong effect", "extended", "95 %", "unit"), rows,
-    )  # fmt: skip
-    return Section("Held-out error", tables=(table,), charts=_held_out_charts(answer))
-
-
-def _held_out_charts(answer: Answer) -> tuple[Chart, ...]:
-    """Held-out error of each channel as a share of the nominal error."""
-    errors = [g for g in answer.held_out if g.before > 0.0]
-    if not errors:
-        return ()
-    x = np.arange(1.0, len(errors) + 1.0)
-    before = np.array([g.before for g in errors])
-    own = np.array([g.after for g in errors]) / before
-    low, high = np.array([g.low for g in errors]) / before, np.array([g.high for g in errors]) / before
-    curves = [Curve("extended", x, own, low, high, "points", "fl")]
-    curves.append(Curve("nuisances alone", x, np.array([g.tuned for g in errors]) / before, style="points", group="rr"))
-    if all(g.best_wrong is not None for g in errors):
-        wrong = np.array([g.best_wrong for g in errors], np.float64) / before
-        curves.append(Curve("best wrong effect", x, wrong, style="points", group="rl"))
-    curves.append(Curve("nominal", np.array([0.5, len(errors) + 0.5]), np.ones(2), style="demand"))
-    title, names = "Held-out error against the nominal simulation", tuple(WORDS[g.channel] for g in errors)
-    return (Chart(title, "channel", "", "error / nominal error", "", tuple(curves), names),)
 
 
 def _limits(answer: Answer) -> Section:

@@ -19,6 +19,7 @@ from hil.diagnosis.data.log import (
 )
 from hil.diagnosis.sensor_consistency.braking import BrakingModel
 from hil.diagnosis.sensor_consistency.coverage import missing, needs
+from hil.diagnosis.sensor_consistency.headline import headline
 from hil.diagnosis.sensor_consistency.held_out import HeldOutError, held_out_errors
 from hil.diagnosis.sensor_consistency.labels import Cause, causes_of, simulated_effects
 from hil.diagnosis.sensor_consistency.lateral import LateralModel
@@ -113,6 +114,7 @@ def check(
     undetectable = needs(motion, {name for cause in causes for name in cause.effects})
     content = {
         "verdict": "cannot_tell_apart" if ambiguous else "named" if causes else "none",
+        "headline": headline(causes),
         "causes": named,
         "rivals": _rivals(causes, named),
         "undetectable_effects": sorted(undetectable),

@@ -208,7 +208,7 @@ def _scale(
     channel = {"gain": "ax_mps2", "ay_gain": "ay_mps2", "yaw_gain": "yaw_rate_rad_s"}[parameter]
     factor = next((one for one in DATABASE_FACTORS if interval[0] <= one - 1.0 <= interval[1]), None)
     if factor is not None or abs(value) > MAX_SENSOR_SCALE or parameter != "gain":
-        return [Label("wrong_scale", "factor", "imu", 1.0, 2.0)], channel, factor
+        return [Label("wrong_scale", "gain", "imu", 1.0, 2.0)], channel, factor
     labels = [Label("imu_gain", "gain", "imu", 1.0, IMU_SCALE)]
     if not to_ground:  # without a ground speed the wheels' radius looks the same
         labels.append(Label("tyre_radius", "gain", "car", 1.0, 0.015))

@@ -13,11 +13,6 @@ from hil.diagnosis.sensor_consistency.threshold import THRESHOLD
 from hil.report.report import Cell, Chart, Curve, Number, Panel, Report, Section, Table, Trace, Verdict
 from hil.report.units import BAR, Display, Unit
 
-_SENTENCE = {
-    "none": "The sensors agree with the car's own motion within noise.",
-    "named": "An effect explains how the sensors differ from the car's own motion.",
-    "cannot_tell_apart": "Several effects explain equally well how the sensors differ from the car's own motion.",
-}
 _TITLE = {
     "ax_mps2": "Longitudinal acceleration", "ay_mps2": "Lateral acceleration", "yaw_rate_rad_s": "Yaw rate",
     "speed_in_stops": "Speed in the stops",
@@ -33,7 +28,7 @@ def build_report(answer: Consistency, sources: Sequence[str]) -> Report:
     return Report(
         title="Measured sensors against the car's own motion",
         verdict={"none": Verdict.PASSED, "named": None}.get(content["verdict"], Verdict.INCONCLUSIVE),
-        reason=_headline(answer) or _SENTENCE[content["verdict"]],
+        reason=content["headline"],
         numbers=tuple(_numbers(answer)),
         sections=(_overview(answer), *_details(answer), _parameters(answer), _relations(answer), _limits(answer)),
         provenance={
@@ -48,7 +43,7 @@ def _numbers(answer: Consistency) -> list[Number]:
     numbers = [Number("Verdict", answer.json["verdict"].replace("_", " "))]
     for cause in answer.json["causes"]:
         for name, entry in cause["parameters"].items():
-            label = f"{', '.join(cause['channels'])}: {cause['effect'].replace('_', ' ')}"
+            label = f"{', '.join(cause['channels'])}: {cause['title']}"
             note = f"{name.replace('_', ' ')}; 95 %: {_interval(entry)}"
             numbers.append(Number(label, rounded(entry["value"]), entry["unit"], note=note))
     for error in answer.errors:
@@ -57,18 +52,6 @@ def _numbers(answer: Consistency) -> list[Number]:
             label, note = f"{_title(error)}: held-out error removed", "on manoeuvres that no fit saw"
             numbers.append(Number(label, removed, "%", note=note))
     return numbers
-
-
-def _headline(answer: Consistency) -> str:
-    """Channels with the effects that explain their error."""
-    by_channel: dict[str, list[str]] = {}
-    for cause in answer.causes:
-        effects = " or ".join(effect.replace("_", " ") for effect in cause.indistinguishable)
-        if cause.labels[0].effect == "wrong_scale":
-            effects = "wrong sign" if cause.database_factor == -1.0 else "wrong scale or sign"
-        by_channel.setdefault(", ".join(cause.channels), []).append(effects)
-    headline = "; ".join(f"{channel}: {', '.join(effects)}" for channel, effects in by_channel.items())
-    return f"{headline}." if headline else ""
 
 
 def _title(error: HeldOutError) -> str:
@@ -145,7 +128,7 @@ def _parameters(answer: Consistency) -> Section:
     listed = [("cause", one) for one in content["causes"]] + [("rival", one) for one in content["rivals"]]
     parameters: list[tuple[Cell, ...]] = [
         (
-            kind, one["effect"], ", ".join(one["channels"]), name, rounded(entry["value"]), _interval(entry),
+            kind, one["title"], ", ".join(one["channels"]), name, rounded(entry["value"]), _interval(entry),
             entry["unit"], round(100.0 * one["probability"], 1),
         )
         for kind, one in listed

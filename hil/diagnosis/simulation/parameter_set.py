@@ -104,19 +104,33 @@ class ParameterSet:
                         tooth += amount * step
                     case NuisanceKind.TOOTH_WINDOW:
                         window += amount * step
-        return replace(
-            self, p=p, theta=theta, disc_offset_k=disc, latency_s=tuple(late), tooth_share=tooth, window_rows2=window
+        moved = theta - self.theta  # also before an onset: what single wheels are off
+        onsets = tuple(
+            replace(one, before=tuple(np.add(one.before, moved[_strengths(one.effect)]).tolist()))
+            for one in self.onsets
         )
+        return replace(
+            self, p=p, theta=theta, disc_offset_k=disc, latency_s=tuple(late), tooth_share=tooth, window_rows2=window,
+            onsets=onsets,
+        )  # fmt: skip
 
-    def with_extension(self, extension: Extension) -> "ParameterSet":
-        """With the effects, parameters and nonparametric terms of an extension file."""
+    def with_extension(self, extension: Extension, logs: Sequence[str] = ()) -> "ParameterSet":
+        """With the effects, parameters and nonparametric terms of an extension file.
+
+        An effect that begins in one of the ``logs``, names by number, begins there; one that begins in another log acts
+        throughout.
+        """
         p, theta = self.p.copy(), self.theta.copy()
         for name, values in extension.parameters.items():
             p[PARAMETER.slice(name)] = values
         changed = extension.theta != THETA.neutral()
         theta[changed] = extension.theta[changed]
         rows = np.vstack([self.nonparametric_rows, extension.nonparametric_rows])
-        return replace(self, p=p, theta=theta, nonparametric_rows=rows)
+        extended = replace(self, p=p, theta=theta, nonparametric_rows=rows)
+        for effect, (log, since_s) in extension.onsets.items():
+            if log in logs:
+                extended = extended.with_onset(effect, logs.index(log), since_s, before=self)
+        return extended
 
     def extension_of(self, vehicle: "ParameterSet") -> Extension:
         """Effects and nonparametric terms, and the parameters that differ from those of a nominal vehicle."""

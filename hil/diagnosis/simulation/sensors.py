@@ -36,7 +36,7 @@ SENSORS = np.concatenate(
 )
 """Indices in theta of all parameters of sensors and clocks."""
 _GROUND_SCALE = THETA.slice("speed_scale", "gain").start
-_WHEEL_SCALE = THETA.slice("wrong_scale", "factor").start + NODES.index("wheel")
+_WHEEL_SCALE = THETA.slice("wrong_scale", "gain").start + NODES.index("wheel")
 
 
 def before_sensors(inputs: Floats, theta: Floats, row_s: float) -> Floats:

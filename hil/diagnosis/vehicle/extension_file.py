@@ -1,7 +1,9 @@
 """The extension file: what a diagnosis adds to a car, as TOML that ``explain --extend`` and ``run --extend`` take.
 
 ``[effects]``, ``[[laws]]`` (nonparametric terms) and ``[parameters]`` are for simulations; ``[channels]``, by model, is
-for the next comparison of sensors (`hil.diagnosis.sensor_consistency`).
+for the next comparison of sensors (`hil.diagnosis.sensor_consistency`). An effect with an onset has ``onset_s``, the
+time into the log ``onset_log``: `explain --extend` lets it begin in that log, `run --extend` at that time of the
+scenario.
 """
 
 import json
@@ -19,6 +21,10 @@ from plant.injection.bank import NO_TERMS
 from plant.injection.theta import THETA
 from plant.vectors import PARAMETER
 
+ONSET_LOG = "onset_log"
+"""Key of the log in which an effect begins."""
+_RENAMED = {("wrong_scale", "factor"): "gain"}
+"""Parameters of effects that earlier files call differently: effect and name, name now."""
 _CHANNEL_MODELS = ("along", "turning", "wheels", "braking")
 
 
@@ -26,16 +32,18 @@ _CHANNEL_MODELS = ("along", "turning", "wheels", "braking")
 class Extension:
     """Theta of the effects, changed parameters of the plant by flat name, and rows of nonparametric terms.
 
-    Theta is (THETA.size,), the rows as in `plant.injection.bank`.
+    Theta is (THETA.size,), the rows as in `plant.injection.bank`. ``onsets`` are log and s into it by effect, of those
+    that begin in a log.
     """
 
     theta: Floats
     parameters: Mapping[str, list[float]]
     nonparametric_rows: Floats = field(default_factory=NO_TERMS.copy)
+    onsets: Mapping[str, tuple[str, float]] = field(default_factory=dict)
 
 
-def write_extension(path: Path, extension: Extension, note: str) -> None:
-    """Write an extension file that begins with the comment ``note``."""
+def write_extension(path: Path, extension: Extension, notes: Sequence[str]) -> None:
+    """Write an extension file that begins with the comments ``notes``."""
     neutral = THETA.neutral()
     effects: dict[str, dict[str, Any]] = {}
     for effect in THETA.effects:
@@ -50,8 +58,10 @@ def write_extension(path: Path, extension: Extension, note: str) -> None:
             value = float(extension.theta[THETA.slice(effect.name, time)][0])
             if entries and abs(value) < 1e11:
                 entries[time] = value
+        if entries and effect.name in extension.onsets:
+            entries[ONSET_LOG], entries["onset_s"] = extension.onsets[effect.name]
         effects[effect.name] = entries
-    lines = [f"# {note}", "# Effects by name, then estimated parameters of the vehicle within their tolerance."]
+    lines = [*(f"# {note}" for note in notes), "# Effects by name, then estimated parameters of the vehicle."]
     lines += _tables("effects", effects)
     for law in written_laws(extension.nonparametric_rows):
         lines += ["", "[[laws]]", *_entries(law)]
@@ -103,8 +113,10 @@ def load_extension(path: Path) -> Extension:
         Not TOML; an unknown effect or parameter; a value out of bounds.
     """
     table = _read(path)
-    theta = THETA.neutral()
-    for name, values in table.get("effects", {}).items():
+    theta, onsets = THETA.neutral(), {}
+    for name, values in effect_tables(path).items():
+        if ONSET_LOG in values:
+            onsets[name] = str(values.pop(ONSET_LOG)), float(values.pop("onset_s", 0.0))
         try:
             THETA.set(theta, name, values)
         except (KeyError, ValueError) as error:
@@ -121,7 +133,25 @@ def load_extension(path: Path) -> Extension:
         rows = read_laws(table.get("laws", []), f"{path}: laws")
     except EffectError as error:
         raise UnusableError(str(error)) from error
-    return Extension(theta, parameters, rows)
+    return Extension(theta, parameters, rows, onsets)
+
+
+def effect_tables(path: Path) -> dict[str, dict[str, Any]]:
+    """The table ``[effects]`` as written, with today's names of all parameters.
+
+    Raises
+    ------
+    UnusableError
+        Not TOML, or an effect that is no table.
+    """
+    tables = _read(path).get("effects", {})
+    for name, values in tables.items():
+        if not isinstance(values, dict):
+            raise UnusableError(f"{path}: effects.{name}: expected a table, got {values!r}; write [effects.{name}]")
+    return {
+        name: {_RENAMED.get((name, key), key): value for key, value in values.items()}
+        for name, values in tables.items()
+    }
 
 
 def load_channels(path: Path) -> dict[str, dict[str, float]]:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hil.diagnosis.data.log import UnusableError
+from hil.diagnosis.vehicle.key_names import stated_keys
 from hil.diagnosis.vehicle.keys import (
     ALIASES,
     DERIVED,
@@ -95,7 +96,7 @@ def load_vehicle(source: Path | Mapping[str, Any] | None) -> Vehicle:
     table = _read(source) if isinstance(source, Path) else dict(source)
     if "vehicle" in table and isinstance(table["vehicle"], Mapping) and "mass_kg" in table["vehicle"]:
         table = dict(table["vehicle"])
-    return _from_flat(table, where)
+    return replace(_from_flat(table, where), stated=stated_keys(table))
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """The vehicle: its parameters, its nuisance parameters, and what its vehicle set does not state."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -38,6 +38,7 @@ class Vehicle:
     straight_line : lateral dynamics are off.
     suspension_stated : the set states every parameter of the suspension.
     latencies : of the frames of each of `LATENCY_NODES` behind those of the wheel speeds.
+    stated : keys of the set as written there, by the name of what they state (`hil.diagnosis.vehicle.key_names`).
     """
 
     parameters: PlantParameters
@@ -50,6 +51,7 @@ class Vehicle:
     straight_line: bool = False
     suspension_stated: bool = True
     latencies: tuple[Latency, ...] = latencies({}, {}, measured=True)
+    stated: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def undiagnosable_effects(self) -> tuple[str, ...]:

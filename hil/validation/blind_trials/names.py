@@ -5,7 +5,7 @@ from typing import Any
 
 _NUMBERS = {
     ("imu_bias", "bias_mps2"): "ax_mps2", ("imu_position", "distance_m"): "x_m", ("imu_filter", "lag_s"): "time_s",
-    ("timestamp_offset", "time_s"): "delay_s", ("clock_drift", "rate"): "share", ("wrong_scale", "gain"): "factor",
+    ("timestamp_offset", "time_s"): "delay_s", ("clock_drift", "rate"): "share",
 }  # fmt: skip
 _OF_ANY_PHASE = ("hot_spot",)
 """Effects whose sign is half a turn of a phase that nobody knows."""

@@ -8,12 +8,12 @@ from plant.layout import Vector
 
 def sense(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
     """k' = k (1+e): e = -2 a sign, 2.6 km/h for m/s, 255 a byte."""
-    return values * (1.0 + number["factor"][:, [NODES.index(node)]])
+    return values * (1.0 + number["gain"][:, [NODES.index(node)]])
 
 
 def undo(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
     """Inverse of `sense`."""
-    return values / (1.0 + number["factor"][:, [NODES.index(node)]])
+    return values / (1.0 + number["gain"][:, [NODES.index(node)]])
 
 
 EFFECT = Effect(
@@ -24,7 +24,7 @@ EFFECT = Effect(
     injection_points=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
     acts_when=(Excitation.ALWAYS, Excitation.NONE, Excitation.BRAKES, Excitation.MOTORS, Excitation.NONE),
     scope=Scope.NODE,
-    parameters=(Parameter("factor", "", -3.0, 300.0, 2.6),),
+    parameters=(Parameter("gain", "", -3.0, 300.0, 2.6),),
     source="M: 1, -1, 3.6, 256",
     signature="exact constant ratio",
     manoeuvre="straight_stop",

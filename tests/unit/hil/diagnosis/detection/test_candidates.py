@@ -1,12 +1,14 @@
 """Signatures of candidates: two names of one weak brake have the same, up to a stop and after it."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from outsider import VEHICLE
 
 from hil.diagnosis.data.log import make_log
 from hil.diagnosis.data.prepare import prepare
-from hil.diagnosis.detection.candidates import CandidateSet, unexcited_sensors
+from hil.diagnosis.detection.candidates import CandidateSet, inseparable_forward, unexcited_sensors
 from hil.diagnosis.estimation.information import finite_difference_jacobian
 from hil.diagnosis.estimation.terms import candidates, columns
 from hil.diagnosis.noise.model import MODE_NAMES, ChannelNoise, Noise, SampleMasks
@@ -62,3 +64,13 @@ def test_a_sensor_that_carries_only_noise_has_no_scale(torque_nm, excited):
         assert ((name, "motor") in locations) == excited
         assert (name, "imu") in locations
     assert ("iwm_gain", "front") in locations
+
+
+def test_a_calliper_that_grips_unlike_backward_is_no_candidate_where_no_log_moves_backward():
+    """It led before the gain of that brake, which is the same going forward."""
+    forward, backward = (
+        SimpleNamespace(recordings=[SimpleNamespace(speed_mps=np.array(speeds))])
+        for speeds in ([20.0, 0.0, -0.1], [20.0, 0.0, -1.5])
+    )
+    assert inseparable_forward(forward) == {"caliper_asymmetry": "pad_mu_gain"}
+    assert inseparable_forward(backward) == {}

@@ -6,13 +6,13 @@ from motion_logs import RADIUS_M, STEP_S, coloured, motion_log
 
 from hil.diagnosis.data.log import WHEEL_SPEED, Log, UnusableError, make_log
 from hil.diagnosis.explain import explain
-from hil.diagnosis.sensor_consistency.check import Consistency, _rivals, why_not_simulatable
+from hil.diagnosis.sensor_consistency.check import _rivals, why_not_simulatable
+from hil.diagnosis.sensor_consistency.headline import headline
 from hil.diagnosis.sensor_consistency.labels import Cause, Label
 from hil.diagnosis.sensor_consistency.likelihood import fit
 from hil.diagnosis.sensor_consistency.longitudinal import SLIP, LongitudinalModel, slip_prior
 from hil.diagnosis.sensor_consistency.model import Parameter, SensorModel
 from hil.diagnosis.sensor_consistency.motion import motion_of
-from hil.diagnosis.sensor_consistency.page import _headline
 from hil.diagnosis.sensor_consistency.selection import SelectionResult, select_parameters
 
 
@@ -162,5 +162,8 @@ def test_a_rival_is_reported_though_its_effect_is_a_cause_in_another_channel():
 
 
 def test_the_headline_names_all_indistinguishable_effects():
-    headline = _headline(Consistency({}, None, {}, _late_or_filtered(), ()))
-    assert headline == "ax_mps2: imu filter or timestamp offset; pressure: timestamp offset."
+    text = headline(_late_or_filtered())
+    assert text == (
+        "ax_mps2: Inertial sensor has a further low-pass of 100 ms (95 %: 80 to 120 ms) or one node's samples are "
+        "older than their stamps, or newer; pressure: Pressures are 100 ms newer than their stamps (95 %: 80 to 120 ms)."
+    )

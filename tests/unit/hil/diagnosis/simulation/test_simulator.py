@@ -257,7 +257,7 @@ def test_denoised_inputs_are_the_true_ones_however_the_torque_is_measured(late_b
         "latency": replace(level, latency_s=late("motor", 0.006)),
         "stamp": _with(level, "timestamp_offset", "delay_s", MOTOR_NODE * 0.006),
         "clock": _with(level, "clock_drift", "share", MOTOR_NODE * 5e-4),
-        "scale": _with(level, "wrong_scale", "factor", MOTOR_NODE * -0.2),
+        "scale": _with(level, "wrong_scale", "gain", MOTOR_NODE * -0.2),
     }[late_by]
     taken_s = t * (1.0 - 5e-4) if late_by == "clock" else t - 0.006
     seen = 0.8 * true if late_by == "scale" else np.interp(taken_s, t, true)
