@@ -1,7 +1,7 @@
-"""Takes drawn cases of the reference car and gives how often `explain` is right: the one place that knows both."""
+"""Takes drawn cases of hidden cars and gives how often `explain` is right: the one place that knows both."""
 
 FAMILIES = (
     "null", "single", "two", "three", "onset", "unlisted", "confounded", "twin", "not_testable",
-    "parameters", "gain", "calibration",
+    "parameters", "gain", "calibration", "strangers", "strangers_single",
 )  # fmt: skip
-"""Families of trials; the last three score cases of ``single``."""
+"""Families of trials; three score cases of ``single``, the last two are of cars that strangers wrote."""

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from hil.validation.blind_trials import reading
+from hil.validation.blind_trials import reading, strangers
 from hil.validation.blind_trials.metrics import Record
 from hil.validation.blind_trials.separable import separable
 
@@ -19,6 +19,8 @@ _RIGHT: Mapping[str, Callable[[Record], bool]] = {
     "confounded": lambda r: not reading.claims(r) and reading.decided(r),
     "twin": lambda r: not reading.claims(r) or reading.is_top(r),
     "not_testable": reading.called_not_testable,
+    "strangers": lambda r: not reading.answers(r),
+    "strangers_single": lambda r: strangers.is_right(r) and not strangers.something_false(r),
 }
 
 
@@ -36,7 +38,8 @@ def misses(family: str, records: Sequence[Record]) -> list[str]:
 
 def _line(record: Record) -> str:
     size = "" if record["size"] is None else f" at {record['size']:g}"
-    line = f"{record['index']}{size}: {_causes(record['hidden'])}; answered {_answered(record)}"
+    car = f" {record['car']}" if "car" in record and not record["hidden"] else ""
+    line = f"{record['index']}{car}{size}: {_causes(record['hidden'])}; answered {_answered(record)}"
     return f"{line}; then {_answered(record['follow_up'])}" if "follow_up" in record else line
 
 

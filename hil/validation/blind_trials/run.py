@@ -12,10 +12,11 @@ from hil.diagnosis.explain import explain
 from hil.diagnosis.result.answer import Answer
 from hil.errors import BrakebenchError
 from hil.validation.blind_trials import oracle
-from hil.validation.blind_trials.sources import state
+from hil.validation.blind_trials.sources import STRANGERS, state
 from hil.validation.reference_car.case import Case
 from hil.validation.reference_car.cases import draw, followed_by
 from hil.validation.reference_car.files import read_answer, write
+from hil.validation.strangers import cases as strangers
 
 SIZES = (15.0, 8.0, 5.0, 3.0)
 """Signal-to-noise ratios of the family of single causes, in the order they are run."""
@@ -53,7 +54,10 @@ def run_family(
     for drawn, index, size in plan(family, count):
         key = (drawn, index, size)
         if key not in done:
-            done[key] = run_case(draw(drawn, index, seed, size), seed, size, settings)
+            if drawn in strangers.FAMILIES:
+                done[key] = run_stranger(strangers.draw(drawn, index, seed), seed, settings)
+            else:
+                done[key] = run_case(draw(drawn, index, seed, size), seed, size, settings)
             with path.open("ab", buffering=0) as file:  # one write: other families may be appending too
                 file.write(f"{json.dumps(done[key])}\n".encode())
         records.append(done[key])
@@ -83,7 +87,7 @@ def run_case(case: Case, seed: int, size: float | None, settings: Settings | Non
     """
     sources = state()  # of what runs now: a case takes minutes, and files may change
     with TemporaryDirectory() as folder:
-        answered, said = _explained(case, Path(folder), settings)
+        answered, said = _explained(lambda logs: write(case, logs), Path(folder), settings)
         truth = read_answer(Path(folder) / "logs")
     record = {
         "family": case.family, "index": case.index, "seed": seed, "size": size, "sources": sources,
@@ -96,25 +100,51 @@ def run_case(case: Case, seed: int, size: float | None, settings: Settings | Non
         record["oracle"] = oracle.untouched(case)
     if case.family == "confounded":
         with TemporaryDirectory() as folder:
-            record["follow_up"] = _explained(followed_by(case), Path(folder), settings)[1]
+            then = followed_by(case)
+            record["follow_up"] = _explained(lambda logs: write(then, logs), Path(folder), settings)[1]
     return record
 
 
-def _explained(case: Case, folder: Path, settings: Settings | None) -> tuple[Answer | None, Record]:
-    """What `explain` says of the case's logs; data that nothing can be concluded from are an answer too."""
+def run_stranger(case: strangers.Case, seed: int, settings: Settings | None = None) -> Record:
+    """As `run_case`, of a car that a stranger wrote; no file holds what is hidden.
+
+    ``accepted`` are the right answers to the hidden cause (`hil.validation.strangers.car.Cause`).
+    """
+    sources = state(STRANGERS)
+    with TemporaryDirectory() as folder:
+        _, said = _explained(
+            lambda logs: strangers.write(case.car, case.seed, case.hidden, logs), Path(folder), settings
+        )
+    hidden, cause = case.hidden, case.cause
+    causes: list[Record] = []
+    if hidden is not None and cause is not None:
+        number = {"value": hidden.size, "unit": cause.unit}
+        causes.append({"effect": cause.name, "location": case.car.name, "parameters": {"size": number}})
+    return {
+        "family": case.family, "index": case.index, "seed": seed, "size": None, "sources": sources, "snr": case.snr,
+        "reached": case.reached, "car": case.car.name, "hidden": causes,
+        "accepted": [] if cause is None else sorted(cause.accepted), **said,
+    }  # fmt: skip
+
+
+def _explained(
+    written: Callable[[Path], object], folder: Path, settings: Settings | None
+) -> tuple[Answer | None, Record]:
+    """What `explain` says of the logs written; data that nothing can be concluded from are an answer too."""
     logs = folder / "logs"
-    write(case, logs)
+    written(logs)
     try:
         answered = explain(logs, logs / "vehicle.toml", out=folder / "out", settings=settings)
     except UnusableError as error:
         return None, {
-            "verdict": "unusable", "why": str(error), "named": [], "causes": [], "rivals": [],
+            "verdict": "unusable", "why": str(error), "named": [], "causes": [], "rivals": [], "rivals_at": [],
             "undetectable_effects": [], "held_out_error": {},
         }  # fmt: skip
-    assert isinstance(answered, Answer)  # the reference car's logs tell forces
+    assert isinstance(answered, Answer)  # the logs tell forces
     found = answered.json
     return answered, {
         "verdict": found["verdict"], "named": [cause["effect"] for cause in found["causes"]],
         "causes": found["causes"], "rivals": [rival["effect"] for rival in found["rivals"]],
+        "rivals_at": [f"{rival['effect']}@{rival['location']}" for rival in found["rivals"]],
         "undetectable_effects": found["undetectable_effects"], "held_out_error": found["held_out_error"],
     }  # fmt: skip

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from hil.validation.blind_trials import strangers
 from hil.validation.blind_trials.calibration import calibration
 from hil.validation.blind_trials.detection import detection_limits
 from hil.validation.blind_trials.gain import gain, gain_of_oracle
@@ -143,4 +144,5 @@ _SCORED: dict[str, Callable[[Records], Metrics]] = {
     "null": _null, "single": _single, "two": _two, "three": _three, "onset": _onset, "unlisted": _unlisted,
     "confounded": _confounded, "twin": _twin, "not_testable": _not_testable,
     "parameters": lambda records: parameters(_reached(records)), "gain": gain, "calibration": calibration,
+    "strangers": strangers.null, "strangers_single": strangers.single,
 }  # fmt: skip

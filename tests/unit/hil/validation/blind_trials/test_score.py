@@ -22,7 +22,8 @@ def _cause(effect: str, joint: str = "", chance: float = 0.9, onset_s: float | N
 def _record(hidden: str | list[str], named: list[str], **more: Any) -> dict[str, Any]:
     effects, number = [hidden] if isinstance(hidden, str) else hidden, {"gain": {"value": 0.1, "unit": ""}}
     record = {
-        "family": "single", "index": 0, "size": 15.0, "sources": "abc",
+        "family": "single", "index": 0, "size": 15.0, "sources": "abc", "car": "a", "accepted": effects,
+        "rivals_at": [],
         "reached": True, "noise": "medium", "named": named,
         "rivals": [], "undetectable_effects": [], "held_out_error": {}, "verdict": "named" if named else "none",
         "hidden": [

@@ -1,0 +1,83 @@
+"""Drives of the trials: which car hides what, and how much; the logs and the set that are handed over."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet
+
+from hil.errors import BrakebenchError
+from hil.validation.strangers.car import Cause, Hidden, StrangerCar
+from hil.validation.strangers.dead_time import DeadTime
+from hil.validation.strangers.snr import Visibility
+
+CARS: dict[str, StrangerCar] = {car.name: car for car in (DeadTime(),)}
+FAMILIES = ("strangers", "strangers_single")
+SNR, REACHED = 15.0, 0.02
+"""Signal-to-noise ratio of what is hidden, and by which share it may be off."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A drive of a car; ``hidden`` None is nothing. ``reached`` False: the cause's range ends before the ratio."""
+
+    family: str
+    index: int
+    car: StrangerCar
+    seed: int
+    hidden: Hidden | None = None
+    snr: float | None = None
+    reached: bool = True
+
+    @property
+    def cause(self) -> Cause | None:
+        """The hidden cause."""
+        return None if self.hidden is None else self.car.causes[self.hidden.cause]
+
+
+def draw(family: str, index: int, seed: int, cars: Sequence[StrangerCar] = tuple(CARS.values())) -> Case:
+    """Case ``index`` of a family: cars in turn, each car's causes in turn; the same arguments give the same case.
+
+    Raises
+    ------
+    BrakebenchError
+        There is no such family.
+    """
+    if family not in FAMILIES:
+        raise BrakebenchError(f"family {family!r}: expected one of {', '.join(FAMILIES)}")
+    car, nth = cars[index % len(cars)], index // len(cars)
+    own = int(np.random.default_rng([seed, index, FAMILIES.index(family)]).integers(2**31))
+    if family == "strangers":
+        return Case(family, index, car, own)
+    order = np.random.default_rng([seed, index % len(cars)]).permutation(len(car.causes))
+    cause = car.causes[list(car.causes)[order[nth % len(order)]]]
+    hidden, snr = Visibility(car, own, stated(car, own)).sized(cause, SNR)
+    return Case(family, index, car, own, hidden, snr, abs(snr / SNR - 1.0) <= REACHED)
+
+
+def stated(car: StrangerCar, seed: int) -> dict[str, float | list[float]]:
+    """The set that the owner writes for the drive of a seed."""
+    return car.stated(np.random.default_rng([seed, 7]))
+
+
+def write(car: StrangerCar, seed: int, hidden: Hidden | None, folder: Path) -> None:
+    """Write the logs of a drive (``0.parquet`` and on) and the owner's ``vehicle.toml``; nothing tells what is hidden.
+
+    Raises
+    ------
+    BrakebenchError
+        There is something in the folder already, or it cannot be written.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise BrakebenchError(f"{folder}: not empty; give a folder that is empty or does not exist")
+    lines = [f"{key} = {json.dumps(value)}" for key, value in stated(car, seed).items()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for k, table in enumerate(car.drive(seed, hidden)):
+            pa.parquet.write_table(pa.table(dict(table)), folder / f"{k}.parquet")
+        (folder / "vehicle.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise BrakebenchError(f"{folder}: cannot be written: {error}") from error
