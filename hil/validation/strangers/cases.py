@@ -10,11 +10,14 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from hil.errors import BrakebenchError
+from hil.validation.strangers.brake_by_wire_van import BrakeByWireVan
 from hil.validation.strangers.car import Cause, Hidden, StrangerCar
 from hil.validation.strangers.dead_time import DeadTime
+from hil.validation.strangers.hydraulic_saloon import HydraulicSaloon
 from hil.validation.strangers.snr import Visibility
 
-CARS: dict[str, StrangerCar] = {car.name: car for car in (DeadTime(),)}
+_CARS: tuple[StrangerCar, ...] = (DeadTime(), HydraulicSaloon(), BrakeByWireVan())
+CARS = {car.name: car for car in _CARS}
 FAMILIES = ("strangers", "strangers_single")
 SNR, REACHED = 15.0, 0.02
 """Signal-to-noise ratio of what is hidden, and by which share it may be off."""
