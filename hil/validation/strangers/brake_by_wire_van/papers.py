@@ -7,7 +7,7 @@ import numpy as np
 from hil.validation.strangers.brake_by_wire_van import numbers as n
 from hil.validation.strangers.brake_by_wire_van.logger import Logger
 from hil.validation.strangers.brake_by_wire_van.numbers import WHEELS, Numbers
-from hil.validation.strangers.car import Tolerated
+from hil.validation.strangers.car import Tolerated, Vehicle
 from hil.validation.strangers.changes import Change, plus
 
 FEW_KEYS = 0.3
@@ -54,9 +54,9 @@ TOLERATED: Mapping[str, tuple[float, Change]] = {
     "front_inertia": (0.12, plus("wheel_inertia_kg_m2", (0, 1))),
     "rear_inertia": (0.12, plus("wheel_inertia_kg_m2", (2, 3))), "drag": (0.04, plus("drag_kg_m")),
     "rolling": (1e-3, plus("rolling")), "front_pads": (5e-6, plus("gain_nm_pa", (0, 1))),
-    "rear_pads": (3e-6, plus("gain_nm_pa", (2, 3))), "stiffness": (2.0, plus("stiffness")),
-    "relaxation": (0.07, plus("length_m")), "cornering": (1.0, plus("cornering")),
-    "friction": (0.05, plus("friction")), "pad_speed_loss": (0.008, plus("pad_speed_loss")),
+    "rear_pads": (3e-6, plus("gain_nm_pa", (2, 3))), "stiffness": (2.5, plus("stiffness")),
+    "relaxation": (0.1, plus("length_m")), "cornering": (1.6, plus("cornering")),
+    "friction": (0.07, plus("friction")), "pad_speed_loss": (0.008, plus("pad_speed_loss")),
     "steering_ratio": (0.2, plus("steering_ratio")), "yaw_inertia": (450.0, plus("yaw_inertia_kg_m2")),
     "dive": (4e-4, plus("dive_rad_s2_m")), "roll": (1.2e-3, plus("roll_rad_s2_m")),
     "transfer": (0.015, plus("transfer_s")), "toe": (3e-4, plus("toe_rad")),
@@ -77,6 +77,25 @@ TOLERATED: Mapping[str, tuple[float, Change]] = {
     **{f"pressure_gain_{w}": (5e-3, plus("pressure_gain", (i,))) for i, w in enumerate(WHEELS)},
 }  # fmt: skip
 """Name -> one standard deviation, and how the number goes off."""
+BY_KEY = {
+    "rolling": ("rolling_resistance", 1.0, 0.0022),
+    "steering_ratio": ("steering_ratio", 1.0, 1.0),
+    "emb_frequency": ("ehb_natural_frequency_hz", 1.0, 2.4),
+    "emb_damping": ("ehb_damping_ratio", 1.0, 0.36),
+    "emb_dead_time": ("ehb_dead_time_s", 1e3, 0.01),
+    "motor_dead_time": ("motor_time_constant_s", 1e3, 0.01),
+}
+"""Name -> the key that owners may state it by, its size per that of the key, and one standard deviation of the key
+where it is not stated (docs/vehicle-set.md)."""
+
+
+def tolerated(stated_numbers: Vehicle) -> list[Tolerated]:
+    """Numbers that nobody knows exactly beside a set: half the stated tolerance, or as usually known."""
+    found = {name: deviation for name, (deviation, _) in TOLERATED.items()}
+    for name, (key, share, usual) in BY_KEY.items():
+        told = stated_numbers.get(f"{key}_tolerance")
+        found[name] = share * (usual if told is None else 0.5 * float(np.max(told)))
+    return [Tolerated(name, deviation) for name, deviation in found.items()]
 
 
 def with_off(both: Both, off: Tolerated | None) -> Both:

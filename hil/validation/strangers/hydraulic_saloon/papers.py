@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hil.validation.strangers.car import Tolerated
+from hil.validation.strangers.car import Tolerated, Vehicle
 from hil.validation.strangers.changes import Change, plus
 from hil.validation.strangers.hydraulic_saloon import numbers as n
 from hil.validation.strangers.hydraulic_saloon.brakes import drum_factor
@@ -52,9 +52,9 @@ TOLERATED: Mapping[str, tuple[float, Change]] = {
     "front_axle": (0.01, plus("to_axle_m", (0,))), "radius": (0.001, plus("radius_m")),
     "wheel_inertia": (0.07, plus("wheel_inertia_kg_m2")), "drag": (0.016, plus("drag_kg_m")),
     "rolling": (8e-4, plus("rolling")), "front_pads": (0.0075, plus("mu", (0, 1))),
-    "rear_linings": (0.0075, plus("mu", (2, 3))), "stiffness": (2.0, plus("stiffness")),
-    "relaxation": (0.05, plus("length_m")), "cornering": (0.8, plus("cornering")),
-    "friction": (0.04, plus("friction")), "pad_speed_loss": (0.01, plus("pad_speed_loss")),
+    "rear_linings": (0.0075, plus("mu", (2, 3))), "stiffness": (3.0, plus("stiffness")),
+    "relaxation": (0.08, plus("length_m")), "cornering": (2.0, plus("cornering")),
+    "friction": (0.08, plus("friction")), "pad_speed_loss": (0.01, plus("pad_speed_loss")),
     "steering_ratio": (0.2, plus("steering_ratio")), "yaw_inertia": (110.0, plus("yaw_inertia_kg_m2")),
     "dive": (3e-4, plus("dive_rad_s2_m")), "roll": (1e-3, plus("roll_rad_s2_m")),
     "transfer": (0.02, plus("transfer_s")), "toe": (3e-4, plus("toe_rad")),
@@ -70,6 +70,25 @@ TOLERATED: Mapping[str, tuple[float, Change]] = {
     **{f"pressure_zero_{w}": (7e3, plus("pressure_zero_pa", (i,))) for i, w in enumerate(WHEELS)},
 }  # fmt: skip
 """Name -> one standard deviation, and how the number goes off."""
+BY_KEY = {
+    "cog_height": ("cog_height_m", 1.0, 0.04),
+    "drag": ("drag_coefficient", 0.5 * n.AIR_KG_M3 * n.AREA_M2, 0.045),
+    "rolling": ("rolling_resistance", 1.0, 0.0022),
+    "wheel_inertia": ("wheel_inertia_kg_m2", 1.0, 0.22),
+    "yaw_inertia": ("yaw_inertia_kg_m2", 1.0, 290.0),
+    "steering_ratio": ("steering_ratio", 1.0, 1.0),
+}
+"""Name -> the key that owners may state it by, its size per that of the key, and one standard deviation of the key
+where it is not stated (docs/vehicle-set.md)."""
+
+
+def tolerated(stated_numbers: Vehicle) -> list[Tolerated]:
+    """Numbers that nobody knows exactly beside a set: half the stated tolerance, or as usually known."""
+    found = {name: deviation for name, (deviation, _) in TOLERATED.items()}
+    for name, (key, share, usual) in BY_KEY.items():
+        told = stated_numbers.get(f"{key}_tolerance")
+        found[name] = share * (usual if told is None else 0.5 * float(np.max(told)))
+    return [Tolerated(name, deviation) for name, deviation in found.items()]
 
 
 def with_off(both: Both, off: Tolerated | None) -> Both:
