@@ -17,7 +17,7 @@ from hil.validation.strangers.hydraulic_saloon import HydraulicSaloon
 from hil.validation.strangers.snr import Visibility
 
 _CARS: tuple[StrangerCar, ...] = (DeadTime(), HydraulicSaloon(), BrakeByWireVan())
-CARS: dict[str, StrangerCar] = {car.name: car for car in _CARS}
+CARS = {car.name: car for car in _CARS}
 FAMILIES = ("strangers", "strangers_single")
 SNR, REACHED = 15.0, 0.02
 """Signal-to-noise ratio of what is hidden, and by which share it may be off."""

@@ -1,14 +1,14 @@
 """What the van's owner writes, and what nobody knows exactly."""
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
 
 from hil.validation.strangers.brake_by_wire_van import numbers as n
 from hil.validation.strangers.brake_by_wire_van.logger import Logger
 from hil.validation.strangers.brake_by_wire_van.numbers import WHEELS, Numbers
-from hil.validation.strangers.car import Tolerated
+from hil.validation.strangers.car import Tolerated, Vehicle
+from hil.validation.strangers.changes import Change, plus
 
 FEW_KEYS = 0.3
 """Share of the owners who write what a van has unlike a car, and no more."""
@@ -48,50 +48,54 @@ def stated(rng: np.random.Generator) -> dict[str, float | list[float]]:
     return found
 
 
-def _number(name: str, at: tuple[int, ...] = ()) -> Callable[[Both, float], Both]:
-    """A number with a deviation added, at these places of an array."""
-
-    def off(both: Both, by: float) -> Both:
-        old: Any = getattr(both[0] if name in Numbers._fields else both[1], name)
-        new = old + by
-        if at:
-            new = old.copy()
-            new[list(at)] += by
-        if name in Numbers._fields:
-            return both[0]._replace(**{name: new}), both[1]
-        return both[0], both[1]._replace(**{name: new})
-
-    return off
-
-
-TOLERATED: Mapping[str, tuple[float, Callable[[Both, float], Both]]] = {
-    "mass": (20.0, _number("mass_kg")), "cog_height": (0.03, _number("height_m")),
-    "front_axle": (0.015, _number("to_axle_m", (0,))), "radius": (0.001, _number("radius_m")),
-    "front_inertia": (0.12, _number("wheel_inertia_kg_m2", (0, 1))),
-    "rear_inertia": (0.12, _number("wheel_inertia_kg_m2", (2, 3))), "drag": (0.04, _number("drag_kg_m")),
-    "rolling": (1e-3, _number("rolling")), "front_pads": (5e-6, _number("gain_nm_pa", (0, 1))),
-    "rear_pads": (3e-6, _number("gain_nm_pa", (2, 3))), "stiffness": (2.0, _number("stiffness")),
-    "relaxation": (0.07, _number("length_m")), "cornering": (1.0, _number("cornering")),
-    "friction": (0.05, _number("friction")), "pad_speed_loss": (0.008, _number("pad_speed_loss")),
-    "steering_ratio": (0.2, _number("steering_ratio")), "yaw_inertia": (450.0, _number("yaw_inertia_kg_m2")),
-    "dive": (4e-4, _number("dive_rad_s2_m")), "roll": (1.2e-3, _number("roll_rad_s2_m")),
-    "transfer": (0.015, _number("transfer_s")), "toe": (3e-4, _number("toe_rad")),
-    "emb_frequency": (0.6, _number("emb_hz")), "emb_damping": (0.075, _number("emb_damping")),
-    "emb_dead_time": (8.0, _number("emb_dead_ms")), "clearance": (8.0, _number("clearance_ms")),
-    "dead_band": (2e4, _number("dead_band_pa")), "motor_gain": (0.01, _number("motor_gain")),
-    "motor_time": (0.006, _number("motor_s")), "motor_dead_time": (6.0, _number("motor_dead_ms")),
-    "imu_age": (0.005, _number("imu_age_s")), "wheel_age": (0.006, _number("wheel_age_s")),
-    "pressure_age": (0.006, _number("pressure_age_s")), "motor_age": (0.01, _number("motor_age_s")),
-    "ax_zero": (0.025, _number("ax_zero_mps2")), "ay_zero": (0.025, _number("ay_zero_mps2")),
-    "ax_gain": (0.003, _number("ax_gain")), "yaw_zero": (1e-3, _number("yaw_zero_rad_s")),
-    "steer_zero": (0.0087, _number("steer_zero_rad")),
-    **{f"pads_{w}": (1.5e-6, _number("gain_nm_pa", (i,))) for i, w in enumerate(WHEELS)},
-    **{f"radius_{w}": (3.5e-4, _number("radius_m", (i,))) for i, w in enumerate(WHEELS)},
-    **{f"threshold_{w}": (1.5e4, _number("threshold_pa", (i,))) for i, w in enumerate(WHEELS)},
-    **{f"pressure_zero_{w}": (7e3, _number("pressure_zero_pa", (i,))) for i, w in enumerate(WHEELS)},
-    **{f"pressure_gain_{w}": (5e-3, _number("pressure_gain", (i,))) for i, w in enumerate(WHEELS)},
+TOLERATED: Mapping[str, tuple[float, Change]] = {
+    "mass": (20.0, plus("mass_kg")), "cog_height": (0.03, plus("height_m")),
+    "front_axle": (0.015, plus("to_axle_m", (0,))), "radius": (0.001, plus("radius_m")),
+    "front_inertia": (0.12, plus("wheel_inertia_kg_m2", (0, 1))),
+    "rear_inertia": (0.12, plus("wheel_inertia_kg_m2", (2, 3))), "drag": (0.04, plus("drag_kg_m")),
+    "rolling": (1e-3, plus("rolling")), "front_pads": (5e-6, plus("gain_nm_pa", (0, 1))),
+    "rear_pads": (3e-6, plus("gain_nm_pa", (2, 3))), "stiffness": (2.5, plus("stiffness")),
+    "relaxation": (0.1, plus("length_m")), "cornering": (1.6, plus("cornering")),
+    "friction": (0.07, plus("friction")), "pad_speed_loss": (0.008, plus("pad_speed_loss")),
+    "steering_ratio": (0.2, plus("steering_ratio")), "yaw_inertia": (450.0, plus("yaw_inertia_kg_m2")),
+    "dive": (4e-4, plus("dive_rad_s2_m")), "roll": (1.2e-3, plus("roll_rad_s2_m")),
+    "transfer": (0.015, plus("transfer_s")), "toe": (3e-4, plus("toe_rad")),
+    "grade": (0.0025, plus("grade")), "wind": (1.0, plus("wind_mps")),
+    "emb_frequency": (0.6, plus("emb_hz")), "emb_damping": (0.075, plus("emb_damping")),
+    "emb_dead_time": (8.0, plus("emb_dead_ms")), "clearance": (8.0, plus("clearance_ms")),
+    "dead_band": (2e4, plus("dead_band_pa")), "motor_gain": (0.015, plus("motor_gain")),
+    "motor_time": (0.006, plus("motor_s")), "motor_dead_time": (6.0, plus("motor_dead_ms")),
+    "imu_age": (0.01, plus("imu_age_s")), "wheel_age": (0.01, plus("wheel_age_s")),
+    "pressure_age": (0.01, plus("pressure_age_s")), "motor_age": (0.01, plus("motor_age_s")),
+    "ax_zero": (0.025, plus("ax_zero_mps2")), "ay_zero": (0.025, plus("ay_zero_mps2")),
+    "ax_gain": (0.01, plus("ax_gain")), "yaw_zero": (1e-3, plus("yaw_zero_rad_s")),
+    "steer_zero": (0.0087, plus("steer_zero_rad")),
+    **{f"pads_{w}": (1.5e-6, plus("gain_nm_pa", (i,))) for i, w in enumerate(WHEELS)},
+    **{f"radius_{w}": (3.5e-4, plus("radius_m", (i,))) for i, w in enumerate(WHEELS)},
+    **{f"threshold_{w}": (1.5e4, plus("threshold_pa", (i,))) for i, w in enumerate(WHEELS)},
+    **{f"pressure_zero_{w}": (7e3, plus("pressure_zero_pa", (i,))) for i, w in enumerate(WHEELS)},
+    **{f"pressure_gain_{w}": (5e-3, plus("pressure_gain", (i,))) for i, w in enumerate(WHEELS)},
 }  # fmt: skip
 """Name -> one standard deviation, and how the number goes off."""
+BY_KEY = {
+    "rolling": ("rolling_resistance", 1.0, 0.0022),
+    "steering_ratio": ("steering_ratio", 1.0, 1.0),
+    "emb_frequency": ("ehb_natural_frequency_hz", 1.0, 2.4),
+    "emb_damping": ("ehb_damping_ratio", 1.0, 0.36),
+    "emb_dead_time": ("ehb_dead_time_s", 1e3, 0.01),
+    "motor_dead_time": ("motor_time_constant_s", 1e3, 0.01),
+}
+"""Name -> the key that owners may state it by, its size per that of the key, and one standard deviation of the key
+where it is not stated (docs/vehicle-set.md)."""
+
+
+def tolerated(stated_numbers: Vehicle) -> list[Tolerated]:
+    """Numbers that nobody knows exactly beside a set: half the stated tolerance, or as usually known."""
+    found = {name: deviation for name, (deviation, _) in TOLERATED.items()}
+    for name, (key, share, usual) in BY_KEY.items():
+        told = stated_numbers.get(f"{key}_tolerance")
+        found[name] = share * (usual if told is None else 0.5 * float(np.max(told)))
+    return [Tolerated(name, deviation) for name, deviation in found.items()]
 
 
 def with_off(both: Both, off: Tolerated | None) -> Both:

@@ -16,8 +16,8 @@ from hil.validation.strangers.brake_by_wire_van.numbers import (
     Numbers,
     true_numbers,
 )
-from hil.validation.strangers.brake_by_wire_van.papers import TOLERATED, stated, with_off
-from hil.validation.strangers.car import Cause, Hidden, Noise, Tolerated
+from hil.validation.strangers.brake_by_wire_van.papers import stated, tolerated, with_off
+from hil.validation.strangers.car import Cause, Hidden, Noise, Tolerated, Vehicle
 from hil.validation.strangers.signals import Vector
 
 _USUAL_MPS = 16.0
@@ -74,9 +74,9 @@ class BrakeByWireVan:
             slope_mps2=slope_mps2(hills, _USUAL_MPS),
         )
 
-    def tolerated(self, seed: int) -> Sequence[Tolerated]:
-        """Numbers that nobody knows exactly; alike for all seeds."""
-        return [Tolerated(name, deviation) for name, (deviation, _) in TOLERATED.items()]
+    def tolerated(self, stated: Vehicle) -> Sequence[Tolerated]:
+        """Numbers that nobody knows exactly beside that set."""
+        return tolerated(stated)
 
 
 def truth(seed: int) -> tuple[Numbers, Logger]:

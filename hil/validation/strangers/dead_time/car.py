@@ -7,8 +7,9 @@ steering are exact at each, sensors are 8 to 13 ms old, each node by its own age
 ages, small differences of the wheels, gusts and the road's grade are drawn for each drive, within what
 docs/vehicle-set.md takes wheels to differ by. Discs begin each log at 350 K.
 
-The owner states seventeen numbers with tolerances that hold, and that frames may be late; in every fourth drive six
-numbers alone, each within a hundredth of the truth. The dead time of the motors has no key: their lag alone is told.
+The owner states seventeen numbers with tolerances that hold, and in half of these drives knows that frames may be late;
+in every fourth drive six numbers alone, each within a hundredth of the truth. The dead time of the motors has no key:
+their lag alone is told.
 """
 
 from collections.abc import Mapping, Sequence
@@ -49,7 +50,7 @@ STATED = {
 }  # fmt: skip
 """Half-widths that the owner states."""
 SIX = tuple(STATED)[:6]
-SIX_SHARE, SIX_WITHIN = 0.25, 0.01
+SIX_SHARE, SIX_WITHIN, LATE_SHARE = 0.25, 0.01, 0.5
 LATENCY_TOLD_S = 0.015
 USUAL = {
     "cog_height_m": 0.0795, "track_m": 0.02, "wheel_inertia_kg_m2": 0.45, "drag_coefficient": 0.09,
@@ -121,7 +122,7 @@ class DeadTime:
 
     def stated(self, rng: np.random.Generator) -> dict[str, float | list[float]]:
         """Seventeen numbers with tolerances, or six alone."""
-        six = rng.random() < SIX_SHARE
+        six, late = rng.random() < SIX_SHARE, rng.random() < LATE_SHARE
         said: dict[str, float | list[float]] = {}
         for key, half in STATED.items():
             true = _true(key)
@@ -131,7 +132,7 @@ class DeadTime:
                 said[key] = float(f"{value:.5g}")
                 if not six:
                     said[f"{key}_tolerance"] = float(f"{half:.3g}")
-        if not six:
+        if late and not six:
             said["node_latency_s_tolerance"] = LATENCY_TOLD_S
         return said
 

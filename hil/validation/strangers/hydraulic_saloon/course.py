@@ -20,9 +20,9 @@ LEAD_S = 0.4
 """Driven before a log begins."""
 REST_S = 1.2
 LONGEST_STOP_S = 14.0
-GUST_MPS, GUST_S = 0.7, 2.5
+GUST_MPS, GUST_S = 0.3, 2.5
 HILL_M = (90.0, 210.0, 520.0)
-HILL = 0.0035
+HILL = 0.0008
 """Grade of each of the waves, one standard deviation of its size."""
 
 

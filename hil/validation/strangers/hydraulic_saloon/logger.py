@@ -25,8 +25,8 @@ ROW_S = 0.01
 TEETH = 44
 FINE_TEETH = 44 * 50
 """Where noise and steps are left out."""
-WHITE = {"wheel": 0.012, "ax": 0.06, "ay": 0.06, "yaw": 0.0018, "pressure": 1.2e4, "steer": 0.0015, "speed": 0.025}
-SLOW = {"wheel": (0.012, 0.15), "ax": (0.012, 6.0), "ay": (0.012, 6.0), "yaw": (0.0006, 8.0), "speed": (0.03, 1.5)}
+WHITE = {"wheel": 0.006, "ax": 0.03, "ay": 0.03, "yaw": 0.0012, "pressure": 6e3, "steer": 0.0015, "speed": 0.025}
+SLOW = {"wheel": (0.006, 0.15), "ax": (0.008, 6.0), "ay": (0.008, 6.0), "yaw": (0.0006, 8.0), "speed": (0.03, 1.5)}
 STEP = {"ax": 0.01, "ay": 0.01, "yaw": 0.0005, "pressure": 1e4, "steer": 0.00175, "speed": 0.01}
 
 

@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hil.validation.strangers.car import Cause, Hidden, Noise, Tolerated
+from hil.validation.strangers.car import Cause, Hidden, Noise, Tolerated, Vehicle
 from hil.validation.strangers.hydraulic_saloon.causes import CAUSES, with_hidden
 from hil.validation.strangers.hydraulic_saloon.course import GUST_MPS, GUST_S, REST_S, Course, courses, slope_mps2
 from hil.validation.strangers.hydraulic_saloon.logger import SLOW, STEP, WHITE, Logger, logged, true_logger
 from hil.validation.strangers.hydraulic_saloon.motion import OMEGA, STATES, TEMPERATURE, VX, run
 from hil.validation.strangers.hydraulic_saloon.numbers import WHEELS, Numbers, true_numbers
-from hil.validation.strangers.hydraulic_saloon.papers import TOLERATED, stated, with_off
+from hil.validation.strangers.hydraulic_saloon.papers import stated, tolerated, with_off
 from hil.validation.strangers.signals import Vector
 
 _USUAL_MPS = 20.0
@@ -58,9 +58,9 @@ class HydraulicSaloon:
             slope_mps2=slope_mps2(hills, _USUAL_MPS),
         )
 
-    def tolerated(self, seed: int) -> Sequence[Tolerated]:
-        """Numbers that nobody knows exactly; alike for all seeds."""
-        return [Tolerated(name, deviation) for name, (deviation, _) in TOLERATED.items()]
+    def tolerated(self, stated: Vehicle) -> Sequence[Tolerated]:
+        """Numbers that nobody knows exactly beside that set."""
+        return tolerated(stated)
 
 
 def truth(seed: int) -> tuple[Numbers, Logger]:
