@@ -8,6 +8,7 @@ from typing import Annotated
 
 Coefficient = Annotated[float, "", -500.0, 500.0]
 Scale = Annotated[float, "", 0.0, 10.0]
+SignedScale = Annotated[float, "", -20.0, 20.0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +70,7 @@ class TyreParameters:
     lfzo: Scale
     lcx: Scale
     lmux: Scale
-    lex: Scale
+    lex: SignedScale
     lkx: Scale
     lhx: Scale
     lvx: Scale

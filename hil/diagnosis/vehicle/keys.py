@@ -94,8 +94,11 @@ WIDE: Final = {
     "tyre_lsgkp": 0.6,
     "suspension_ride_rate_n_m": 2.0,
     "suspension_damping_ns_m": 1.0,
+    "suspension_brake_support_tangent": 1.0,
 }
-"""Default half-width of a parameter that a set does not state, as a share of the shipped value."""
+"""Default half-width of a parameter that a set does not state, as a share of the shipped value, the larger axle's. The
+links of a car support from nothing up to all of the dive and the lift: 0.35 at the front, 0.55 at the rear (a car that
+does not pitch, as in models without springs)."""
 
 LUMPED: Final = {
     "motor_time_constant_s": 0.7, "ehb_natural_frequency_hz": 0.4, "ehb_damping_ratio": 0.4, "ehb_dead_time_s": 0.5,

@@ -132,6 +132,8 @@ def _from_flat(table: Mapping[str, Any], where: str) -> Vehicle:
         parameters = with_gains(parameters, gains)
     missing = [name for name in WIDE if name not in stated.names]
     tolerance = _tolerance(stated, parameters, gains, missing, unlimited)
+    if gains and not friction:  # one constant, which the gains contain
+        tolerance |= {name: 0.0 for name in tolerance if name.startswith("pad_")}
     remarks = (*stated.remarks, *_remarks_on_missing(where, unlimited, unstated, missing))
     vehicle = _vehicle(parameters, tolerance, friction or not gains, remarks, stated.names)
     known = stated.names | {_without_axle(name) for name in stated.tolerances}
@@ -243,7 +245,10 @@ def _without_axle(name: str) -> str:
 
 def _merge_axles(nuisances: tuple[Nuisance, ...], name: str) -> tuple[Nuisance, ...]:
     """Nuisances of both axles of a parameter as one: the set states one value for both."""
-    front, rear = (one for one in nuisances if one.name.startswith(name))
+    of_axles = [one for one in nuisances if one.name.startswith(name)]
+    if len(of_axles) < 2:  # known exactly: no nuisances
+        return nuisances
+    front, rear = of_axles
     both = replace(front, name=name, at=front.at + rear.at, step=front.step + rear.step)
     return tuple(both if one is front else one for one in nuisances if one is not rear)
 

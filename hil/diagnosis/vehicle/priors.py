@@ -13,8 +13,9 @@ from plant.effects.effect import NODES
 from plant.injection.theta import THETA
 from plant.vectors import PARAMETER, P
 
-CONSTANT_EPSILON_W = 1e7
-"""Pad parameter epsilon from which on the pad friction is constant."""
+CONSTANT_EPSILON_W = 1e11
+"""Pad parameter epsilon from which on the pad friction is constant: hard stops make 1e5 W at a pad face, so within
+1e-6."""
 BRAKE_K = 423.15
 """Disc temperature that brake gains are stated at."""
 HALF_WIDTH_TO_SIGMA = 0.5
@@ -59,7 +60,7 @@ class Nuisance:
     ----------
     at : indices in the vector that ``kind`` says.  step : (len(at),) prior standard deviations, in its units.
     bound : largest z; a parameter farther off is a cause to be named.
-    upper_bound, lower_bound : largest z > 0 and smallest z < 0 for which the equation has a meaning.
+    upper_bound, lower_bound : largest and smallest z for which the equation has a meaning.
     """
 
     name: str
@@ -102,6 +103,7 @@ class _Prior(NamedTuple):
     It is the set's tolerance, and at least ``share`` of the value and ``half_width``; where the set states the value,
     at least ``if_stated`` of it instead.  ``fixed``: whatever the set says.
     ``split``: one nuisance per axle.  ``signed``: of either sign.  ``name`` of the nuisance, if not the parameter's.
+    ``to_zero``: the value may be zero, not less: it is added to, as a factor never leads there.
     ``reciprocal`` of another parameter is the upper limit.
     """
 
@@ -112,6 +114,7 @@ class _Prior(NamedTuple):
     fixed: bool = False
     split: bool = False
     signed: bool = False
+    to_zero: bool = False
     name: str = ""
     reciprocal: str = ""
 
@@ -129,16 +132,16 @@ _WHOLE_CAR = (
 """Both axles are moved together. A share counts however well the set states the value: a parameter of an equation is
 not quite what was measured."""
 _AXLES = (
-    _Prior("friction_brake_threshold_pressure_pa", split=True),
+    _Prior("friction_brake_threshold_pressure_pa", split=True, to_zero=True),
     _Prior("vehicle_slip_angle_share", split=True),
 )
 _CURVES = (
     _Prior("pad_a_1_ks"),
     _Prior("pad_epsilon_w"),
     _Prior("pad_c_1_s"),
-    _Prior("tyre_lex", half_width=1.5, fixed=True, name="tyre_curve", reciprocal="tyre_pex1"),
+    _Prior("tyre_lex", half_width=1.5, fixed=True, signed=True, name="tyre_curve", reciprocal="tyre_pex1"),
     _Prior("tyre_lcx", half_width=0.25, fixed=True, name="tyre_shape"),
-    _Prior("tyre_pkx3", half_width=0.3, fixed=True, name="tyre_stiffness_load"),
+    _Prior("tyre_pkx3", half_width=0.3, fixed=True, signed=True, name="tyre_stiffness_load"),
     _Prior("tyre_pky2", 0.5, fixed=True, name="tyre_side_stiffness_load"),
     _Prior("tyre_pdx2", half_width=0.04, fixed=True, name="tyre_friction_load"),
     _Prior("tyre_ptx2", half_width=1.5, fixed=True, name="tyre_relaxation_load"),
@@ -188,25 +191,20 @@ def _nuisances(row: _Prior, p: Floats, tolerance: Mapping[str, float], stated: b
     """Nuisances of one row, without those of no half-width."""
     own, name = PARAMETER.slice(row.parameter), row.name or row.parameter
     members = [(at,) for at in range(own.start, own.stop)] if row.split else [tuple(range(own.start, own.stop))]
-    share, least = (row.if_stated, 0.0) if stated and not row.fixed else (row.share, row.half_width)
-    kind = NuisanceKind.SIGNED if row.signed else NuisanceKind.VEHICLE
+    share, half = (row.if_stated, 0.0) if stated and not row.fixed else (row.share, row.half_width)
+    kind = NuisanceKind.SIGNED if row.signed or row.to_zero else NuisanceKind.VEHICLE
     nuisances = []
     for at, axle in zip(members, ("_front", "_rear") if row.split else ("",), strict=True):
         value = float(p[list(at)].mean())
-        half_width = max(0.0 if row.fixed else tolerance.get(row.parameter, 0.0), share * value, least)
+        half_width = max(0.0 if row.fixed else tolerance.get(row.parameter, 0.0), share * value, half)
         if half_width:
             step = HALF_WIDTH_TO_SIGMA * half_width
             limit = np.inf
             if row.reciprocal and (factor := float(p[PARAMETER.slice(row.reciprocal)][0])) > 0.0:
-                limit = _sigmas(value, step, 1.0 / factor)  # E is 1 at most (Pacejka 2012, eq. 4.E14)
-            nuisances.append(Nuisance(f"{name}{axle}", at, (step,) * len(at), kind, upper_bound=limit))
+                limit = (1.0 / factor - value) / step  # E is 1 at most (Pacejka 2012, eq. 4.E14)
+            least = -value / step if row.to_zero else -np.inf
+            nuisances.append(Nuisance(f"{name}{axle}", at, (step,) * len(at), kind, 3.0, limit, least))
     return nuisances
-
-
-def _sigmas(value: float, step: float, other: float) -> float:
-    """Number of standard deviations from a positive ``value`` to ``other``."""
-    factor = factor_of(value, step)
-    return float(np.log(other / value) / np.log(factor)) if factor > 1.0 else (other - value) / step
 
 
 def _brake_gain_share(p: Floats, tolerance: Mapping[str, float], k: int, axle: str) -> float:

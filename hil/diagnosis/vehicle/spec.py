@@ -13,7 +13,8 @@ from plant.injection.theta import THETA
 from plant.parameters.plant import PlantParameters
 from plant.vectors import P
 
-_CONSTANT_B_1_J = 2e-6
+_CONSTANT_B_1_J = 2e-10
+"""With `CONSTANT_EPSILON_W`, a rate of 20 1/s at which the friction settles."""
 _FIXED_KG_M2 = 1e12
 """Yaw inertia of a car that cannot turn."""
 _TURNING = (

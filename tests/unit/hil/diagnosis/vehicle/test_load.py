@@ -10,7 +10,8 @@ from hil.diagnosis.vehicle.load import load_vehicle, paper_car
 from hil.diagnosis.vehicle.priors import HALF_WIDTH_TO_SIGMA, INSTRUMENTS, Nuisance, recording_nuisances
 from hil.diagnosis.vehicle.spec import Vehicle, rest_friction
 from plant.injection.theta import THETA
-from plant.vectors import PARAMETER, P
+from plant.model import Scene, advance, initial_state
+from plant.vectors import CUT, INPUT, OUTPUT, PARAMETER, P
 
 SIX = {
     "mass_kg": 1800.0,
@@ -34,6 +35,19 @@ def test_six_values_make_a_car_with_a_constant_brake_gain() -> None:
         assert temperature > 0.0
     assert not car.pad_temperature_matters
     assert any("wide prior" in text for text in car.remarks)
+
+
+def test_a_constant_friction_is_constant_at_any_power() -> None:
+    """A share lost at high speed and pressure would pass for a friction that rises with the speed."""
+    car = load_vehicle(SIX | {"threshold_pressure_pa": 0.0})
+    torques, u, cut = [], INPUT.zeros(), CUT.zeros()
+    u[INPUT.slice("pressure_pa")], cut[CUT.slice("pressure")] = 4e6, 1.0
+    for speed in (5.0, 40.0):
+        x, y = initial_state(car.parameters, speed, car.parameters.friction_brake.ambient_k, 0.5), OUTPUT.zeros()
+        advance(x, u, car.p, y, 300, Scene(cut=cut))
+        torques.append(y[OUTPUT.slice("friction_torque_nm")][0])
+    assert torques == pytest.approx([-2.5e-4 * 4e6] * 2, rel=1e-5)
+    assert not [one.name for one in car.nuisances if one.name.startswith("pad_") and one.kind == "vehicle"]
 
 
 def test_an_unknown_key_is_reported_not_refused() -> None:
@@ -82,6 +96,29 @@ def test_each_axle_has_its_threshold(stated, taken, members):
     assert [car.p[k] for n in nuisances for k in n.at] == pytest.approx(taken)
     if stated is not None:
         assert all(step == pytest.approx(HALF_WIDTH_TO_SIGMA * 2e4) for n in nuisances for step in n.step)
+
+
+def test_an_unstated_threshold_reaches_zero_and_a_stated_zero_is_known() -> None:
+    """Torque proportional to pressure: a factor never leads to it, and a threshold was named in such a car."""
+    thresholds = [n for n in load_vehicle(SIX).nuisances if n.name.startswith("friction_brake_threshold_pressure_pa")]
+    at_limit = nominal(load_vehicle(SIX)).with_nuisances(thresholds, np.array([n.lower for n in thresholds]))
+    assert at_limit.p[PARAMETER.slice("friction_brake_threshold_pressure_pa")] == pytest.approx([0.0, 0.0], abs=1e-6)
+    stated = load_vehicle(SIX | {"threshold_pressure_pa": 0.0})
+    assert not [n for n in stated.nuisances if n.name.startswith("friction_brake_threshold_pressure_pa")]
+
+
+@pytest.mark.parametrize(("name", "at", "wanted"), [
+    ("tyre_stiffness_load", P.tyre_pkx3, 0.0), ("tyre_curve", P.tyre_lex, -0.35),
+    ("tyre_friction_load", P.tyre_pdx2, -0.01),
+    ("suspension_brake_support_tangent_front", P.suspension_brake_support_tangent, 0.35),
+])  # fmt: skip
+def test_forms_of_a_simple_car_are_within_their_bounds(name, at, wanted):
+    """Slip stiffness and grip in proportion to the load, a hyperbolic tangent, no pitch: what models without springs
+    have."""
+    car = load_vehicle(SIX)
+    (nuisance,) = (one for one in car.nuisances if one.name == name)
+    reached = [nominal(car).with_nuisances([nuisance], np.array([z])).p[at] for z in (nuisance.lower, nuisance.upper)]
+    assert min(reached) <= wanted <= max(reached)
 
 
 def test_the_larger_tolerance_of_two_axles_counts() -> None:
