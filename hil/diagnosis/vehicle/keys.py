@@ -68,6 +68,9 @@ SPECIAL: Final = {
 }  # fmt: skip
 """Names that are not a parameter of the plant by themselves; brake gains are N m at one wheel per Pa."""
 
+AXLES: Final = ("front", "rear")
+"""Ends of the names of what stands once for each axle."""
+
 LATENCY: Final = "node_latency_s"
 """Latency of a node's frames behind those of the wheel speeds; a set states its tolerance alone."""
 LATENCY_S: Final = 4e-3
