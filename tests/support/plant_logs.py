@@ -1,5 +1,7 @@
 """Logs that the plant itself made, with sensor noise and a coloured force: short, and the same for several tests."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from hil.diagnosis.vehicle.load import paper_car
@@ -20,13 +22,16 @@ def _demands(n: int, k: int) -> np.ndarray:
     return u
 
 
-def log(theta: np.ndarray, seed: int, k: int, seconds: float = 14.0) -> dict[str, np.ndarray]:
-    """One log of the shipped car with sensor noise and a coloured force."""
+def log(
+    theta: np.ndarray, seed: int, k: int, seconds: float = 14.0,
+    demands: Callable[[int, int], np.ndarray] = _demands, speed_mps: float = SPEED_MPS,
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """One log of the shipped car with sensor noise and a coloured force; ``demands`` by number of rows and of log."""
     rng, n = np.random.default_rng([seed, k]), round(seconds / STEP_S)
-    parameters, u = paper_car().parameters, _demands(n, k)
+    parameters, u = paper_car().parameters, demands(n, k)
     groups = ("state.wheel_speed_rad_s", "state.pressure_pa", "state.motor_torque_nm")
     names = [f"{g}_{w}" for g in groups for w in WHEELS] + ["state.imu_longitudinal_mps2", "state.speed_mps"]
-    x = initial_state(parameters, SPEED_MPS, 350.0, 0.7)
+    x = initial_state(parameters, speed_mps, 350.0, 0.7)
     (table,) = replay(x, u, pack(parameters), names, Scene(theta=theta))
     force = np.zeros(n)
     for i in range(1, n):

@@ -346,8 +346,8 @@ def _changes(stated: Mapping[str, Any], base: PlantParameters, where: str) -> tu
     if not 0.0 < front < wheelbase:
         keys = ", ".join(key for key in stated if key in SPECIAL and not key.startswith("brake_gain"))
         raise UnusableError(
-            f"{where}: {keys}: expected a centre of gravity 0 to {wheelbase:g} m behind the front axle, got {front:g} m; "
-            "measure both from the front axle"
+            f"{where}: {keys}: expected a centre of gravity 0 to {wheelbase:g} m behind the front axle, got "
+            f"{front:g} m; measure both from the front axle"
         )
     between = [float(front), wheelbase - float(front)]
     check_bounds(base, "vehicle_cog_to_axle_m", "cog_to_front_axle_m and wheelbase_m", between, where)

@@ -1,4 +1,4 @@
-"""Every documented key with every kind of entry: a car as stated, or a refusal that says what is wrong and what to do."""
+"""Every documented key with every kind of entry: a car as stated, or a refusal that says what to do."""
 
 import math
 
