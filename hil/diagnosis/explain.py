@@ -18,6 +18,7 @@ from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.data.read import from_frame, read_logs
 from hil.diagnosis.detection.result import Diagnosis, Progress, Settings
 from hil.diagnosis.detection.stepwise import diagnose
+from hil.diagnosis.manoeuvres.stops import stops_of
 from hil.diagnosis.result.answer import Answer, answer
 from hil.diagnosis.result.cross_validation import held_out_error
 from hil.diagnosis.result.residual_patterns import residual_patterns
@@ -57,8 +58,10 @@ def explain(
     car = load_vehicle(shipped(Path(vehicle), "vehicle") if isinstance(vehicle, str | Path) else vehicle)
     read = with_both_axles(_logs(logs, car, channel_map, database, about))
     radius_m = float(car.parameters.wheel.rolling_radius_m)
+    stops = [stop.as_json() for stop in stops_of(read, radius_m)]
     if why := why_not_simulatable(read, radius_m):
-        return check(read, car, why, extend, folder, report)
+        compared = check(read, car, why, extend, folder, report)
+        return replace(compared, json=compared.json | {"stops": stops})
     car = (car.without_lateral_dynamics() if is_straight_line(read) else car).with_motor_limits_from(read)
     dataset = prepare(read, radius_m, car.unstated)
     base = nominal(car) if extend is None else nominal(car).with_extension(load_extension(Path(extend)))
@@ -69,7 +72,8 @@ def explain(
     extension = None if folder is None else _write_extension(diagnosis, nominal(car), folder)
     of_logs = (f"{one.log.name}: {text}" for one in dataset.recordings for text in one.log.remarks)
     remarks = [*car.remarks, *of_logs, *diagnosis.remarks]
-    return answer(diagnosis, errors, patterns, extension, remarks, folder)
+    found = answer(diagnosis, errors, patterns, extension, remarks, folder)
+    return replace(found, json=found.json | {"stops": stops})
 
 
 def _write_extension(diagnosis: Diagnosis, without: ParameterSet, folder: Path) -> str:
