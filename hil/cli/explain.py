@@ -45,6 +45,8 @@ def run(args: argparse.Namespace) -> int:
     from hil.diagnosis.explain import explain
     from hil.diagnosis.manoeuvres.coast_down import CoastDown
     from hil.diagnosis.manoeuvres.coast_down_page import build_report as coast_report
+    from hil.diagnosis.manoeuvres.stop_figures import StopFigures
+    from hil.diagnosis.manoeuvres.stop_figures import build_report as stops_report
     from hil.diagnosis.result.page import build_report
     from hil.diagnosis.sensor_consistency.check import Consistency
     from hil.diagnosis.sensor_consistency.page import build_report as sensor_report
@@ -65,6 +67,8 @@ def run(args: argparse.Namespace) -> int:
     sources = [str(path) for path in args.logs]
     if isinstance(answer, CoastDown):
         report = coast_report(answer, sources)
+    elif isinstance(answer, StopFigures):
+        report = stops_report(answer, sources)
     elif isinstance(answer, Consistency):
         report = sensor_report(answer, sources)
     else:
@@ -73,6 +77,7 @@ def run(args: argparse.Namespace) -> int:
         from hil.report.figure import write_figure
         from hil.report.html import write_html
 
+        args.out.mkdir(parents=True, exist_ok=True)
         write_html(report, args.out / "report.html")
         write_figure(report, args.out / "report.png")
         (args.out / "result.json").write_text(json.dumps(answer.json, indent=2), encoding="utf-8")

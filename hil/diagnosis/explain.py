@@ -19,6 +19,7 @@ from hil.diagnosis.data.read import from_frame, read_logs
 from hil.diagnosis.detection.result import Diagnosis, Progress, Settings
 from hil.diagnosis.detection.stepwise import diagnose
 from hil.diagnosis.manoeuvres.coast_down import CoastDown, coast_down
+from hil.diagnosis.manoeuvres.stop_figures import StopFigures, stop_figures
 from hil.diagnosis.manoeuvres.stops import stops_of
 from hil.diagnosis.result.answer import Answer, answer
 from hil.diagnosis.result.cross_validation import held_out_error
@@ -38,12 +39,12 @@ def explain(
     logs: Any, vehicle: Path | str | Mapping[str, Any] | None = None, *, channel_map: Path | None = None,
     database: Path | None = None, about: Path | None = None, extend: Path | None = None, out: Path | None = None,
     settings: Settings | None = None, progress: Progress | None = None,
-) -> Answer | Consistency | CoastDown:  # fmt: skip
+) -> Answer | Consistency | CoastDown | StopFigures:  # fmt: skip
     """Find what the simulation gets wrong in measured data, name its cause, extend the model and measure the gain.
 
     Where no force was measured, or none that propels the car, no simulation is possible: the sensors are compared with
     the car's own motion (`hil.diagnosis.sensor_consistency`); the remarks say so. Logs of a speed alone in which the
-    car coasts give its road load (`hil.diagnosis.manoeuvres.coast_down`).
+    car coasts give its road load (`hil.diagnosis.manoeuvres.coast_down`), stops by speed alone their figures.
 
     Parameters
     ----------
@@ -66,13 +67,15 @@ def explain(
     radius_m = float(car.parameters.wheel.rolling_radius_m)
     is_inertial = bool(measured_channels(read) & _INERTIAL)
     coasting = coast_down(read, car, extend, None if is_inertial else folder)
-    if coasting is not None and not is_inertial:
-        return coasting
     stops = [stop.as_json() for stop in stops_of(read, radius_m)]
+    if coasting is not None and not is_inertial:
+        return replace(coasting, json=coasting.json | {"stops": stops})
     if why := why_not_simulatable(read, radius_m):
         road_load = {} if coasting is None else {"coast_down": coasting.json["coast_down"]}
         compared = check(read, car, why, extend, folder, report)
         return replace(compared, json=compared.json | {"stops": stops} | road_load)
+    if (figures := stop_figures(read, car, stops)) is not None:
+        return figures
     car = (car.without_lateral_dynamics() if is_straight_line(read) else car).with_motor_limits_from(read)
     dataset = prepare(read, radius_m, car.unstated)
     base = nominal(car) if extend is None else nominal(car).with_extension(load_extension(Path(extend)))

@@ -60,7 +60,8 @@ def prepare(logs: Sequence[Log], radius_m: float, unstated: Collection[str] = ()
     )
     if not (pressure or pressure_demand or torque or torque_demand):
         raise UnusableError(
-            "neither pressures nor motor torques, measured or demanded: nothing shows what braked the car"
+            "neither pressures nor motor torques, measured or demanded: nothing shows what braked the car; "
+            "a speed alone serves where the car mostly coasts, for 10 s or more at a time (coast-downs)"
         )
     mask = CUT.zeros()
     mask[CUT.slice("pressure")] = 1.0 if pressure else 0.0

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
+from hil.diagnosis.manoeuvres import stops
 from hil.diagnosis.manoeuvres.coast_down import CoastDown
 from hil.diagnosis.manoeuvres.coasting import CELL_S
 from hil.report.report import Cell, Chart, Curve, Number, Report, Section, Table, Verdict
@@ -42,7 +43,7 @@ def build_report(answer: CoastDown, sources: Sequence[str]) -> Report:
         verdict=Verdict.PASSED if content["verdict"] == "none" else Verdict.INCONCLUSIVE,
         reason=_SENTENCE[content["verdict"]],
         numbers=tuple(numbers),
-        sections=(*coast_section(coast), _charts(answer), _limits(content)),
+        sections=(*coast_section(coast), _charts(answer), *stops.section(content.get("stops", ())), _limits(content)),
         provenance={
             "logs": list(sources), "runs": len(answer.runs), "seconds": sum(run.length_s for run in answer.runs),
             "extension": content["extension"] or "not written", "remarks": content["remarks"],

@@ -1,10 +1,13 @@
 """Mean fully developed deceleration: numbers by hand, ramps, and stops of the plant with their exact truth."""
 
+import json
+
 import numpy as np
 import plant_logs
 import pytest
 
 from hil.braking import crossings, distance, mean_fully_developed_deceleration
+from hil.cli.main import main
 from hil.diagnosis.data.log import PRESSURE, WHEEL_SPEED, Log, make_log
 from hil.diagnosis.data.read import from_frame
 from hil.diagnosis.manoeuvres.stops import section, stops_of
@@ -107,3 +110,18 @@ def test_the_section_shows_what_the_json_holds() -> None:
     assert table.rows[0][0] == "ramp.csv"
     assert table.rows[0][2:4] == (90.0, pytest.approx(6.0, abs=0.03))
     assert section([]) == ()
+
+
+def test_stops_of_which_the_speed_alone_is_known_have_their_figures(tmp_path, capsys):
+    log = ramp(50.0, pressure=False)
+    np.savetxt(
+        tmp_path / "stop.csv", np.column_stack((log.t_s, log.channels["speed_mps"])), "%.5f", ",",
+        header="t_s,speed_mps", comments="",
+    )  # fmt: skip
+    assert main(["explain", str(tmp_path / "stop.csv"), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["verdict"] == "not_testable"
+    assert [one["mfdd_mps2"] for one in answer["stops"]] == pytest.approx([6.0], rel=0.01)
+    assert main(["explain", str(tmp_path / "stop.csv"), "--out", str(tmp_path / "out")]) == 0
+    assert "MFDD" in capsys.readouterr().out
+    assert "Stops" in (tmp_path / "out" / "report.html").read_text()
