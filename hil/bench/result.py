@@ -15,6 +15,7 @@ from dbc.codec import COUNTER_SIGNAL, CRC_SIGNAL
 from dbc.contract import MessageSpec, contract
 from dbc.frame import BusName, LinkEvent
 from hil.bench.recorder import recorded_events
+from hil.braking import LOWER, UPPER, crossings, mean_fully_developed_deceleration
 from hil.errors import BrakebenchError
 from hil.log.frames import FrameFlag, Recording
 from hil.log.read import read_log
@@ -137,6 +138,7 @@ class RunResult:
     ----------
     stop_distance_m, stop_time_s : from the pedal's first movement to standstill; None without a complete stop.
     mean_decel_mps2 : mean deceleration over that time; positive.
+    mfdd_mps2 : mean fully developed deceleration, from 0.8 to 0.1 of the speed at the pedal's first movement.
     demanded_decel_mps2 : mean of what the driver demanded over that time.
     energy_recuperated_j : electrical energy returned to the battery over that time.
     frames_sent : frames recorded on the vehicle bus.
@@ -149,6 +151,7 @@ class RunResult:
     stop_distance_m: float | None
     stop_time_s: float | None
     mean_decel_mps2: float | None
+    mfdd_mps2: float | None
     demanded_decel_mps2: float | None
     energy_recuperated_j: float | None
     frames_sent: int
@@ -167,12 +170,13 @@ class RunResult:
 def measure(signals: Signals, bit_rate: int | None = None) -> RunResult:
     """Measure a recorded run; ``bit_rate`` of the vehicle bus where it is not the one that its database states."""
     braking = _braking_window(signals)
-    distance = time = mean = demanded = energy = None
+    distance = time = mean = developed = demanded = energy = None
     if braking is not None:
         start_s, end_s = braking
         time = end_s - start_s
         distance = _rise(signals, "TRUTH_MOTION.DISTANCE", start_s, end_s)
         mean = float(np.interp(start_s, *signals.get("TRUTH_MOTION.SPEED"))) / time
+        developed = _fully_developed(signals, start_s)
         energy = _rise(signals, "TRUTH_ENERGY.RECUPERATED", start_s, end_s)
         t_s, values = signals.get("BRAKE_STATUS.DEMANDED_DECELERATION")
         inside = values[(t_s >= start_s) & (t_s <= end_s)]
@@ -182,6 +186,7 @@ def measure(signals: Signals, bit_rate: int | None = None) -> RunResult:
         stop_distance_m=distance,
         stop_time_s=time,
         mean_decel_mps2=mean,
+        mfdd_mps2=developed,
         demanded_decel_mps2=demanded,
         energy_recuperated_j=energy,
         frames_sent=_vehicle_frames(signals).size,
@@ -203,6 +208,19 @@ def _braking_window(signals: Signals) -> tuple[float, float] | None:
         return None
     still = t_s[(np.abs(speed) < STANDSTILL_MPS) & (t_s > pressed[0])]
     return (float(pressed[0]), float(still[0])) if len(still) else None
+
+
+def _fully_developed(signals: Signals, start_s: float) -> float | None:
+    """Mean fully developed deceleration of a stop; None where a plant of somebody's own does not send the distance."""
+    t_s, speed = signals.get("TRUTH_MOTION.SPEED")
+    v0 = float(np.interp(start_s, t_s, speed))
+    times = crossings(t_s, speed, start_s, (UPPER * v0, LOWER * v0))
+    if times is None or v0 < STANDSTILL_MPS:
+        return None
+    ways = [_rise(signals, "TRUTH_MOTION.DISTANCE", start_s, end_s) for end_s in times]
+    if ways[0] is None or ways[1] is None or ways[1] <= ways[0]:
+        return None
+    return mean_fully_developed_deceleration(v0, ways[0], ways[1])
 
 
 def _rise(signals: Signals, name: str, start_s: float, end_s: float) -> float | None:

@@ -36,6 +36,7 @@ def _numbers(result: RunResult) -> tuple[Number, ...]:
         Number("Stopping distance", result.stop_distance_m, "m", "from the pedal's first movement to standstill"),
         Number("Stopping time", result.stop_time_s, "s"),
         Number("Mean deceleration", result.mean_decel_mps2, "m/s²"),
+        Number("Mean fully developed deceleration", result.mfdd_mps2, "m/s²", "0.8 to 0.1 of the speed (UN R13-H)"),
         Number("Demanded deceleration", result.demanded_decel_mps2, "m/s²", "pedal map, mean over the stop"),
         Number("Energy recuperated", result.energy_recuperated_j, KJ),
         Number("Frames on the vehicle bus", result.frames_sent, ""),

@@ -43,6 +43,10 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 def run(args: argparse.Namespace) -> int:
     """Explain and print."""
     from hil.diagnosis.explain import explain
+    from hil.diagnosis.manoeuvres.coast_down import CoastDown
+    from hil.diagnosis.manoeuvres.coast_down_page import build_report as coast_report
+    from hil.diagnosis.manoeuvres.stop_figures import StopFigures
+    from hil.diagnosis.manoeuvres.stop_figures import build_report as stops_report
     from hil.diagnosis.result.page import build_report
     from hil.diagnosis.sensor_consistency.check import Consistency
     from hil.diagnosis.sensor_consistency.page import build_report as sensor_report
@@ -61,11 +65,19 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(_unusable(str(error)), indent=2))
         return error.exit_code
     sources = [str(path) for path in args.logs]
-    report = sensor_report(answer, sources) if isinstance(answer, Consistency) else build_report(answer, sources)
+    if isinstance(answer, CoastDown):
+        report = coast_report(answer, sources)
+    elif isinstance(answer, StopFigures):
+        report = stops_report(answer, sources)
+    elif isinstance(answer, Consistency):
+        report = sensor_report(answer, sources)
+    else:
+        report = build_report(answer, sources)
     if args.out is not None:
         from hil.report.figure import write_figure
         from hil.report.html import write_html
 
+        args.out.mkdir(parents=True, exist_ok=True)
         write_html(report, args.out / "report.html")
         write_figure(report, args.out / "report.png")
         (args.out / "result.json").write_text(json.dumps(answer.json, indent=2), encoding="utf-8")

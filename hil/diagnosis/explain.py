@@ -1,6 +1,7 @@
 """`explain`: takes measured logs and a vehicle set, gives the answer. The call behind ``brakebench explain``."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -16,25 +17,33 @@ from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.data.read import from_frame, read_logs
 from hil.diagnosis.detection.result import Progress, Settings
 from hil.diagnosis.detection.stepwise import diagnose
+from hil.diagnosis.manoeuvres.coast_down import CoastDown, coast_down
+from hil.diagnosis.manoeuvres.stop_figures import StopFigures, stop_figures
+from hil.diagnosis.manoeuvres.stops import stops_of
 from hil.diagnosis.result.answer import Answer, answer
 from hil.diagnosis.result.cross_validation import confirmed, held_out_error
 from hil.diagnosis.result.extended_car import extended_car, write_extended_car
 from hil.diagnosis.result.residual_patterns import residual_patterns
 from hil.diagnosis.sensor_consistency.check import Consistency, check, why_not_simulatable
+from hil.diagnosis.sensor_consistency.motion import measured_channels
 from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.vehicle.load import load_vehicle
 from hil.diagnosis.vehicle.spec import Vehicle
+
+_INERTIAL = {"ax_mps2", "ay_mps2", "yaw_rate_rad_s"}
+"""Channels that can be compared with the motion."""
 
 
 def explain(
     logs: Any, vehicle: Path | str | Mapping[str, Any] | None = None, *, channel_map: Path | None = None,
     database: Path | None = None, about: Path | None = None, extend: Path | None = None, out: Path | None = None,
     settings: Settings | None = None, progress: Progress | None = None,
-) -> Answer | Consistency:  # fmt: skip
+) -> Answer | Consistency | CoastDown | StopFigures:  # fmt: skip
     """Find what the simulation gets wrong in measured data, name its cause, extend the model and measure the gain.
 
     Where no force was measured, or none that propels the car, no simulation is possible: the sensors are compared with
-    the car's own motion (`hil.diagnosis.sensor_consistency`); the remarks say so.
+    the car's own motion (`hil.diagnosis.sensor_consistency`); the remarks say so. Logs of a speed alone in which the
+    car coasts give its road load (`hil.diagnosis.manoeuvres.coast_down`), stops by speed alone their figures.
 
     Parameters
     ----------
@@ -55,8 +64,17 @@ def explain(
     car = load_vehicle(shipped(Path(vehicle), "vehicle") if isinstance(vehicle, str | Path) else vehicle)
     read = with_both_axles(_logs(logs, car, channel_map, database, about))
     radius_m = float(car.parameters.wheel.rolling_radius_m)
+    is_inertial = bool(measured_channels(read) & _INERTIAL)
+    coasting = coast_down(read, car, extend, None if is_inertial else folder)
+    stops = [stop.as_json() for stop in stops_of(read, radius_m)]
+    if coasting is not None and not is_inertial:
+        return replace(coasting, json=coasting.json | {"stops": stops})
     if why := why_not_simulatable(read, radius_m):
-        return check(read, car, why, extend, folder, report)
+        road_load = {} if coasting is None else {"coast_down": coasting.json["coast_down"]}
+        compared = check(read, car, why, extend, folder, report)
+        return replace(compared, json=compared.json | {"stops": stops} | road_load)
+    if (figures := stop_figures(read, car, stops)) is not None:
+        return figures
     car = (car.without_lateral_dynamics() if is_straight_line(read) else car).with_motor_limits_from(read)
     dataset = prepare(read, radius_m, car.unstated)
     base, notes = (nominal(car), []) if extend is None else extended_car(car, Path(extend), dataset)
@@ -68,7 +86,8 @@ def explain(
     extension = None if folder is None else write_extended_car(diagnosis, folder)
     of_logs = (f"{one.log.name}: {text}" for one in dataset.recordings for text in one.log.remarks)
     remarks = [*car.remarks, *notes, *of_logs, *diagnosis.remarks]
-    return answer(diagnosis, errors, patterns, extension, remarks, folder)
+    found = answer(diagnosis, errors, patterns, extension, remarks, folder)
+    return replace(found, json=found.json | {"stops": stops})
 
 
 def shipped(path: Path, kind: str) -> Path:

@@ -16,7 +16,7 @@ from hil.bench.result import Signals
 from hil.bus.rendezvous import base_directory
 
 FACTS = {
-    "stop_distance_m", "stop_time_s", "mean_decel_mps2", "demanded_decel_mps2", "energy_recuperated_j",
+    "stop_distance_m", "stop_time_s", "mean_decel_mps2", "mfdd_mps2", "demanded_decel_mps2", "energy_recuperated_j",
     "frames_sent", "frames_lost", "frames_corrupt", "overruns", "lateness_ms", "bus_load", "bus", "processes", "log",
 }  # fmt: skip
 

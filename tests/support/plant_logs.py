@@ -1,5 +1,7 @@
 """Logs that the plant itself made, with sensor noise and a coloured force: short, and the same for several tests."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from hil.diagnosis.vehicle.load import paper_car
@@ -20,13 +22,21 @@ def _demands(n: int, k: int) -> np.ndarray:
     return u
 
 
-def log(theta: np.ndarray, seed: int, k: int, seconds: float = 14.0) -> dict[str, np.ndarray]:
-    """One log of the shipped car with sensor noise and a coloured force."""
+def log(
+    theta: np.ndarray, seed: int, k: int, seconds: float = 14.0,
+    demands: Callable[[int, int], np.ndarray] = _demands, speed_mps: float = SPEED_MPS,
+    exact: bool = False,
+):  # fmt: skip
+    """One log of the shipped car with sensor noise and a coloured force; ``demands`` by number of rows and of log.
+
+    ``exact`` returns speed and distance, (2, rows), without noise and that force beside it.
+    """
     rng, n = np.random.default_rng([seed, k]), round(seconds / STEP_S)
-    parameters, u = paper_car().parameters, _demands(n, k)
+    parameters, u = paper_car().parameters, demands(n, k)
     groups = ("state.wheel_speed_rad_s", "state.pressure_pa", "state.motor_torque_nm")
-    names = [f"{g}_{w}" for g in groups for w in WHEELS] + ["state.imu_longitudinal_mps2", "state.speed_mps"]
-    x = initial_state(parameters, SPEED_MPS, 350.0, 0.7)
+    names = [f"{g}_{w}" for g in groups for w in WHEELS]
+    names += ["state.imu_longitudinal_mps2", "state.speed_mps", "state.distance_m"]
+    x = initial_state(parameters, speed_mps, 350.0, 0.7)
     (table,) = replay(x, u, pack(parameters), names, Scene(theta=theta))
     force = np.zeros(n)
     for i in range(1, n):
@@ -40,7 +50,7 @@ def log(theta: np.ndarray, seed: int, k: int, seconds: float = 14.0) -> dict[str
         columns[f"motor_torque_{w}_nm"] = table[:, 8 + i] + rng.standard_normal(n)
         columns[f"pressure_demand_{w}_pa"] = u[:, INPUT.slice("pressure_demand_pa")][:, i]
         columns[f"motor_torque_demand_{w}_nm"] = u[:, INPUT.slice("motor_demand_nm")][:, i]
-    return columns
+    return (columns, table[:, 13:15].T) if exact else columns
 
 
 def logs(theta: np.ndarray, seed: int) -> list[dict[str, np.ndarray]]:

@@ -102,8 +102,12 @@ def make_log(name: str, t_s: Floats, channels: Mapping[str, Floats], remarks: tu
         notes.append(f"{int((~keep).sum())} rows with a repeated time are left out")
         t_s, known = t_s[keep], {key: value[keep] for key, value in known.items()}
     length_s = float(t_s[-1] - t_s[0]) if len(t_s) > 1 else 0.0
-    if length_s < _SHORTEST_S:
-        raise UnusableError(f"{name}: {length_s:.2f} s long; expected {_SHORTEST_S:g} s or more (is t_s in seconds?)")
+    cycle_s = float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.0
+    if length_s + 1.5 * cycle_s < _SHORTEST_S:  # 200 samples at 100 Hz are 2 s
+        raise UnusableError(
+            f"{name}: {length_s:.2f} s long; expected {_SHORTEST_S:g} s or more (is t_s in seconds?); leave it out, or "
+            "record from before the manoeuvre to after it"
+        )
     if len(t_s) / length_s < _SLOWEST_HZ:
         raise UnusableError(f"{name}: {len(t_s) / length_s:.2f} samples a second; expected {_SLOWEST_HZ:g} or more")
     for key, value in known.items():

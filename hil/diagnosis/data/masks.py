@@ -32,7 +32,8 @@ def moving_and_resting(speed_mps: Floats, sample_s: float) -> tuple[Mask, Mask]:
     before, after = (max(int(time_s / sample_s), 1) for time_s in (_BEFORE_S, SETTLE_S))
     near_stop = np.convolve(speed_mps < SLOW_MPS, np.ones(before + 1 + after))[before : before + len(speed_mps)] > 0.5
     rings = max(int(_RINGS_S / sample_s), 1)
-    resting = np.convolve(speed_mps > _AT_REST_MPS, np.ones(2 * rings + 1), mode="same") < 0.5
+    moved = np.convolve(speed_mps > _AT_REST_MPS, np.ones(2 * rings + 1))  # "same" is as long as the longer of both
+    resting = moved[rings : rings + len(speed_mps)] < 0.5
     resting[: 2 * after] = False  # the simulated body first sinks into its springs
     return ~near_stop, resting
 

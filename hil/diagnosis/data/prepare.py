@@ -62,7 +62,8 @@ def prepare(logs: Sequence[Log], radius_m: float, unstated: Collection[str] = ()
     )
     if not (pressure or pressure_demand or torque or torque_demand):
         raise UnusableError(
-            "neither pressures nor motor torques, measured or demanded: nothing shows what braked the car"
+            "neither pressures nor motor torques, measured or demanded: nothing shows what braked the car; "
+            "a speed alone serves where the car mostly coasts, for 10 s or more at a time (coast-downs)"
         )
     mask = CUT.zeros()
     mask[CUT.slice("pressure")] = 1.0 if pressure else 0.0
@@ -81,10 +82,10 @@ def prepare(logs: Sequence[Log], radius_m: float, unstated: Collection[str] = ()
         replace(_recording(log, groups, stride, radius_m, tracked), number=k) for k, log in enumerate(logs)
     )
     moving_s = sum(float(recording.moving.sum()) for recording in recordings) * stride * ROW_S
-    if moving_s < _LEAST_MOVING_S:
+    if round(moving_s, 1) < _LEAST_MOVING_S:
         raise UnusableError(
             f"the car moves for {moving_s:.1f} s in all logs; expected {_LEAST_MOVING_S:g} s or more above "
-            f"{SLOW_MPS:g} m/s"
+            f"{SLOW_MPS:g} m/s; add logs of more such manoeuvres, or longer ones"
         )
     return Dataset(recordings, mask, tuple(groups), stride * ROW_S, tuple(_missing_channel_notes(common)), tracked)
 

@@ -10,6 +10,7 @@ from hil.diagnosis.detection.profile_fit import FittedHypothesis, delta_chi2
 from hil.diagnosis.detection.threshold import INDISTINGUISHABLE
 from hil.diagnosis.estimation.gauss_newton import Model
 from hil.diagnosis.estimation.terms import Candidate
+from hil.diagnosis.manoeuvres import stops
 from hil.diagnosis.result.answer import Answer
 from hil.diagnosis.result.cross_validation import probabilities
 from hil.diagnosis.result.page_parts import EXTENDED, NOMINAL, binned_curve, comparison_panels, limits
@@ -43,7 +44,7 @@ def build_report(answer: Answer, sources: Sequence[str]) -> Report:
         numbers=tuple(numbers(answer)),
         sections=(
             _comparison(answer), moved(answer), *goodness_of_fit(answer), _patterns(answer), *_curves(answer),
-            _candidates(answer), held_out(answer), _limits(answer),
+            _candidates(answer), held_out(answer), *stops.section(content.get("stops", ())), _limits(answer),
         ),
         provenance={
             "logs": list(sources), "segments": len(diagnosis.dataset.segments),

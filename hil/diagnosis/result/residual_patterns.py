@@ -86,9 +86,9 @@ def _variables(dataset: Dataset) -> dict[str, Floats]:
 def _pattern(name: str, values: Floats, known: Floats, variables: dict[str, Floats], masks: SampleMasks) -> str:
     shown = values.copy()
     if name in ("wheel.mean", "gps"):  # the error of the speed accumulates: its slope correlates
-        n = 25
-        slope = np.convolve(values, np.concatenate((np.ones(n), -np.ones(n))) / (n * n * masks.sample_s), mode="same")
-        restarts = np.convolve((masks.segment_start + masks.log_start) > 0.5, np.ones(2 * n + 1), mode="same") > 0.5
-        shown = np.where(restarts, np.nan, slope)
+        n, count = max(round(0.5 / masks.sample_s), 1), len(values)
+        weights = np.concatenate((np.ones(n), -np.ones(n))) / (n * n * masks.sample_s)
+        near = np.convolve((masks.segment_start + masks.log_start) > 0.5, np.ones(2 * n + 1))[n : n + count]
+        shown = np.where(near > 0.5, np.nan, np.convolve(values, weights)[n - 1 : n - 1 + count])
     step = max(int(0.1 / masks.sample_s), 1)
     return pattern(shown, known, variables, step)

@@ -63,5 +63,7 @@ def pattern(
     strong.sort(key=lambda one: -abs(one[0]))
     if strong:
         return "; ".join(f"{'grows' if r > 0 else 'falls'} with {name} ({r:+.2f})" for r, name in strong[:2])
+    if not np.isfinite(residual[valid]).any():
+        return otherwise
     offset = float(np.nanmean(residual[valid])) / max(float(np.nanstd(residual[valid])), 1e-12)
     return "constant offset" if abs(offset) > _MIN_OFFSET else otherwise

@@ -89,7 +89,8 @@ class LongitudinalModel(SensorModel):
         self.resolution = {"delay_s": 0.5 * motion.cell_s}
         margin = round(SENSOR["delay_s"].high / motion.cell_s) + 1  # the same cells count whatever the delay
         ends = np.maximum(motion.log_start, np.concatenate((motion.log_start[1:], [1.0])))
-        inside = 1.0 - np.minimum(np.convolve(ends, np.ones(2 * margin + 1), "same"), 1.0)
+        near = np.convolve(ends, np.ones(2 * margin + 1))[margin : margin + len(ends)]
+        inside = 1.0 - np.minimum(near, 1.0)
         self._valid = np.column_stack([motion.moving, motion.moving * inside])
 
     def state_space(self, parameters: Mapping[str, float], noise: Mapping[str, float]) -> StateSpace:

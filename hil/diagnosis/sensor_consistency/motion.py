@@ -95,10 +95,13 @@ def motion_of(logs: Sequence[Log], radius_m: float) -> Motion:
     speed = _without_gaps(np.median(wheels, axis=0) if wheels else channels["speed_mps"])
     accel = slope_of(speed, log_id, cell_s)
     margin = round(0.5 / cell_s)
-    slow = np.convolve(speed < SLOW_MPS, np.ones(2 * margin + 1), mode="same") > 0.5
+    slow = np.convolve(speed < SLOW_MPS, np.ones(2 * margin + 1))[margin : margin + len(speed)] > 0.5
     moving_s = (~slow).sum() * cell_s
-    if moving_s < 4.0:
-        raise UnusableError(f"the car moves for {moving_s:.1f} s in all; expected 4 s or more above {SLOW_MPS:g} m/s")
+    if round(moving_s, 1) < 4.0:
+        raise UnusableError(
+            f"the car moves for {moving_s:.1f} s in all; expected 4 s or more above {SLOW_MPS:g} m/s; add logs of more "
+            "such manoeuvres, or longer ones"
+        )
     segment_id = _segment_id(log_id, accel, cell_s)
     return Motion(tuple(logs), cell_s, t_s, log_start, log_id, channels, speed, accel, 1.0 * ~slow, segment_id)
 

@@ -68,6 +68,9 @@ SPECIAL: Final = {
 }  # fmt: skip
 """Names that are not a parameter of the plant by themselves; brake gains are N m at one wheel per Pa."""
 
+AXLES: Final = ("front", "rear")
+"""Ends of the names of what stands once for each axle."""
+
 LINE: Final = "line_lag_s"
 """Lag of the pads behind the pressure sensors, as one pole; a set states its tolerance alone."""
 LINE_S: Final = 8e-3

@@ -4,6 +4,7 @@ import tomllib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,17 @@ from typing import Any
 import numpy as np
 
 from hil.diagnosis.data.log import UnusableError
+from hil.diagnosis.vehicle.checks import (
+    check_bounds,
+    check_order,
+    checked_number,
+    checked_numbers,
+    checked_tolerance,
+)
 from hil.diagnosis.vehicle.key_names import stated_keys
 from hil.diagnosis.vehicle.keys import (
     ALIASES,
+    AXLES,
     DERIVED,
     LINE,
     LINE_S,
@@ -27,6 +36,7 @@ from hil.diagnosis.vehicle.latency import ALL_NODES, LATENCY_KEYS, latencies
 from hil.diagnosis.vehicle.priors import (
     INSTRUMENTS,
     Nuisance,
+    NuisanceKind,
     instruments,
     line_lag,
     nuisance_parameters,
@@ -34,7 +44,7 @@ from hil.diagnosis.vehicle.priors import (
     with_wide_prior,
 )
 from hil.diagnosis.vehicle.spec import Vehicle, with_constant_friction, with_gains
-from hil.scenario.parameters import ParameterError, is_number, load_set, override
+from hil.scenario.parameters import is_number, load_set, override
 from plant.model import pack
 from plant.parameters.plant import PlantParameters
 from plant.vectors import PARAMETER
@@ -49,6 +59,8 @@ _BRAKES, _MOTORS = "suspension_brake_support_tangent", "suspension_drive_support
 _KNOWN = sorted({*ALIASES, *DERIVED, *SPECIAL, *LATENCY_KEYS, *PARAMETER.sizes})
 _FORMS = ("tyre_", "suspension_")
 """Sections with curves that hardly a set states: what it does not state gets a wide prior."""
+_IN_BRAKE_GAIN = ("friction_brake_piston_area_m2", "friction_brake_effective_radius_m", "friction_brake_efficiency")
+"""Parameters whose tolerance is part of the brake gains'."""
 _TOLERANCES_ONLY = tuple(f"{key}_tolerance" for key in (ALL_NODES, LINE, *INSTRUMENTS))
 """Keys of parameters that have a tolerance and no value."""
 _CONSEQUENCES = {
@@ -66,11 +78,23 @@ class _Stated:
     values: dict[str, Any] = field(default_factory=dict)
     tolerances: dict[str, float] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
+    one_axle: set[str] = field(default_factory=set)
+    """Names with their axle, of values and half-widths that are stated for one axle alone."""
 
     @property
     def names(self) -> set[str]:
         """Names of the stated values, without the axle."""
         return {_without_axle(name) for name in self.values}
+
+    @property
+    def known(self) -> set[str]:
+        """Names of the stated values, with the axle where one axle alone is stated."""
+        return (self.names - {_without_axle(name) for name in self.one_axle}) | self.one_axle
+
+    @property
+    def exact(self) -> set[str]:
+        """Names of a stated tolerance of zero."""
+        return {name for name, half in self.tolerances.items() if half == 0.0}
 
     def widen(self, name: str, half_width: float) -> None:
         self.tolerances[name] = max(self.tolerances.get(name, 0.0), half_width)
@@ -78,8 +102,7 @@ class _Stated:
 
 def paper_car() -> Vehicle:
     """The shipped vehicle set with its own tolerances."""
-    parameters = load_set(_SHIPPED, PlantParameters)
-    return _vehicle(parameters, _shipped_tolerances(), True, (), ())
+    return _vehicle(_shipped_parameters(), _shipped_tolerances(), True, (), ())
 
 
 def load_vehicle(source: Path | Mapping[str, Any] | None) -> Vehicle:
@@ -106,7 +129,13 @@ def _read(path: Path) -> dict[str, Any]:
         raise UnusableError(f"{path}: not a vehicle set: {error}") from error
 
 
-def _shipped_tolerances() -> dict[str, float]:
+@cache
+def _shipped_parameters() -> PlantParameters:
+    return load_set(_SHIPPED, PlantParameters)
+
+
+@cache
+def _shipped_tolerances() -> Mapping[str, float]:
     return {
         f"{section}_{name}": float(entry["tolerance"])
         for section, entries in tomllib.loads(_SHIPPED.read_text(encoding="utf-8")).items()
@@ -116,26 +145,24 @@ def _shipped_tolerances() -> dict[str, float]:
 
 
 def _from_flat(table: Mapping[str, Any], where: str) -> Vehicle:
-    base = paper_car().parameters
+    base = _shipped_parameters()
     stated = _stated(table, where, base)
     changes, gains = _changes(stated.values, base, where)
     unstated = tuple(section for section in UNLIMITED if section not in changes)
     unlimited = _without_limits(changes)
-    try:
-        parameters = override(base, changes, where)
-    except ParameterError as error:
-        raise UnusableError(str(error)) from error
+    parameters = override(base, changes, where)
+    check_order(parameters, where)
     friction = any(name.startswith("pad_") for name in stated.values)
     if gains and not friction:
         parameters = with_constant_friction(parameters)
     if gains:
         parameters = with_gains(parameters, gains)
-    missing = [name for name in WIDE if name not in stated.names]
+    missing = [name for name in WIDE if name not in stated.names | stated.exact]
     tolerance = _tolerance(stated, parameters, gains, missing, unlimited)
     if gains and not friction:  # one constant, which the gains contain
         tolerance |= {name: 0.0 for name in tolerance if name.startswith("pad_")}
     remarks = (*stated.remarks, *_remarks_on_missing(where, unlimited, unstated, missing))
-    vehicle = _vehicle(parameters, tolerance, friction or not gains, remarks, stated.names)
+    vehicle = _vehicle(parameters, tolerance, friction or not gains, remarks, stated.known, stated.exact)
     known = stated.names | {_without_axle(name) for name in stated.tolerances}
     nuisances = tuple(
         with_wide_prior(one, vehicle.p)
@@ -149,6 +176,7 @@ def _from_flat(table: Mapping[str, Any], where: str) -> Vehicle:
         nuisances = (*nuisances, *side_to_side_variation(vehicle.p, motors="motor" not in unstated))
     nuisances = (*nuisances, *instruments(stated.tolerances, not unlimited, motors="motor" not in unstated))
     nuisances = (*nuisances, *line_lag(stated.tolerances.get(LINE, LINE_S)))
+    vehicle = replace(vehicle, remarks=(*vehicle.remarks, *_remark_on_unused(where, stated, nuisances)))
     suspension = {name for name in PARAMETER.sizes if name.startswith("suspension_")}
     return replace(
         vehicle, nuisances=nuisances, unstated=unstated, unlimited=unlimited,
@@ -161,8 +189,8 @@ def _stated(table: Mapping[str, Any], where: str, base: PlantParameters) -> _Sta
     stated = _Stated()
     for key, value in table.items():
         stem = key.removesuffix("_tolerance")
-        if stem in DERIVED and isinstance(value, int | float):
-            _derive(stem, float(value), key != stem, base, stated)
+        if stem in DERIVED:
+            _derive(stem, checked_number(value, key, where), key != stem, base, stated, where)
             continue
         name = ALIASES.get(stem, stem)
         known = name in SPECIAL or name in PARAMETER.sizes or name in LATENCY_KEYS
@@ -172,16 +200,22 @@ def _stated(table: Mapping[str, Any], where: str, base: PlantParameters) -> _Sta
                 hint = f"; did you mean {near[0]!r}?" if near else ""
                 stated.remarks.append(f"{where}: unknown key {key!r} is left out{hint}")
             continue
-        given = _number(value, f"{where}: {key}")
         if key != stem:
-            stated.widen(name, max(given if isinstance(given, list) else [given]))
-        elif isinstance(given, list) and not _by_axle(name, base):
+            most = PARAMETER.sizes.get(name, 1)
+            given = table.get(stem)
+            stated.widen(name, checked_tolerance(value, key, where, len(given) if isinstance(given, list) else most))
+            continue
+        given = checked_numbers(value, key, where)
+        check_bounds(base, name, key, float(np.mean(given)) if not _by_axle(name, base) else given, where)
+        if isinstance(given, list) and not _by_axle(name, base):
             mean, half_width = float(np.mean(given)), 0.5 * float(np.ptp(given))
             stated.values[name] = mean
-            stated.widen(name, half_width)
+            if half_width > 0.0:
+                stated.widen(name, half_width)
             stated.remarks.append(f"{where}: {key} is one value per car: the mean {mean:g} +/- {half_width:g} is taken")
         else:
             stated.values[name] = given
+            stated.one_axle.difference_update(f"{name}_{axle}" for axle in AXLES)
     if _BRAKES in stated.values:  # a hub carrier takes up the torque of a motor in the wheel as it does a caliper's
         stated.values.setdefault(_MOTORS, stated.values[_BRAKES])
         stated.tolerances.setdefault(_MOTORS, stated.tolerances.get(_BRAKES, 0.0))
@@ -207,8 +241,10 @@ def _tolerance(
     """Half-widths of all parameters: as stated, 1 % of a value stated without one, wide for missing values."""
     shipped = {name: half for name, half in _shipped_tolerances().items() if name not in unlimited}
     tolerance = {name: shipped.get(name, 0.0) for name in PARAMETER.sizes}
-    for name in stated.names & set(PARAMETER.sizes) - stated.tolerances.keys():
-        tolerance[name] = min(tolerance[name], _STATED * _largest(parameters, name))
+    for name in stated.known - stated.tolerances.keys():
+        whole = _without_axle(name)
+        if whole in PARAMETER.sizes:
+            tolerance[name] = min(tolerance[whole], _STATED * _largest(parameters, whole))
     tolerance |= {f"brake_gain_{axle}": _STATED * gain for axle, gain in gains.items()}
     for name in missing:
         tolerance[name] = max(tolerance[name], WIDE[name] * _largest(parameters, name))
@@ -238,6 +274,19 @@ def _remarks_on_missing(
     return remarks
 
 
+def _remark_on_unused(where: str, stated: _Stated, nuisances: Sequence[Nuisance]) -> list[str]:
+    """Remark on tolerances that no fit uses: of numbers that the logs of a car hardly show."""
+    moved = {at for one in nuisances if one.kind in (NuisanceKind.VEHICLE, NuisanceKind.SIGNED) for at in one.at}
+    unused = []
+    for name, half in stated.tolerances.items():
+        whole = _without_axle(name)
+        own = PARAMETER.slice(whole) if whole in PARAMETER.sizes else None
+        fixed = name == "wheelbase_m" if own is None else moved.isdisjoint(range(own.start, own.stop))
+        if half and fixed and name not in _IN_BRAKE_GAIN:
+            unused.append(name)
+    return [f"{where}: kept as stated whatever their tolerance: {', '.join(unused)}"] if unused else []
+
+
 def _without_axle(name: str) -> str:
     """Name of a parameter without its axle."""
     return name.removesuffix("_front").removesuffix("_rear")
@@ -245,36 +294,35 @@ def _without_axle(name: str) -> str:
 
 def _merge_axles(nuisances: tuple[Nuisance, ...], name: str) -> tuple[Nuisance, ...]:
     """Nuisances of both axles of a parameter as one: the set states one value for both."""
-    of_axles = [one for one in nuisances if one.name.startswith(name)]
-    if len(of_axles) < 2:  # known exactly: no nuisances
+    axles = [one for one in nuisances if one.name.startswith(name)]
+    if len(axles) < len(AXLES):  # known exactly
         return nuisances
-    front, rear = of_axles
+    front, rear = axles
     both = replace(front, name=name, at=front.at + rear.at, step=front.step + rear.step)
     return tuple(both if one is front else one for one in nuisances if one is not rear)
 
 
-def _derive(key: str, value: float, is_tolerance: bool, base: PlantParameters, stated: _Stated) -> None:
+def _derive(key: str, value: float, is_tolerance: bool, base: PlantParameters, stated: _Stated, where: str) -> None:
     """Add a key that is one member, or a multiple, of a parameter of the plant to ``stated``."""
     name, member, factor = DERIVED[key]
+    of_axle = f"{name}_{AXLES[member]}" if member is not None and _by_axle(name, base) else name
     if is_tolerance:
-        stated.widen(name, value * factor)
+        half = checked_tolerance(value, f"{key}_tolerance", where) * factor
+        if half or member is not None:  # a value that is not taken cannot be known exactly
+            stated.widen(of_axle, half)
     elif member is not None:
         now = stated.values.get(name, _value(base, name))
         changed = list(now) if isinstance(now, list | tuple) else [now]
         changed[member] = value * factor
+        check_bounds(base, name, key, changed if _by_axle(name, base) else changed[0], where)
+        if of_axle != name and (name not in stated.values or {f"{name}_{axle}" for axle in AXLES} & stated.one_axle):
+            stated.one_axle.add(of_axle)
         stated.values[name] = changed if isinstance(now, list | tuple) else changed[0]
 
 
 def _by_axle(name: str, base: PlantParameters) -> bool:
     """Whether the plant has a value of the parameter per axle."""
     return name in PARAMETER.sizes and isinstance(_value(base, name), tuple)
-
-
-def _number(value: Any, where: str) -> Any:
-    numbers = value if isinstance(value, list) else [value]
-    if not numbers or not all(map(is_number, numbers)):
-        raise UnusableError(f"{where}: expected a number, got {value!r}")
-    return value
 
 
 def _value(parameters: PlantParameters, flat: str) -> Any:
@@ -300,11 +348,21 @@ def _changes(stated: Mapping[str, Any], base: PlantParameters, where: str) -> tu
     if front is None:
         default = base.vehicle.cog_to_axle_m[0] / sum(base.vehicle.cog_to_axle_m)
         front = wheelbase - rear if rear is not None else wheelbase * (1.0 - share if share is not None else default)
+    for key, other in (("cog_to_rear_axle_m", rear), ("front_weight_share", share)):
+        implied = wheelbase - front if other is rear else 1.0 - front / wheelbase
+        if other is not None and abs(other - implied) > _STATED * max(abs(implied), abs(other)):
+            raise UnusableError(
+                f"{where}: {key}: expected {implied:.4g}, as the other keys give, got {other:.4g}; state one of them"
+            )
     if not 0.0 < front < wheelbase:
+        keys = ", ".join(key for key in stated if key in SPECIAL and not key.startswith("brake_gain"))
         raise UnusableError(
-            f"{where}: the centre of gravity is {front:g} m behind the front axle; expected 0 to {wheelbase:g}"
+            f"{where}: {keys}: expected a centre of gravity 0 to {wheelbase:g} m behind the front axle, got "
+            f"{front:g} m; measure both from the front axle"
         )
-    flat = {"vehicle_cog_to_axle_m": [float(front), wheelbase - float(front)]} | {
+    between = [float(front), wheelbase - float(front)]
+    check_bounds(base, "vehicle_cog_to_axle_m", "cog_to_front_axle_m and wheelbase_m", between, where)
+    flat = {"vehicle_cog_to_axle_m": between} | {
         name: value for name, value in values.items() if name in PARAMETER.sizes
     }
     changes: dict[str, Any] = {}
@@ -319,7 +377,7 @@ def _changes(stated: Mapping[str, Any], base: PlantParameters, where: str) -> tu
 
 def _vehicle(
     parameters: PlantParameters, tolerance: Mapping[str, float], thermal: bool, remarks: tuple[str, ...],
-    stated: Collection[str],
+    stated: Collection[str], exact: Collection[str] = (),
 ) -> Vehicle:  # fmt: skip
     p = pack(parameters)
-    return Vehicle(parameters, p, tuple(nuisance_parameters(p, tolerance, stated)), thermal, remarks)
+    return Vehicle(parameters, p, tuple(nuisance_parameters(p, tolerance, stated, exact)), thermal, remarks)

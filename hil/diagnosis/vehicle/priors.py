@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hil.diagnosis.data.log import WHEELS, Floats
+from hil.diagnosis.vehicle.checks import lowest
 from hil.diagnosis.vehicle.latency import LATENCY_NODES, Latency
 from plant.effects.effect import NODES
 from plant.injection.theta import THETA
@@ -164,20 +165,24 @@ _CURVES = (
 """Pads; curves of the tyre near its peak and sideways, which hardly a set states; body, suspension and discs."""
 
 
-def nuisance_parameters(p: Floats, tolerance: Mapping[str, float], stated: Collection[str]) -> list[Nuisance]:
+def nuisance_parameters(
+    p: Floats, tolerance: Mapping[str, float], stated: Collection[str], exact: Collection[str] = ()
+) -> list[Nuisance]:
     """Nuisances of a car: one per parameter or axle; parameters with the same action (pad radius and area) are one.
 
     Parameters
     ----------
     p : (PARAMETER.size,).  tolerance : half-widths by parameter.  stated : parameters that the vehicle set gives.
+    exact : those that are known exactly, which have no nuisance.  Names end in the axle where it is one axle's alone.
     """
 
     def of(rows: tuple[_Prior, ...]) -> list[Nuisance]:
-        return [nuisance for row in rows for nuisance in _nuisances(row, p, tolerance, row.parameter in stated)]
+        return [nuisance for row in rows for nuisance in _nuisances(row, p, tolerance, stated, exact)]
 
     cog = PARAMETER.slice("vehicle_cog_to_axle_m").start
-    step = HALF_WIDTH_TO_SIGMA * tolerance.get("cog_to_front_axle_m", tolerance.get("vehicle_cog_to_axle_m", 0.0))
-    nuisances = [*of(_WHOLE_CAR), Nuisance("vehicle_cog_to_axle_m", (cog, cog + 1), (step, -step))]
+    nuisances = of(_WHOLE_CAR)
+    if step := HALF_WIDTH_TO_SIGMA * _cog_half_width(p, tolerance):
+        nuisances.append(Nuisance("vehicle_cog_to_axle_m", (cog, cog + 1), (step, -step)))
     of_axles = of(_AXLES)
     for k, axle in enumerate(("front", "rear")):
         area = PARAMETER.slice("friction_brake_piston_area_m2").start + k
@@ -187,23 +192,37 @@ def nuisance_parameters(p: Floats, tolerance: Mapping[str, float], stated: Colle
     return nuisances + of(_CURVES)
 
 
-def _nuisances(row: _Prior, p: Floats, tolerance: Mapping[str, float], stated: bool) -> list[Nuisance]:
+def _cog_half_width(p: Floats, tolerance: Mapping[str, float]) -> float:
+    """Half-width of the centre of gravity's place along the car, m, from whichever key states it."""
+    wheelbase = float(p[PARAMETER.slice("vehicle_cog_to_axle_m")].sum())
+    keys = {"cog_to_front_axle_m": 1.0, "cog_to_rear_axle_m": 1.0, "front_weight_share": wheelbase}
+    stated = (tolerance[key] * factor for key, factor in keys.items() if key in tolerance)
+    return next(stated, tolerance.get("vehicle_cog_to_axle_m", 0.0))
+
+
+def _nuisances(
+    row: _Prior, p: Floats, tolerance: Mapping[str, float], stated: Collection[str], exact: Collection[str]
+) -> list[Nuisance]:
     """Nuisances of one row, without those of no half-width."""
     own, name = PARAMETER.slice(row.parameter), row.name or row.parameter
     members = [(at,) for at in range(own.start, own.stop)] if row.split else [tuple(range(own.start, own.stop))]
-    share, half = (row.if_stated, 0.0) if stated and not row.fixed else (row.share, row.half_width)
     kind = NuisanceKind.SIGNED if row.signed or row.to_zero else NuisanceKind.VEHICLE
     nuisances = []
     for at, axle in zip(members, ("_front", "_rear") if row.split else ("",), strict=True):
-        value = float(p[list(at)].mean())
-        half_width = max(0.0 if row.fixed else tolerance.get(row.parameter, 0.0), share * value, half)
-        if half_width:
+        value, keys = float(p[list(at)].mean()), {row.parameter, f"{row.parameter}{axle}"}
+        is_stated = not keys.isdisjoint(stated) and not row.fixed
+        share, least = (row.if_stated, 0.0) if is_stated else (row.share, row.half_width)
+        given = tolerance.get(f"{row.parameter}{axle}", tolerance.get(row.parameter, 0.0))
+        half_width = max(0.0 if row.fixed else given, share * abs(value), least)
+        if half_width and keys.isdisjoint(exact):
             step = HALF_WIDTH_TO_SIGMA * half_width
             limit = np.inf
             if row.reciprocal and (factor := float(p[PARAMETER.slice(row.reciprocal)][0])) > 0.0:
-                limit = (1.0 / factor - value) / step  # E is 1 at most (Pacejka 2012, eq. 4.E14)
-            least = -value / step if row.to_zero else -np.inf
-            nuisances.append(Nuisance(f"{name}{axle}", at, (step,) * len(at), kind, 3.0, limit, least))
+                limit = max((1.0 / factor - value) / step, 0.0)  # E is 1 at most (Pacejka 2012, eq. 4.E14)
+            at_zero = row.to_zero or (value == 0.0 and lowest(row.parameter) == 0.0)
+            least_z = -value / step if at_zero else -np.inf
+            steps = (step,) * len(at)
+            nuisances.append(Nuisance(f"{name}{axle}", at, steps, kind, upper_bound=limit, lower_bound=least_z))
     return nuisances
 
 

@@ -56,8 +56,10 @@ brake_gain_front_nm_pa = 2.9e-4
 brake_gain_rear_nm_pa = 1.7e-4
 ```
 
-- A number without tolerance is taken to be known to a hundredth; one that is not given, to what the tables say.
-- What stands once for each axle takes one number for both, or a list `[front, rear]`; its tolerance is one number.
+- A number without tolerance is taken to be known to a hundredth (the centre of gravity along the car to 0.1 m); one
+  that is not given, to what the tables say. A tolerance of 0 says that it is known exactly: no fit moves it.
+- What stands once for each axle takes one number for both, or a list `[front, rear]`; its tolerance is one number,
+  the larger half-width (a list of as many numbers is taken so).
   Of a number that the car has once, a list gives the mean, and half its spread as tolerance; the remarks say so.
 - The mass is the whole car's, wheels included; the inertia is that of one wheel with all that turns with it; the
   rolling radius is effective, way per angle. A wheel's torque is its brake gain times the pressure above the threshold.
