@@ -12,8 +12,9 @@ from threadpoolctl import threadpool_limits
 from dbc.database import parse_database
 from hil.diagnosis.data.axle_torques import with_both_axles
 from hil.diagnosis.data.channel_map import load_map
-from hil.diagnosis.data.log import Log
+from hil.diagnosis.data.log import Log, UnusableError
 from hil.diagnosis.data.masks import is_straight_line
+from hil.diagnosis.data.paired_wheels import with_paired_wheels
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.data.read import from_frame, read_logs
 from hil.diagnosis.detection.result import Diagnosis, Progress, Settings
@@ -26,6 +27,11 @@ from hil.diagnosis.simulation.parameter_set import ParameterSet, nominal
 from hil.diagnosis.vehicle.extension_file import load_extension, write_extension
 from hil.diagnosis.vehicle.load import load_vehicle
 from hil.diagnosis.vehicle.spec import Vehicle
+
+
+_SHIPPED_CAR = "paper_car"
+"""Name of the vehicle set that our own recordings are of."""
+_UNSTATED = "no vehicle is given: taken as the car that comes with brakebench"
 
 
 def explain(
@@ -41,7 +47,7 @@ def explain(
     Parameters
     ----------
     logs : a data frame (or mapping of columns) in the canonical table, a path, or a list of either.
-    vehicle : flat vehicle set as a file or mapping; None is the shipped car.
+    vehicle : flat vehicle set as a file or mapping; None is the shipped car, for our own recordings alone.
     channel_map, database, about : another car's channel map, its DBC, and ``logs.toml``.
     extend : extension file whose model is the starting point.
     out : folder for the extension file; without it none is written.
@@ -54,8 +60,10 @@ def explain(
     """
     report = progress or (lambda _: None)
     folder = None if out is None else Path(out)
-    car = load_vehicle(shipped(Path(vehicle), "vehicle") if isinstance(vehicle, str | Path) else vehicle)
-    read = with_both_axles(_logs(logs, car, channel_map, database, about))
+    car = _vehicle(vehicle)
+    read = with_both_axles(with_paired_wheels(_logs(logs, car, channel_map, database, about, vehicle is not None)))
+    if vehicle is None:
+        _refuse_another_car(read)
     radius_m = float(car.parameters.wheel.rolling_radius_m)
     if why := why_not_simulatable(read, radius_m):
         return check(read, car, why, extend, folder, report)
@@ -94,8 +102,27 @@ def shipped(path: Path, kind: str) -> Path:
     return ours if not path.suffix and not path.exists() and ours.exists() else path
 
 
+def _vehicle(vehicle: Path | str | Mapping[str, Any] | None) -> Vehicle:
+    if vehicle is None or str(vehicle) == _SHIPPED_CAR:
+        return load_vehicle(None)
+    return load_vehicle(shipped(Path(vehicle), "vehicle") if isinstance(vehicle, str | Path) else vehicle)
+
+
+def _refuse_another_car(logs: Sequence[Log]) -> None:
+    """Refuse files that nobody said whose they are: only recordings of our own bus are of the shipped car."""
+    others = [log.name for log in logs if log.another_car]
+    if others:
+        more = f" and {len(others) - 1} more" if len(others) > 1 else ""
+        raise UnusableError(
+            f"{others[0]}{more}: not a recording of brakebench's own bus and no vehicle is given; its numbers (mass, "
+            "rolling radius, brake gains) decide what counts as wrong: give --vehicle SET.toml with mass_kg, "
+            "wheelbase_m, cog_to_front_axle_m, rolling_radius_m, brake_gain_front_nm_pa and brake_gain_rear_nm_pa "
+            f"(docs/vehicle-set.md), or --vehicle {_SHIPPED_CAR} if it is the car that comes with brakebench"
+        )
+
+
 def _logs(
-    logs: Any, car: Vehicle, channel_map: Path | None, database: Path | None, about: Path | None
+    logs: Any, car: Vehicle, channel_map: Path | None, database: Path | None, about: Path | None, stated: bool
 ) -> Sequence[Log]:
     items = list(logs) if isinstance(logs, list | tuple) else [logs]
     mapped = None if channel_map is None else load_map(shipped(Path(channel_map), "map"))
@@ -110,5 +137,6 @@ def _logs(
         elif isinstance(item, str | Path):
             read += read_logs([Path(item)], dbc, mapped, None if about is None else Path(about), constant)
         else:
-            read.append(from_frame(item, f"dataframe {k}" if len(items) > 1 else "dataframe"))
+            frame = from_frame(item, f"dataframe {k}" if len(items) > 1 else "dataframe")
+            read.append(frame if stated else replace(frame, remarks=(*frame.remarks, _UNSTATED)))
     return read
