@@ -17,6 +17,7 @@ from hil.diagnosis.data.masks import is_straight_line
 from hil.diagnosis.data.paired_wheels import with_paired_wheels
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.data.read import from_frame, read_logs
+from hil.diagnosis.data.trial.run import on_trial
 from hil.diagnosis.detection.result import Diagnosis, Progress, Settings
 from hil.diagnosis.detection.stepwise import diagnose
 from hil.diagnosis.result.answer import Answer, answer
@@ -27,7 +28,7 @@ from hil.diagnosis.simulation.parameter_set import ParameterSet, nominal
 from hil.diagnosis.vehicle.extension_file import load_extension, write_extension
 from hil.diagnosis.vehicle.load import load_vehicle
 from hil.diagnosis.vehicle.spec import Vehicle
-
+from hil.diagnosis.vehicle.trial_car import car_of
 
 _SHIPPED_CAR = "paper_car"
 """Name of the vehicle set that our own recordings are of."""
@@ -65,7 +66,9 @@ def explain(
     if vehicle is None:
         _refuse_another_car(read)
     radius_m = float(car.parameters.wheel.rolling_radius_m)
-    if why := why_not_simulatable(read, radius_m):
+    why = why_not_simulatable(read, radius_m)
+    read = on_trial(read, car_of(car), simulated=not why)
+    if why:
         return check(read, car, why, extend, folder, report)
     car = (car.without_lateral_dynamics() if is_straight_line(read) else car).with_motor_limits_from(read)
     dataset = prepare(read, radius_m, car.unstated)

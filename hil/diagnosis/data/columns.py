@@ -11,7 +11,7 @@ _WITH_UNIT = re.compile(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*")
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """Values (rows,) of a column and its unit, empty where the file tells none.
+    """Values (rows,) of a column and its unit, empty where the file gives none.
 
     ``own_t_s`` and ``own_values`` (n,) are its samples as they came, s, where it has stamps of its own.
     """
@@ -41,9 +41,8 @@ def by_name(where: str, columns: Iterable[tuple[str, Column]], used: Collection[
         found.setdefault(name, []).append((number, column))
     twice = {name: [number for number, _ in same] for name, same in found.items() if len(same) > 1 and name in used}
     if twice:
-        told = "; ".join(f"{name} at columns {', '.join(map(str, numbers))}" for name, numbers in twice.items())
+        places = "; ".join(f"{name} at columns {', '.join(map(str, numbers))}" for name, numbers in twice.items())
         raise UnusableError(
-            f"{where}: the same head stands over several columns: {told}; nothing tells which one is meant: rename or "
-            "drop all but one of each"
+            f"{where}: the same head stands over several columns: {places}; rename or drop all but one of each"
         )
     return {name: same[-1][1] for name, same in found.items()}

@@ -69,8 +69,9 @@ _WHEELS = ("fl", "fr", "rl", "rr")
 def nothing_shows_speed(logs: "Sequence[Log]") -> str:
     """What to say where no log, or not every one, has a speed."""
     wanted = ("speed_mps", *(f"wheel_speed_{wheel}_rad_s" for wheel in _WHEELS))
-    return f"{_without(logs, wanted)}neither wheel speeds nor a speed in every log: nothing shows how the car moved; " + (
-        expected_instead(_columns(logs, wanted), wanted)
+    return (
+        f"{_without(logs, wanted)}neither wheel speeds nor a speed in every log: nothing shows how the car moved; "
+        + expected_instead(_columns(logs, wanted), wanted)
     )
 
 
@@ -79,8 +80,8 @@ def nothing_shows_force(logs: "Sequence[Log]") -> str:
     stems = (("pressure", "pa"), ("motor_torque", "nm"), ("pressure_demand", "pa"), ("motor_torque_demand", "nm"))
     wanted = tuple(f"{stem}_{wheel}_{unit}" for stem, unit in stems for wheel in _WHEELS)
     return (
-        f"{_without(logs, wanted)}neither pressures nor motor torques of all wheels, measured or demanded: nothing shows "
-        f"what braked the car; {expected_instead(_columns(logs, wanted), wanted)}"
+        f"{_without(logs, wanted)}neither pressures nor motor torques of all wheels, measured or demanded: nothing "
+        f"shows what braked the car; {expected_instead(_columns(logs, wanted), wanted)}"
     )
 
 

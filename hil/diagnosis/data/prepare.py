@@ -9,6 +9,7 @@ import numpy as np
 from hil.diagnosis.data.clock import clock_origin_s, timestamp_jitter_s
 from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Dataset, Recording, Segment
 from hil.diagnosis.data.grid import averaged, has_sample, resampled, smoothed, without_gaps
+from hil.diagnosis.data.hints import nothing_shows_force, nothing_shows_speed
 from hil.diagnosis.data.log import (
     MOTOR_DEMAND,
     MOTOR_TORQUE,
@@ -19,7 +20,6 @@ from hil.diagnosis.data.log import (
     Log,
     UnusableError,
 )
-from hil.diagnosis.data.hints import nothing_shows_force, nothing_shows_speed
 from hil.diagnosis.data.masks import SETTLE_S, Mask, after_wheel_lock, known_pressures, moving_and_resting
 from hil.diagnosis.data.paired_wheels import copied_axles
 from plant.vectors import CUT, INPUT, U

@@ -146,7 +146,9 @@ def from_columns(name: str, columns: Mapping[str, Column], channel_map: ChannelM
         if not channels:
             wanted = ", ".join(source.signal for source in list(channel_map.entries.values())[:12])
             seen = ", ".join(list(columns)[:20])
-            raise UnusableError(f"{name}: none of the columns that --map names is there ({wanted}); columns seen: {seen}")
+            raise UnusableError(
+                f"{name}: none of the columns that --map names is there ({wanted}); columns seen: {seen}"
+            )
     else:
         for key, column in columns.items():
             if key == time:

@@ -9,7 +9,7 @@ import numpy as np
 from hil.diagnosis.data.log import Floats, UnusableError
 
 _SAMPLE = 200
-"""Rows by which the kind of numbers is told."""
+"""Rows that show the kind of numbers."""
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
@@ -82,12 +82,12 @@ def _unquoted(row: str, between: str) -> str:
 
 
 def _refuse_decimal_commas(path: Path, names: Sequence[str], rows: Sequence[str]) -> None:
-    """Refuse numbers with decimal commas between commas: nothing tells one from the other."""
+    """Refuse numbers with decimal commas between commas: nothing shows which is which."""
     counts = {row.count(",") + 1 for row in rows[:_SAMPLE]}
     if len(names) > 1 and counts and min(counts) > len(names) and max(counts) <= 2 * len(names):
         raise UnusableError(
             f"{path}: {len(names)} names in the header, {min(counts)} cells in a row: are commas both decimal and "
-            f"between cells (row 1: {rows[0][:60]})? Nothing tells them apart; save it with semicolons between the "
+            f"between cells (row 1: {rows[0][:60]})? Nothing shows which is which; save it with semicolons between the "
             "cells, or with decimal points"
         )
 
@@ -111,8 +111,8 @@ def _decimal_comma(path: Path, rows: Sequence[str], between: str) -> bool:
     if points is not None or all(_THOUSANDS.fullmatch(cell) for cell in commas):
         beside = f" beside {points!r}" if points is not None else ""
         raise UnusableError(
-            f"{path}: a comma in {commas[0]!r}{beside} may be decimal or part thousands; write the numbers with decimal "
-            "points and without marks for thousands"
+            f"{path}: a comma in {commas[0]!r}{beside} may be decimal or part thousands; write the numbers with "
+            "decimal points and without marks for thousands"
         )
     return True
 

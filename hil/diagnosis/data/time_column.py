@@ -14,7 +14,7 @@ _BY_SUFFIX = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 NAMES = (*_NAMES, *(f"{stem}_{unit}" for unit in _BY_SUFFIX for stem in ("t", "time", "timestamp")))
 """Names of a time column, in the order in which they are looked for."""
 _STEPS_S = (5e-4, 0.2)
-"""Time between two samples that a log can have: 2 kHz to 5 Hz. In ms, us and ns these are numbers apart."""
+"""Time between two samples that a log can have: 2 kHz to 5 Hz. In ms, us and ns these differ by their size."""
 _SINCE_1970_S = (6e8, 4e9)
 """Stamps since 1970, s: the years 1989 to 2096."""
 
@@ -47,7 +47,7 @@ def times_s(name: str, columns: Mapping[str, Column], wanted: str | None) -> tup
     if column.unit or suffix in _BY_SUFFIX:
         factor = to_si(column.unit, f"{name}: {named}")[0] if column.unit else _BY_SUFFIX[suffix]
         return named, _from_zero(column.values, factor), []
-    factor, remarks = _told_by_its_steps(name, named, column.values)
+    factor, remarks = _by_its_steps(name, named, column.values)
     return named, _from_zero(column.values, factor), remarks
 
 
@@ -57,7 +57,7 @@ def _from_zero(values: Floats, factor: float) -> Floats:
     return np.asarray((values - start) * factor, np.float64)
 
 
-def _told_by_its_steps(name: str, named: str, values: Floats) -> tuple[float, list[str]]:
+def _by_its_steps(name: str, named: str, values: Floats) -> tuple[float, list[str]]:
     """Factor to seconds of a column without a unit, by the size of its numbers, and what to remark."""
     finite = values[np.isfinite(values)]
     steps = np.diff(finite)

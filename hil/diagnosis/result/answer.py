@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from hil.diagnosis.data.channels_read import channels_read
 from hil.diagnosis.detection.nonparametric import BasisFunction, estimate_curve
 from hil.diagnosis.detection.onset import nearest
 from hil.diagnosis.detection.profile_fit import FittedHypothesis, delta_chi2, delta_criterion, rival_hypotheses
@@ -75,6 +76,7 @@ def answer(
         "extension": extension,
         "missing": list(diagnosis.dataset.missing_channels),
         "remarks": remarks,
+        "channels_read": channels_read(recording.log for recording in diagnosis.dataset.recordings),
     }  # fmt: skip
     return Answer(content, diagnosis, held_out, patterns)
 
