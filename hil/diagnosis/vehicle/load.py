@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hil.diagnosis.data.log import UnusableError
+from hil.diagnosis.vehicle.bounds import refuse_implausible, refuse_negative_tolerance
 from hil.diagnosis.vehicle.keys import (
     ALIASES,
     DERIVED,
@@ -155,6 +156,7 @@ def _stated(table: Mapping[str, Any], where: str, base: PlantParameters) -> _Sta
     for key, value in table.items():
         stem = key.removesuffix("_tolerance")
         if stem in DERIVED and isinstance(value, int | float):
+            _refuse_implausible(where, key, DERIVED[stem][0], value, DERIVED[stem][2])
             _derive(stem, float(value), key != stem, base, stated)
             continue
         name = ALIASES.get(stem, stem)
@@ -165,6 +167,7 @@ def _stated(table: Mapping[str, Any], where: str, base: PlantParameters) -> _Sta
                 stated.remarks.append(f"{where}: unknown key {key!r} is left out{hint}")
             continue
         given = _number(value, f"{where}: {key}")
+        _refuse_implausible(where, key, name, given)
         if key != stem:
             stated.widen(name, max(given if isinstance(given, list) else [given]))
         elif isinstance(given, list) and not _by_axle(name, base):
@@ -178,6 +181,13 @@ def _stated(table: Mapping[str, Any], where: str, base: PlantParameters) -> _Sta
         stated.values.setdefault(_MOTORS, stated.values[_BRAKES])
         stated.tolerances.setdefault(_MOTORS, stated.tolerances.get(_BRAKES, 0.0))
     return stated
+
+
+def _refuse_implausible(where: str, key: str, name: str, given: Any, factor: float = 1.0) -> None:
+    if key.endswith("_tolerance"):
+        refuse_negative_tolerance(where, key, given)
+    else:
+        refuse_implausible(where, key, name, given, factor)
 
 
 def _without_limits(changes: dict[str, Any]) -> tuple[str, ...]:
