@@ -11,6 +11,8 @@ from hil.diagnosis.data.units import USUAL, units_of, written
 if TYPE_CHECKING:
     from hil.diagnosis.data.log import Log
 
+_SUFFIXES = ("_rad_s", "_mps2", "_mps", "_pa", "_nm", "_rad")
+_WHEELS = ("fl", "fr", "rl", "rr")
 _SHOWN = 20
 """Columns that a message lists, at most."""
 
@@ -37,7 +39,8 @@ def unit_hint(channel: str, values: "np.typing.NDArray[np.float64]", low: float,
 def expected_instead(columns: Sequence[str], wanted: Iterable[str]) -> str:
     """The columns that were seen, those near to the names ``wanted``, and how to say which is which."""
     wanted = tuple(wanted)
-    shown = ", ".join(columns[:_SHOWN]) + (f" and {len(columns) - _SHOWN} more" if len(columns) > _SHOWN else "")
+    unknown_first = sorted(columns, key=lambda column: column in wanted or is_channel(column))
+    shown = ", ".join(unknown_first[:_SHOWN]) + (f" and {len(columns) - _SHOWN} more" if len(columns) > _SHOWN else "")
     near = {name: column for name in wanted if (column := _nearest(name, columns)) is not None}
     parts = [f"columns seen: {shown or 'none'}"]
     if near:
@@ -51,19 +54,21 @@ def expected_instead(columns: Sequence[str], wanted: Iterable[str]) -> str:
     return "; ".join(parts)
 
 
+def is_channel(column: str) -> bool:
+    """Whether a column has the name of a channel, which a reader need not look at."""
+    return bool(units_of(column)) and column.endswith(_SUFFIXES)
+
+
 def _nearest(name: str, columns: Sequence[str]) -> str | None:
     """The column whose name is near to ``name``, by its letters in lower case; None where none is."""
     lower: dict[str, str] = {}
     for column in columns:
         lower.setdefault(column.lower().replace(".", "_").replace(" ", "_"), column)
     stem = name
-    for suffix in ("_rad_s", "_mps2", "_mps", "_pa", "_nm", "_rad"):
+    for suffix in _SUFFIXES:
         stem = stem.removesuffix(suffix)
     found = get_close_matches(name, lower, 1, 0.7) or get_close_matches(stem, lower, 1, 0.7)
     return lower[found[0]] if found else None
-
-
-_WHEELS = ("fl", "fr", "rl", "rr")
 
 
 def nothing_shows_speed(logs: "Sequence[Log]") -> str:

@@ -10,6 +10,7 @@ from hil.diagnosis.detection.profile_fit import FittedHypothesis, delta_chi2
 from hil.diagnosis.detection.threshold import INDISTINGUISHABLE
 from hil.diagnosis.estimation.gauss_newton import Model
 from hil.diagnosis.result.answer import Answer
+from hil.diagnosis.result.channels_table import channels_section
 from hil.diagnosis.result.cross_validation import HeldOutError, probabilities
 from hil.diagnosis.result.page_parts import EXTENDED, NOMINAL, binned_curve, comparison_panels, limits, rounded
 from hil.diagnosis.result.residual_patterns import UNITS, WORDS
@@ -48,7 +49,7 @@ def build_report(answer: Answer, sources: Sequence[str]) -> Report:
         numbers=tuple(_numbers(answer)),
         sections=(
             _comparison(answer), _patterns(answer), *_curves(answer), _candidates(answer), _held_out(answer),
-            _limits(answer),
+            channels_section(content), _limits(answer),
         ),
         provenance={
             "logs": list(sources), "segments": len(diagnosis.dataset.segments),

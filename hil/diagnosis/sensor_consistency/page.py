@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
+from hil.diagnosis.result.channels_table import channels_section
 from hil.diagnosis.result.page_parts import EXTENDED, NOMINAL, binned_curve, comparison_panels, limits, rounded
 from hil.diagnosis.sensor_consistency.braking import APPLIED_PA, BrakingModel
 from hil.diagnosis.sensor_consistency.check import Consistency
@@ -35,7 +36,10 @@ def build_report(answer: Consistency, sources: Sequence[str]) -> Report:
         verdict={"none": Verdict.PASSED, "named": None}.get(content["verdict"], Verdict.INCONCLUSIVE),
         reason=_headline(answer) or _SENTENCE[content["verdict"]],
         numbers=tuple(_numbers(answer)),
-        sections=(_overview(answer), *_details(answer), _parameters(answer), _relations(answer), _limits(answer)),
+        sections=(
+            _overview(answer), *_details(answer), _parameters(answer), _relations(answer), channels_section(content),
+            _limits(answer),
+        ),
         provenance={
             "logs": list(sources), "segments": answer.motion.segments,
             "seconds": round(len(answer.motion.t_s) * answer.motion.cell_s, 1),

@@ -174,11 +174,11 @@ def _against_motion(motion: Motion) -> list[Finding]:
         brakes = names[0].startswith("pressure")
         unit = _unit(1.0 / abs(force.factor), PRESSURE_UNITS if brakes else TORQUE_UNITS, _WITHIN)
         source = "brake gains, mass and radius" if brakes else "mass and radius"
+        kind, does = ("pressures", "brakes") if brakes else ("torques", "gains and loses speed")
         what = (
-            f"the car brakes {abs(force.factor):.3g} times as much as {names[0]} and the other wheels' make of it with "
-            f"the stated {source} (correlation {abs(force.correlation):.2f})"
+            f"the car {does} {abs(force.factor):.3g} times as much as its {kind} ({names[0]} and the other wheels') "
+            f"make of it with the stated {source} (correlation {abs(force.correlation):.2f})"
         )
-        what = what if brakes else what.replace("brakes", "gains and loses speed")
         if unit is not None:
             found.append(Finding(names, what, unit_advice(names, unit)))
         elif force.factor < 0.0 and abs(np.log(-force.factor)) < np.log(2.0):

@@ -5,7 +5,7 @@ import numpy as np
 from hil.diagnosis.data.log import WHEEL_SPEED, Floats
 from hil.diagnosis.data.trial.agreement import Agreement, agreement, near
 from hil.diagnosis.data.trial.finding import Finding, sign_advice, unit_advice
-from hil.diagnosis.data.trial.motion import Motion, filtered, spread
+from hil.diagnosis.data.trial.motion import STEP_S, Motion, filtered, spread
 from hil.diagnosis.data.trial.scales import ACCELERATION, STRONG
 from hil.diagnosis.data.units import DEG
 
@@ -81,7 +81,7 @@ def _units(seen: dict[tuple[str, str], Agreement]) -> list[Finding]:
                 if _also_another(seen, name, set(others)):
                     continue
                 other, one = next(iter(others.items()))
-                sign = f" and its sign is turned ({_POSITIVE})" if one.factor < 0.0 else ""
+                sign = f"; and its sign is turned ({_POSITIVE}): sign = -1 in the --map" if one.factor < 0.0 else ""
                 advice = unit_advice(_CHANNEL[name], unit) + sign
                 return [Finding(_CHANNEL[name], _got(name, other, one), advice, names_itself=True)]
     return []
@@ -126,5 +126,5 @@ def _sign_advice(name: str) -> str:
 def _got(name: str, other: str, one: Agreement) -> str:
     return (
         f"{_SHOWN[name]} is {one.factor:.4g} times the yaw rate by {_SHOWN[other]} (correlation {one.correlation:.2f} "
-        f"over {one.samples:,} samples of 20 ms)"
+        f"over {one.samples * STEP_S:.3g} s)"
     )

@@ -41,8 +41,8 @@ def _one(log: Log, car: Car, simulated: bool) -> tuple[Log, list[Finding]]:
     """A log as it goes on, and what refuses it."""
     motion = motion_of(log, car)
     found = all_scales(motion)
-    if not found:
-        found = [*lateral(motion), *forces(motion)]
+    if all(one.channels == ("ax_mps2",) for one in found):  # else the speed itself, which the others need, is wrong
+        found = [*found, *lateral(motion), *forces(motion)]
     log, more = _stamps(log, motion, simulated and not found)
     found = [*found, *more]
     fatal = [one for one in found if one.certain and (simulated or not one.names_itself)]

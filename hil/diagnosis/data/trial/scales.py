@@ -5,7 +5,7 @@ import numpy as np
 from hil.diagnosis.data.log import WHEEL_SPEED, Floats
 from hil.diagnosis.data.trial.agreement import Agreement, agreement, near
 from hil.diagnosis.data.trial.finding import Finding, sign_advice, unit_advice
-from hil.diagnosis.data.trial.motion import Motion, spread
+from hil.diagnosis.data.trial.motion import STEP_S, Motion, spread
 from hil.diagnosis.data.units import DEG, RPM
 
 G = 9.80665
@@ -78,7 +78,7 @@ def speed_against_speed(motion: Motion) -> list[Finding]:
     spread = 1.48 * float(np.median(np.abs(ratios - ratio))) / max(abs(ratio), 1e-9)
     if spread > _SPREAD:
         return []
-    got = f"speed_mps is {abs(ratio):.4g} times the wheels' (over {int(both.sum()):,} samples of 20 ms)"
+    got = f"speed_mps is {abs(ratio):.4g} times the wheels' (median over {both.sum() * STEP_S:.3g} s)"
     found = []
     if not near(abs(ratio), 1.0, 0.06):
         for unit, factor in GROUND.items():
@@ -134,7 +134,7 @@ def accelerometer(motion: Motion) -> list[Finding]:
     size, source = abs(seen.factor), "the wheels'" if reference == "wheels" else "speed_mps'"
     got = (
         f"ax_mps2 is {seen.factor:.4g} times {source} acceleration (correlation {seen.correlation:.2f} over "
-        f"{seen.samples:,} samples of 20 ms)"
+        f"{seen.samples * STEP_S:.3g} s)"
     )
     turned = seen.factor < 0.0
     wrong = {("ax_mps2", unit): factor for unit, factor in ACCELERATION.items()}
@@ -146,7 +146,7 @@ def accelerometer(motion: Motion) -> list[Finding]:
     hard = float(np.nanpercentile(np.abs(accel), 99.0)) > _MOST_MPS2
     if len(fitting) > 1:  # rpm and g differ by 3 %: no car brakes as hard as wheels in rpm would say
         fitting = [key for key in fitting if (key[0] == "wheel") == hard]
-    sign = " and its sign is turned: ax_mps2 is negative in braking" if turned else ""
+    sign = "; and its sign is turned (ax_mps2 is negative in braking): sign = -1 in the --map" if turned else ""
     for channel, unit in fitting:
         names = tuple(name for name in WHEEL_SPEED if name in motion.raw) if channel == "wheel" else (channel,)
         advice = unit_advice(names, unit) + sign

@@ -162,7 +162,7 @@ def test_a_wrong_unit_or_sign_across_the_car_is_refused(names: str, factor: floa
     table = _bend()
     half = 0.5 * (1.0 - share)
     left, right = WHEEL_SPEED[::2], WHEEL_SPEED[1::2]
-    table = _times(table, IMU[1:] + ("steer_rad",), share)
+    table = _times(table, (*IMU[1:], "steer_rad"), share)
     mean = {(a, b): (table[a], table[b]) for a, b in zip(left, right, strict=True)}
     for (a, b), (x, y) in mean.items():
         table = table | {a: x + half * (y - x), b: y - half * (y - x)}
@@ -261,3 +261,9 @@ def test_where_sensors_are_compared_with_the_motion_their_scale_is_a_cause_and_a
 def test_torques_of_motors_before_a_gear_are_remarked_on() -> None:
     (passed,) = on_trial([_log(_times(_straight("motors"), MOTOR_TORQUE + MOTOR_DEMAND, 1.0 / 9.0))], CAR)
     assert any("behind a gear give its ratio" in text for text in passed.remarks)
+
+
+def test_an_accelerometer_and_pressures_in_wrong_units_are_told_at_once() -> None:
+    table = _times(_times(_straight(), "ax_mps2", 1.0 / G), PRESSURE + PRESSURE_DEMAND, 1e-5)
+    with pytest.raises(UnusableError, match=r"ax_mps2 \[g\](.|\n)*pressure_fl_pa \[bar\]"):
+        on_trial([_log(table)], CAR)
