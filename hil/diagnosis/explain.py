@@ -11,10 +11,12 @@ from threadpoolctl import threadpool_limits
 from dbc.database import parse_database
 from hil.diagnosis.data.axle_torques import with_both_axles
 from hil.diagnosis.data.channel_map import load_map
-from hil.diagnosis.data.log import Log
+from hil.diagnosis.data.log import Log, UnusableError
 from hil.diagnosis.data.masks import is_straight_line
+from hil.diagnosis.data.paired_wheels import with_paired_wheels
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.data.read import from_frame, read_logs
+from hil.diagnosis.data.trial.run import on_trial
 from hil.diagnosis.detection.result import Progress, Settings
 from hil.diagnosis.detection.stepwise import diagnose
 from hil.diagnosis.manoeuvres.coast_down import CoastDown, coast_down
@@ -23,12 +25,18 @@ from hil.diagnosis.manoeuvres.stops import stops_of
 from hil.diagnosis.result.answer import Answer, answer
 from hil.diagnosis.result.cross_validation import confirmed, held_out_error
 from hil.diagnosis.result.extended_car import extended_car, write_extended_car
+from hil.diagnosis.result.goodness_of_fit import goodness_of_fit
 from hil.diagnosis.result.residual_patterns import residual_patterns
 from hil.diagnosis.sensor_consistency.check import Consistency, check, why_not_simulatable
 from hil.diagnosis.sensor_consistency.motion import measured_channels
 from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.vehicle.load import load_vehicle
 from hil.diagnosis.vehicle.spec import Vehicle
+from hil.diagnosis.vehicle.trial_car import car_of
+
+_SHIPPED_CAR = "paper_car"
+"""Name of the vehicle set that our own recordings are of."""
+_UNSTATED = "no vehicle is given: taken as the car that comes with brakebench"
 
 _INERTIAL = {"ax_mps2", "ay_mps2", "yaw_rate_rad_s"}
 """Channels that can be compared with the motion."""
@@ -48,7 +56,7 @@ def explain(
     Parameters
     ----------
     logs : a data frame (or mapping of columns) in the canonical table, a path, or a list of either.
-    vehicle : flat vehicle set as a file or mapping; None is the shipped car.
+    vehicle : flat vehicle set as a file or mapping; None is the shipped car, for our own recordings alone.
     channel_map, database, about : another car's channel map, its DBC, and ``logs.toml``.
     extend : extension file whose model is the starting point.
     out : folder for the extension file; without it none is written.
@@ -61,15 +69,19 @@ def explain(
     """
     report = progress or (lambda _: None)
     folder = None if out is None else Path(out)
-    car = load_vehicle(shipped(Path(vehicle), "vehicle") if isinstance(vehicle, str | Path) else vehicle)
-    read = with_both_axles(_logs(logs, car, channel_map, database, about))
+    car = _vehicle(vehicle)
+    read = with_both_axles(with_paired_wheels(_logs(logs, car, channel_map, database, about, vehicle is not None)))
+    if vehicle is None:
+        _refuse_another_car(read)
     radius_m = float(car.parameters.wheel.rolling_radius_m)
     is_inertial = bool(measured_channels(read) & _INERTIAL)
     coasting = coast_down(read, car, extend, None if is_inertial else folder)
     stops = [stop.as_json() for stop in stops_of(read, radius_m)]
     if coasting is not None and not is_inertial:
         return replace(coasting, json=coasting.json | {"stops": stops})
-    if why := why_not_simulatable(read, radius_m):
+    why = why_not_simulatable(read, radius_m)
+    read = on_trial(read, car_of(car), simulated=not why)
+    if why:
         road_load = {} if coasting is None else {"coast_down": coasting.json["coast_down"]}
         compared = check(read, car, why, extend, folder, report)
         return replace(compared, json=compared.json | {"stops": stops} | road_load)
@@ -83,10 +95,11 @@ def explain(
         report("held-out error by cross-validation")
         diagnosis = confirmed(diagnosis, report)
         errors, patterns = held_out_error(diagnosis), residual_patterns(diagnosis)
+        fits = goodness_of_fit(diagnosis)
     extension = None if folder is None else write_extended_car(diagnosis, folder)
     of_logs = (f"{one.log.name}: {text}" for one in dataset.recordings for text in one.log.remarks)
     remarks = [*car.remarks, *notes, *of_logs, *diagnosis.remarks]
-    found = answer(diagnosis, errors, patterns, extension, remarks, folder)
+    found = answer(diagnosis, errors, patterns, fits, extension, remarks, folder)
     return replace(found, json=found.json | {"stops": stops})
 
 
@@ -96,8 +109,27 @@ def shipped(path: Path, kind: str) -> Path:
     return ours if not path.suffix and not path.exists() and ours.exists() else path
 
 
+def _vehicle(vehicle: Path | str | Mapping[str, Any] | None) -> Vehicle:
+    if vehicle is None or str(vehicle) == _SHIPPED_CAR:
+        return load_vehicle(None)
+    return load_vehicle(shipped(Path(vehicle), "vehicle") if isinstance(vehicle, str | Path) else vehicle)
+
+
+def _refuse_another_car(logs: Sequence[Log]) -> None:
+    """Refuse files that nobody said whose they are: only recordings of our own bus are of the shipped car."""
+    others = [log.name for log in logs if log.another_car]
+    if others:
+        more = f" and {len(others) - 1} more" if len(others) > 1 else ""
+        raise UnusableError(
+            f"{others[0]}{more}: not a recording of brakebench's own bus and no vehicle is given; its numbers (mass, "
+            "rolling radius, brake gains) decide what counts as wrong: give --vehicle SET.toml with mass_kg, "
+            "wheelbase_m, cog_to_front_axle_m, rolling_radius_m, brake_gain_front_nm_pa and brake_gain_rear_nm_pa "
+            f"(docs/vehicle-set.md), or --vehicle {_SHIPPED_CAR} if it is the car that comes with brakebench"
+        )
+
+
 def _logs(
-    logs: Any, car: Vehicle, channel_map: Path | None, database: Path | None, about: Path | None
+    logs: Any, car: Vehicle, channel_map: Path | None, database: Path | None, about: Path | None, stated: bool
 ) -> Sequence[Log]:
     items = list(logs) if isinstance(logs, list | tuple) else [logs]
     mapped = None if channel_map is None else load_map(shipped(Path(channel_map), "map"))
@@ -112,5 +144,6 @@ def _logs(
         elif isinstance(item, str | Path):
             read += read_logs([Path(item)], dbc, mapped, None if about is None else Path(about), constant)
         else:
-            read.append(from_frame(item, f"dataframe {k}" if len(items) > 1 else "dataframe"))
+            frame = from_frame(item, f"dataframe {k}" if len(items) > 1 else "dataframe")
+            read.append(frame if stated else replace(frame, remarks=(*frame.remarks, _UNSTATED)))
     return read

@@ -22,8 +22,8 @@ _WHEEL = {
 }
 
 
-def own_channels(log: DecodedLog, torque_constant_nm_a: float) -> dict[str, tuple[Floats, Floats]]:
-    """Times (s) and SI values by channel; the motors' torque is their current times the torque constant."""
+def _signals(torque_constant_nm_a: float) -> dict[str, tuple[str, float]]:
+    """Channel and factor to SI by signal."""
     names = dict(_SINGLE)
     for wheel in WHEELS:
         axle = "FRONT" if wheel[0] == "f" else "REAR"
@@ -31,8 +31,20 @@ def own_channels(log: DecodedLog, torque_constant_nm_a: float) -> dict[str, tupl
             names[signal.format(axle=axle, wheel=wheel.upper())] = (channel.format(w=wheel), factor)
         current = f"MOTOR_STATUS_{axle}.CURRENT_{wheel.upper()}"
         names[current] = (f"motor_torque_{wheel}_nm", torque_constant_nm_a)
+    return names
+
+
+def own_sources() -> tuple[dict[str, str], dict[str, str]]:
+    """Signals and their units by channel."""
+    signals = {channel: signal for signal, (channel, _) in _signals(1.0).items()}
+    units = {channel: {_BAR: "bar", 0.01: "%"}.get(factor, "") for channel, factor in _signals(1.0).values()}
+    return signals, {c: "A" if ".CURRENT_" in signals[c] else unit for c, unit in units.items()}
+
+
+def own_channels(log: DecodedLog, torque_constant_nm_a: float) -> dict[str, tuple[Floats, Floats]]:
+    """Times (s) and SI values by channel; the motors' torque is their current times the torque constant."""
     series = {}
-    for signal, (channel, factor) in names.items():
+    for signal, (channel, factor) in _signals(torque_constant_nm_a).items():
         if signal in log.columns and len(log.columns[signal].rows) > 1:
             t, values = log.series(signal)
             order = np.argsort(t, kind="stable")

@@ -8,19 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from hil.diagnosis.data.log import CHANNELS, Floats, UnusableError
+from hil.diagnosis.data.units import ROAD_SPEED, TO_SI, units_of, written
 
 Series = tuple[Floats, Floats]
 """Times (s) and values of one signal, both (samples,)."""
-_TO_SI: dict[str, tuple[float, float]] = {
-    "": (1.0, 0.0), "1": (1.0, 0.0), "s": (1.0, 0.0), "ms": (1e-3, 0.0), "us": (1e-6, 0.0), "ns": (1e-9, 0.0),
-    "rad/s": (1.0, 0.0), "deg/s": (0.017453292519943295, 0.0), "rpm": (0.10471975511965977, 0.0),
-    "1/min": (0.10471975511965977, 0.0), "m/s2": (1.0, 0.0), "m/s^2": (1.0, 0.0), "m/s²": (1.0, 0.0),
-    "g": (9.80665, 0.0), "pa": (1.0, 0.0), "kpa": (1e3, 0.0), "mpa": (1e6, 0.0), "bar": (1e5, 0.0),
-    "psi": (6894.757293168, 0.0), "nm": (1.0, 0.0), "n m": (1.0, 0.0), "rad": (1.0, 0.0),
-    "deg": (0.017453292519943295, 0.0), "%": (0.01, 0.0), "m/s": (1.0, 0.0), "km/h": (1.0 / 3.6, 0.0),
-    "kmph": (1.0 / 3.6, 0.0), "kph": (1.0 / 3.6, 0.0), "mph": (0.44704, 0.0), "k": (1.0, 0.0), "degc": (1.0, 273.15),
-}  # fmt: skip
-"""Unit -> factor and offset to SI."""
 
 
 def to_si(unit: str, where: str) -> tuple[float, float]:
@@ -31,19 +22,44 @@ def to_si(unit: str, where: str) -> tuple[float, float]:
     UnusableError
         Unknown unit.
     """
-    conversion = _TO_SI.get(unit.strip().lower())
+    conversion = TO_SI.get(unit.strip().lower())
     if conversion is None:
-        raise UnusableError(f"{where}: unknown unit {unit!r}; expected one of {', '.join(u for u in _TO_SI if u)}")
+        raise UnusableError(f"{where}: unknown unit {unit!r}; expected one of {', '.join(u for u in TO_SI if u)}")
     return conversion
+
+
+def channel_to_si(channel: str, unit: str, where: str, scaled: bool = False) -> tuple[float, float]:
+    """As `to_si`, of a unit that measures what the channel holds.
+
+    Parameters
+    ----------
+    scaled : whether a scale is given besides: a wheel speed as a speed of the road needs one over the rolling radius.
+
+    Raises
+    ------
+    UnusableError
+        Unknown unit, or one of another quantity.
+    """
+    factor, offset = to_si(unit, where)
+    units, name = units_of(channel), unit.strip().lower()
+    if not name or name in units or scaled:
+        return factor, offset
+    if channel.startswith("wheel_speed") and name in ROAD_SPEED:
+        raise UnusableError(
+            f"{where}: {unit!r} is a speed of the road, expected one of the wheel (rad/s, rpm, ...): divide it by the "
+            f'rolling radius in a --map, [{channel}] unit = "{unit}", scale = 1 / radius_m (3.2258 for 0.31 m)'
+        )
+    raise UnusableError(f"{where}: {unit!r} is no unit of {channel}; expected {', '.join(map(written, units))}")
 
 
 @dataclass(frozen=True)
 class Source:
-    """Signal of a channel: SI = factor * value + offset."""
+    """Signal of a channel: SI = factor * value + offset; ``unit`` as the map names it."""
 
     signal: str
     factor: float
     offset: float
+    unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -95,7 +111,8 @@ def load_map(path: Path) -> ChannelMap:
         unknown = set(entry) - {"signal", "unit", "scale", "sign", "offset", "source"}
         if "signal" not in entry or unknown:
             raise UnusableError(f"{where}: expected signal, unit, scale, sign, offset, got {', '.join(entry)}")
-        factor, offset = to_si(str(entry.get("unit", "")), where)
+        unit = str(entry.get("unit", ""))
+        factor, offset = channel_to_si(target, unit, where, "scale" in entry)
         factor *= float(entry.get("scale", 1.0)) * float(entry.get("sign", 1.0))
-        entries[target] = Source(str(entry["signal"]), factor, offset + float(entry.get("offset", 0.0)))
+        entries[target] = Source(str(entry["signal"]), factor, offset + float(entry.get("offset", 0.0)), unit)
     return ChannelMap(entries, None if time is None else str(time))

@@ -1,12 +1,14 @@
 """The canonical table of a log: SI channels over one time base, and the checks it has to pass."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hil.diagnosis.data.channels_read import ChannelRead, channel_read
+from hil.diagnosis.data.hints import expected_instead, unit_hint
 from hil.errors import BrakebenchError
 
 Floats = NDArray[Any]  # float64 unless a docstring says otherwise
@@ -60,6 +62,10 @@ class Log:
     direction : +1 or -1 along the road.
     disc_temperature_k : at the start, K; None if unknown.
     remarks : what was done to the data, for the report.
+    columns : names of all columns or signals of the file, used or not.
+    read : what was read of each channel.
+    another_car : whether it is a file that is no recording of our own bus.
+    copied : channels that are another wheel's (`hil.diagnosis.data.paired_wheels`), not measured ones.
     """
 
     name: str
@@ -68,14 +74,39 @@ class Log:
     direction: int = 1
     disc_temperature_k: float | None = None
     remarks: tuple[str, ...] = field(default=())
+    columns: tuple[str, ...] = ()
+    read: tuple[ChannelRead, ...] = ()
+    another_car: bool = False
+    copied: frozenset[str] = frozenset()
 
     def has(self, *names: str) -> bool:
         """Whether the log has all these channels."""
         return all(name in self.channels for name in names)
 
 
-def make_log(name: str, t_s: Floats, channels: Mapping[str, Floats], remarks: tuple[str, ...] = ()) -> Log:
+@dataclass(frozen=True, eq=False)
+class Origin:
+    """Where a channel came from: its column or signal, the unit taken, and its own stamps and values if it has any.
+
+    ``t_s`` (n,), s, and ``values`` (n,), SI, are as they came, before they were put on the stamps of the log.
+    """
+
+    column: str
+    unit: str = ""
+    t_s: Floats | None = None
+    values: Floats | None = None
+
+
+def make_log(
+    name: str, t_s: Floats, channels: Mapping[str, Floats], remarks: tuple[str, ...] = (),
+    origins: Mapping[str, Origin] | None = None, columns: Sequence[str] = (),
+) -> Log:  # fmt: skip
     """A checked log: unknown columns, repeated times and implausible values are left out, with a remark.
+
+    Parameters
+    ----------
+    origins : by channel; None where the channels are the columns.
+    columns : names of all columns that were seen; empty where the channels are all.
 
     Raises
     ------
@@ -85,14 +116,34 @@ def make_log(name: str, t_s: Floats, channels: Mapping[str, Floats], remarks: tu
     t_s = np.asarray(t_s, np.float64)
     known = {key: np.asarray(value, np.float64) for key, value in channels.items() if key in CHANNELS}
     notes = list(remarks)
+    columns = tuple(columns) or tuple(channels)
     unknown = sorted(set(channels) - set(known))
     if unknown:
         notes.append(f"unknown columns are left out: {', '.join(unknown[:12])}")
+    accounts = [_account(key, value, t_s, (origins or {}).get(key)) for key, value in known.items()]
+    notes += [f"{one.channel} (column {one.column}) has no value at all" for one in accounts if not one.samples]
     known = {key: value for key, value in known.items() if np.isfinite(value).any()}
     if not known:
-        raise UnusableError(f"{name}: no channel with values; expected some of {', '.join(CHANNELS)}")
+        raise UnusableError(f"{name}: no channel with values; {expected_instead(columns, CHANNELS)}")
     if not np.isfinite(t_s).all():
         raise UnusableError(f"{name}: {int((~np.isfinite(t_s)).sum())} values of t_s are not finite")
+    t_s, known = _increasing(name, t_s, known, notes)
+    known = {key: _plausible(name, key, value, notes) for key, value in known.items()}
+    return Log(name, t_s, known, remarks=tuple(notes), columns=columns, read=tuple(accounts))
+
+
+def _account(channel: str, values: Floats, t_s: Floats, origin: Origin | None) -> ChannelRead:
+    if origin is None:
+        return channel_read(channel, channel, "", t_s, values)
+    if origin.t_s is not None and origin.values is not None:
+        t_s, values = origin.t_s, origin.values
+    return channel_read(channel, origin.column, origin.unit, t_s, values)
+
+
+def _increasing(
+    name: str, t_s: Floats, known: dict[str, Floats], notes: list[str]
+) -> tuple[Floats, dict[str, Floats]]:  # fmt: skip
+    """Times that increase, with the channels at them; ``notes`` tell of rows left out."""
     steps = np.diff(t_s)
     if len(steps) and (steps < 0.0).any():
         at = int(np.argmax(steps < 0.0))
@@ -110,17 +161,20 @@ def make_log(name: str, t_s: Floats, channels: Mapping[str, Floats], remarks: tu
         )
     if len(t_s) / length_s < _SLOWEST_HZ:
         raise UnusableError(f"{name}: {len(t_s) / length_s:.2f} samples a second; expected {_SLOWEST_HZ:g} or more")
-    for key, value in known.items():
-        low, high = next(limits for stem, limits in _PLAUSIBLE.items() if key.startswith(stem))
-        outside = (value < low) | (value > high)
-        if outside.mean() > 0.01:
-            raise UnusableError(
-                f"{name}: {key} goes from {np.nanmin(value):g} to {np.nanmax(value):g}; expected {low:g} to {high:g}: "
-                "wrong unit? The column's name gives its unit"
-            )
-        if outside.any():
-            value = value.copy()
-            value[outside] = np.nan
-            known[key] = value
-            notes.append(f"{int(outside.sum())} implausible values of {key} are left out")
-    return Log(name, t_s, known, remarks=tuple(notes))
+    return t_s, known
+
+
+def _plausible(name: str, key: str, value: Floats, notes: list[str]) -> Floats:
+    """Values of a channel without the implausible ones; ``notes`` tell of them."""
+    low, high = next(limits for stem, limits in _PLAUSIBLE.items() if key.startswith(stem))
+    outside = (value < low) | (value > high)
+    if outside.mean() > 0.01:
+        raise UnusableError(
+            f"{name}: {key} goes from {np.nanmin(value):g} to {np.nanmax(value):g}; expected {low:g} to {high:g}: "
+            f"wrong unit? {unit_hint(key, value, low, high)}"
+        )
+    if outside.any():
+        value = value.copy()
+        value[outside] = np.nan
+        notes.append(f"{int(outside.sum())} implausible values of {key} are left out")
+    return value

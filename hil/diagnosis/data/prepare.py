@@ -9,6 +9,7 @@ import numpy as np
 from hil.diagnosis.data.clock import clock_origin_s, timestamp_jitter_s
 from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Dataset, Recording, Segment
 from hil.diagnosis.data.grid import averaged, has_sample, resampled, smoothed, without_gaps
+from hil.diagnosis.data.hints import nothing_shows_force, nothing_shows_speed
 from hil.diagnosis.data.log import (
     MOTOR_DEMAND,
     MOTOR_TORQUE,
@@ -20,6 +21,7 @@ from hil.diagnosis.data.log import (
     UnusableError,
 )
 from hil.diagnosis.data.masks import SETTLE_S, Mask, after_wheel_lock, known_pressures, moving_and_resting
+from hil.diagnosis.data.paired_wheels import copied_axles
 from plant.vectors import CUT, INPUT, U
 
 STRAIGHT_RAD = 0.02  # of the steering wheel
@@ -56,15 +58,12 @@ def prepare(logs: Sequence[Log], radius_m: float, unstated: Collection[str] = ()
     logs = _without_contradicted_demands(logs)
     common = set.intersection(*(set(log.channels) for log in logs))
     if not (set(WHEEL_SPEED) & common or "speed_mps" in common):
-        raise UnusableError("neither wheel speeds nor a speed in every log: nothing shows how the car moved")
+        raise UnusableError(nothing_shows_speed(logs))
     pressure, pressure_demand, torque, torque_demand = (
         set(names) <= common for names in (PRESSURE, PRESSURE_DEMAND, MOTOR_TORQUE, MOTOR_DEMAND)
     )
     if not (pressure or pressure_demand or torque or torque_demand):
-        raise UnusableError(
-            "neither pressures nor motor torques, measured or demanded: nothing shows what braked the car; "
-            "a speed alone serves where the car mostly coasts, for 10 s or more at a time (coast-downs)"
-        )
+        raise UnusableError(nothing_shows_force(logs))
     mask = CUT.zeros()
     mask[CUT.slice("pressure")] = 1.0 if pressure else 0.0
     mask[CUT.slice("motor_torque")] = 1.0 if torque else 0.0
@@ -197,6 +196,8 @@ def _recording(log: Log, groups: Sequence[str], stride: int, radius_m: float, tr
     compared = {}
     if "pressure" in groups and "pressure" not in tracked:
         compared = known_pressures(averaged(rows.inputs[:, INPUT.slice("pressure_demand_pa")], stride), sample_s)
+    for kind in {"pressure", "motor"} & set(groups):
+        compared |= {f"{kind}.left-right {axle}": np.zeros(len(grips)) for axle in copied_axles(log, kind)}
     charge = log.channels.get("soc")
     return Recording(
         log,

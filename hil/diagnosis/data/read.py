@@ -1,8 +1,7 @@
 """Log files of any kind (CAN logs, CSV, Parquet, MF4, MAT) into the canonical table."""
 
-import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,16 +9,21 @@ from typing import Any
 import numpy as np
 
 from dbc.database import Database
-from hil.diagnosis.data.brakebench_signals import own_channels
-from hil.diagnosis.data.channel_map import ChannelMap, to_si
-from hil.diagnosis.data.log import CHANNELS, Floats, Log, UnusableError, make_log
+from hil.diagnosis.data.brakebench_signals import own_channels, own_sources
+from hil.diagnosis.data.channel_map import ChannelMap, channel_to_si
+from hil.diagnosis.data.channels_read import GAP_S
+from hil.diagnosis.data.columns import Column, by_name, with_unit
+from hil.diagnosis.data.hints import expected_instead
+from hil.diagnosis.data.log import CHANNELS, Floats, Log, Origin, UnusableError, make_log
+from hil.diagnosis.data.table_text import read_text_table
+from hil.diagnosis.data.time_column import NAMES, times_s
 from hil.log import DecodedLog, decode_log, log_format, read_log
 
 _GRID_S = 0.01
 _TABLES = (".csv", ".parquet", ".mf4", ".mdf", ".mat")
-_WITH_UNIT = re.compile(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*")
+_CSV_FRAMES = ("csv", "python_can_csv", "gvret")
+"""Formats of frames with the suffix of a table; rows of numbers between tabs look like other logs of frames."""
 _FRAMES = {"channel", "id", "extended", "length", "data"}
-_HOLD_S = 0.25
 
 
 def read_logs(
@@ -80,15 +84,18 @@ def read_one(
     torque_constant_nm_a: float = 1.0,
 ) -> Log:  # fmt: skip
     """Read one log: a table by its suffix and header, else a CAN log."""
-    columns = None if database is not None else _table_columns(path)
+    used = {*CHANNELS, *NAMES} if channel_map is None else {*channel_map.sources(), channel_map.time or "t_s"}
+    columns = None if database is not None else _table_columns(path, used)
     if columns is not None:
-        return from_columns(path.name, columns, channel_map)
+        return replace(from_columns(path.name, columns, channel_map), another_car=True)
     decoded = decode_log(read_log(path), database)
     if channel_map is not None:
         series = {name: decoded.series(name) for name in channel_map.sources() if name in decoded.columns}
-        return _gridded(
-            path.name, {target: channel_map.convert(target, series) for target in channel_map.targets(series)}
-        )
+        targets = channel_map.targets(series)
+        units = {target: channel_map.entries[target].unit for target in targets}
+        signals = {target: channel_map.entries[target].signal for target in targets}
+        converted = {target: channel_map.convert(target, series) for target in targets}
+        return replace(_gridded(path.name, converted, signals, units, tuple(decoded.columns)), another_car=True)
     if database is not None:
         raise UnusableError(f"{path.name}: another car's DBC needs --map CHANNELS.toml, its signals by channel")
     return _brakebench_log(path.name, decoded, torque_constant_nm_a)
@@ -98,119 +105,116 @@ def _brakebench_log(name: str, decoded: DecodedLog, torque_constant_nm_a: float)
     series = own_channels(decoded, torque_constant_nm_a)
     if not series:
         raise UnusableError(f"{name}: no signal of our own DBC in it; give --dbc and --map for another car's log")
-    return _gridded(name, series)
+    signals, units = own_sources()
+    return _gridded(name, series, signals, units, tuple(decoded.columns))
 
 
-def _gridded(name: str, series: Mapping[str, tuple[Floats, Floats]]) -> Log:
-    """Signals with their own time stamps on one grid: linear interpolation, NaN over gaps of 0.25 s."""
+def _gridded(
+    name: str, series: Mapping[str, tuple[Floats, Floats]], signals: Mapping[str, str], units: Mapping[str, str],
+    columns: Sequence[str],
+) -> Log:  # fmt: skip
+    """Channels with their own time stamps on one grid: linear interpolation, NaN over gaps of 0.25 s.
+
+    ``signals`` and ``units`` are what each channel was made of, ``columns`` the names of all signals.
+    """
     if not series:
-        raise UnusableError(f"{name}: none of the mapped signals is in the log")
+        raise UnusableError(f"{name}: none of the mapped signals is in the log; {expected_instead(columns, CHANNELS)}")
     begin = max(min(float(t[0]) for t, _ in series.values()), 0.0)
     end = max(float(t[-1]) for t, _ in series.values())
     grid = np.arange(begin, end, _GRID_S)
-    columns = {}
+    values_of = {}
     for channel, (t, v) in series.items():
         values = np.interp(grid, t, v, left=np.nan, right=np.nan)
         nearest = np.clip(np.searchsorted(t, grid), 1, len(t) - 1) if len(t) > 1 else np.zeros(len(grid), int)
         gap = t[nearest] - t[nearest - 1] if len(t) > 1 else np.full(len(grid), np.inf)
-        values[gap > _HOLD_S] = np.nan
-        columns[channel] = values
-    return make_log(name, grid - begin, columns)
+        values[gap > GAP_S] = np.nan
+        values_of[channel] = values
+    origins = {channel: Origin(signals[channel], units[channel], t, v) for channel, (t, v) in series.items()}
+    return make_log(name, grid - begin, values_of, origins=origins, columns=columns)
 
 
-def from_columns(name: str, columns: Mapping[str, tuple[Floats, str]], channel_map: ChannelMap | None = None) -> Log:
+def from_columns(name: str, columns: Mapping[str, Column], channel_map: ChannelMap | None = None) -> Log:
     """A log from columns and their units; an empty unit is that of the canonical name."""
-    time = next((key for key in ("t_s", "time_s", "time", "t", "timestamp") if key in columns), None)
-    if channel_map is not None and channel_map.time is not None:
-        time = channel_map.time if channel_map.time in columns else None
-    if time is None:
-        raise UnusableError(f"{name}: no column t_s; got {', '.join(list(columns)[:12])}")
-    factor, _ = to_si(columns[time][1], f"{name}: {time}")
-    t_s = columns[time][0] * factor
+    time, t_s, remarks = times_s(name, columns, None if channel_map is None else channel_map.time)
+    channels, origins = {}, {}
     if channel_map is not None:
-        series = {key: (t_s, values) for key, (values, _) in columns.items()}
-        mapped = {target: channel_map.convert(target, series)[1] for target in channel_map.targets(series)}
-        return make_log(name, t_s - t_s[0], mapped)
-    channels: dict[str, Floats] = {}
-    for key, (values, unit) in columns.items():
-        if key != time:
-            scale, offset = to_si(unit, f"{name}: {key}") if key in CHANNELS else (1.0, 0.0)
-            channels[key] = values * scale + offset
-    return make_log(name, t_s - t_s[0], channels)
+        series = {key: (t_s, column.values) for key, column in columns.items()}
+        for target in channel_map.targets(series):
+            source = channel_map.entries[target]
+            channels[target] = channel_map.convert(target, series)[1]
+            origins[target] = _origin(source.signal, source.unit, columns[source.signal], source.factor, source.offset)
+        if not channels:
+            wanted = ", ".join(source.signal for source in list(channel_map.entries.values())[:12])
+            seen = ", ".join(list(columns)[:20])
+            raise UnusableError(
+                f"{name}: none of the columns that --map names is there ({wanted}); columns seen: {seen}"
+            )
+    else:
+        for key, column in columns.items():
+            if key == time:
+                continue
+            scale, offset = 1.0, 0.0
+            if key in CHANNELS:
+                scale, offset = channel_to_si(key, column.unit, f"{name}: {key}")
+                origins[key] = _origin(key, column.unit, column, scale, offset)
+            channels[key] = column.values * scale + offset
+    return make_log(name, t_s, channels, tuple(remarks), origins, [key for key in columns if key != time])
+
+
+def _origin(name: str, unit: str, column: Column, factor: float, offset: float) -> Origin:
+    values = None if column.own_values is None else column.own_values * factor + offset
+    return Origin(name, unit, column.own_t_s, values)
 
 
 def from_frame(frame: Any, name: str = "dataframe") -> Log:
     """A log from a pandas or polars data frame, or any mapping of columns."""
     # iterating a polars frame gives its columns, not their names
-    return from_columns(name, {str(key): (np.asarray(frame[key], np.float64), "") for key in frame.keys()})  # noqa: SIM118
+    columns = ((str(key), frame[key]) for key in frame.keys())  # noqa: SIM118
+    named = ((key, Column(np.asarray(values, np.float64))) for key, values in columns if np.ndim(values) == 1)
+    return from_columns(name, dict(named))
 
 
-def _table_columns(path: Path) -> dict[str, tuple[Floats, str]] | None:
-    """Columns and their units; None where the file is a log of frames."""
+def _table_columns(path: Path, used: Collection[str]) -> dict[str, Column] | None:
+    """Columns by name, those ``used`` once each; None where the file is a log of frames."""
     suffix = path.suffix.lower()
-    if suffix == ".csv":
-        return None if path.exists() and log_format(path) is not None else _csv(path)
-    if suffix == ".parquet":
-        return _parquet(path)
-    if suffix in (".mf4", ".mdf"):
-        return _mdf(path)
-    if suffix == ".mat":
-        return _mat(path)
-    return None
+    if suffix == ".csv" and path.exists() and log_format(path) in _CSV_FRAMES:
+        return None
+    readers = {".csv": _csv, ".parquet": _parquet, ".mf4": _mdf, ".mdf": _mdf, ".mat": _mat}
+    columns = readers[suffix](path) if suffix in readers else None
+    return None if columns is None else by_name(str(path), columns, used)
 
 
-def _named(columns: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
-    """Columns and their units, which stand in brackets after the name."""
-    out = {}
-    for key, values in columns.items():
-        match = _WITH_UNIT.fullmatch(key)
-        out[match[1] if match else key] = (values, match[2] if match else "")
-    return out
+def _csv(path: Path) -> list[tuple[str, Column]]:
+    columns = []
+    for head, below, values in read_text_table(path):
+        name, unit = with_unit(head, below)
+        columns.append((name, Column(values, unit)))
+    return columns
 
 
-def _csv(path: Path) -> dict[str, tuple[Floats, str]] | None:
-    try:
-        with path.open(encoding="utf-8-sig") as file:
-            lines = file.readlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise UnusableError(f"{path}: cannot be read: {error}") from error
-    if not lines:
-        raise UnusableError(f"{path}: empty file; expected a header and rows")
-    at = 0
-    while lines[at].startswith("#") and at + 1 < len(lines) and lines[at + 1].startswith("#"):
-        at += 1
-    header = [cell.strip().strip('"') for cell in lines[at].lstrip("# ").split(",")]
-    rows = [line for line in lines[at + 1 :] if line.strip() and not line.startswith("#")]
-    try:
-        table = np.genfromtxt(rows, delimiter=",", dtype=np.float64, ndmin=2)
-    except ValueError as error:
-        raise UnusableError(f"{path}: rows of different length: {str(error).splitlines()[0]}") from error
-    if table.size == 0 or table.shape[1] != len(header):
-        got = table.shape[1] if table.size else 0
-        raise UnusableError(f"{path}: {len(header)} names in the header, {got} columns; expected as many")
-    return _named({name: table[:, k] for k, name in enumerate(header)})
-
-
-def _parquet(path: Path) -> dict[str, tuple[Floats, str]] | None:
+def _parquet(path: Path) -> list[tuple[str, Column]] | None:
     import pyarrow as pa
     import pyarrow.parquet
 
     try:
-        table = pyarrow.parquet.read_table(path)
+        with pyarrow.parquet.ParquetFile(path) as file:  # read_table refuses a head that stands twice
+            table = file.read()
     except (pa.ArrowException, OSError) as error:
         raise UnusableError(f"{path}: not a Parquet file: {str(error).splitlines()[0]}") from error
     if set(table.column_names) >= _FRAMES:
         return None
-    columns: dict[str, tuple[Floats, str]] = {}
-    for item in table.schema:
-        if pa.types.is_floating(item.type) or pa.types.is_integer(item.type):
-            unit = (item.metadata or {}).get(b"unit", b"").decode()
-            values = np.asarray(table[item.name].to_numpy(zero_copy_only=False), np.float64)
-            columns |= {key: (v, unit or u) for key, (v, u) in _named({item.name: values}).items()}
+    columns = []
+    for item, content in zip(table.schema, table.columns, strict=True):
+        if pa.types.is_timestamp(item.type):
+            content, item = content.cast(pa.timestamp("ns")).cast(pa.int64()), item.with_metadata({"unit": "ns"})
+        elif not (pa.types.is_floating(item.type) or pa.types.is_integer(item.type)):
+            continue
+        name, unit = with_unit(item.name, (item.metadata or {}).get(b"unit", b"").decode())
+        columns.append((name, Column(np.asarray(content.to_numpy(), np.float64), unit)))
     return columns
 
 
-def _mdf(path: Path) -> dict[str, tuple[Floats, str]] | None:
+def _mdf(path: Path) -> list[tuple[str, Column]] | None:
     try:
         import asammdf
     except ImportError as error:
@@ -224,14 +228,18 @@ def _mdf(path: Path) -> dict[str, tuple[Floats, str]] | None:
             ]
     except Exception as error:  # asammdf raises many kinds on a damaged block
         raise UnusableError(f"{path}: asammdf cannot read it: {error}") from error
+    signals = [s for s in signals if len(s.samples)]
     if not signals:
         raise UnusableError(f"{path}: no numeric signal in it")
-    longest = max(signals, key=lambda s: len(s.timestamps)).timestamps
-    columns = {s.name: (np.interp(longest, s.timestamps, s.samples.astype(np.float64)), s.unit) for s in signals}
-    return {"t_s": (np.asarray(longest, np.float64), ""), **columns}
+    longest = np.asarray(max(signals, key=lambda s: len(s.timestamps)).timestamps, np.float64)
+    columns = [("t_s", Column(longest, "s"))]
+    for s in signals:
+        own = s.samples.astype(np.float64)
+        columns.append((s.name, Column(np.interp(longest, s.timestamps, own), s.unit, s.timestamps, own)))
+    return columns
 
 
-def _mat(path: Path) -> dict[str, tuple[Floats, str]]:
+def _mat(path: Path) -> list[tuple[str, Column]]:
     from scipy.io import loadmat
 
     try:
@@ -239,7 +247,7 @@ def _mat(path: Path) -> dict[str, tuple[Floats, str]]:
     except Exception as error:  # scipy raises many kinds, NotImplementedError for version 7.3
         raise UnusableError(f"{path}: scipy cannot read it (version 7.3? save with -v7): {error}") from error
     vectors = {k: np.asarray(v, np.float64) for k, v in content.items() if not k.startswith("__") and _numeric(v)}
-    return _named(vectors)
+    return [(with_unit(key)[0], Column(values, with_unit(key)[1])) for key, values in vectors.items()]
 
 
 def _numeric(value: Any) -> bool:

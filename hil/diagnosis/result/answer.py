@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hil.diagnosis.data.channels_read import channels_read
 from hil.diagnosis.detection.candidates import inseparable_forward
 from hil.diagnosis.detection.nonparametric import BasisFunction
 from hil.diagnosis.detection.profile_fit import delta_criterion, rival_hypotheses
@@ -18,10 +19,13 @@ from hil.diagnosis.isolation.experiment import (
 from hil.diagnosis.isolation.groups import IsolabilityGroup
 from hil.diagnosis.result.causes import candidate_name, causes_and_rivals, first_isolability_group, named_effects
 from hil.diagnosis.result.cross_validation import HeldOutError
-from hil.diagnosis.result.headline import headline
+from hil.diagnosis.result.goodness_of_fit import ChannelFit
+from hil.diagnosis.result.headline import headline, not_described
 from hil.diagnosis.result.moved_numbers import MovedNumber, moved_numbers
 from hil.diagnosis.result.residual_patterns import WORDS, ResidualPattern
 
+NOT_DESCRIBED = "model_does_not_describe"
+"""Verdict where a channel's free-run error is more than a model that describes the car makes."""
 _MAX_COMPARED = 5
 """Effects of an isolability group between which a discriminating manoeuvre is sought, at most."""
 
@@ -38,22 +42,27 @@ class Answer:
 
 
 def answer(
-    diagnosis: Diagnosis, held_out: list[HeldOutError], patterns: list[ResidualPattern], extension: str | None,
-    remarks: list[str], out: Path | None = None,
+    diagnosis: Diagnosis, held_out: list[HeldOutError], patterns: list[ResidualPattern], fits: list[ChannelFit],
+    extension: str | None, remarks: list[str], out: Path | None = None,
 ) -> Answer:  # fmt: skip
-    """Assemble the answer; discriminating manoeuvres are written into ``out``."""
+    """Assemble the answer; discriminating manoeuvres are written into ``out``.
+
+    Where the model does not describe the car, what it would name are rivals at most: it errs more than any of them.
+    """
     group = first_isolability_group(diagnosis)
     causes, rivals = causes_and_rivals(diagnosis, group)
     verdict = _verdict(diagnosis, causes, rivals, group)
     moved = moved_numbers(diagnosis)
-    fit = getattr(diagnosis, "fit", None)
+    misfits = [one for one in fits if not one.described]
+    if misfits:
+        verdict, rivals, causes = NOT_DESCRIBED, [*causes, *rivals], []
     content = {
         "verdict": verdict,
-        "headline": headline(verdict, causes, rivals, moved),
+        "headline": not_described(misfits, rivals) if misfits else headline(verdict, causes, rivals, moved),
         "causes": causes,
         "rivals": rivals,
         "moved_numbers": [one.as_json() for one in moved],
-        "goodness_of_fit": fit,
+        "goodness_of_fit": [one.as_json() for one in fits],
         "undetectable_effects": diagnosis.undetectable_effects,
         "discriminating_manoeuvres": (
             _manoeuvres(diagnosis, rivals, out) if verdict == "cannot_tell_apart" else []
@@ -72,6 +81,7 @@ def answer(
         "extension": extension,
         "missing": list(diagnosis.dataset.missing_channels),
         "remarks": remarks,
+        "channels_read": channels_read(recording.log for recording in diagnosis.dataset.recordings),
     }  # fmt: skip
     return Answer(content, diagnosis, held_out, patterns, moved)
 

@@ -5,6 +5,7 @@ innovation with the size of the noise is a model that leaves nothing; a coloured
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
@@ -50,6 +51,15 @@ class ChannelFit:
     worst_log: str
     worst_s: tuple[float, float]
     worst_error: float
+
+    def as_json(self) -> dict[str, Any]:
+        """As printed."""
+        return {
+            "channel": self.channel, "unit": self.unit, "noise": self.noise, "error": self.error,
+            "unexplained": self.unexplained, "autocorrelation": self.autocorrelation, "whiteness_p": self.whiteness_p,
+            "worst_log": self.worst_log, "worst_from_s": self.worst_s[0], "worst_to_s": self.worst_s[1],
+            "worst_error": self.worst_error, "described": self.described,
+        }  # fmt: skip
 
     @property
     def described(self) -> bool:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from hil.diagnosis.result.goodness_of_fit import ChannelFit
 from hil.diagnosis.result.moved_numbers import MovedNumber, Value
 from hil.diagnosis.result.phrases import sentence
 
@@ -31,6 +32,19 @@ def headline(
         listed = "; ".join(others[:_MOST_RIVALS]) + (f"; and {more} more" if more > 0 else "")
         sentences.append(f"These logs cannot tell {'that' if len(causes) == 1 else 'these'} from: {listed}.")
     return " ".join(sentences)
+
+
+def not_described(misfits: Sequence[ChannelFit], rivals: Sequence[Mapping[str, Any]]) -> str:
+    """That the model does not describe the car: in which channel, by how much, where; and what comes nearest."""
+    worst = max(misfits, key=lambda one: one.unexplained)
+    since_s, until_s = worst.worst_s
+    told = (
+        f"The model does not describe this car: {worst.channel.replace('_', ' ')} is off by "
+        f"{short_text(worst.error)} {worst.unit}, {100.0 * worst.unexplained:.0f} % of what it does, most in "
+        f"{worst.worst_log} from {since_s:.1f} to {until_s:.1f} s."
+    )
+    nearest = "; ".join(_lower(sentence(one, interval=False)) for one in _by_effect(rivals)[:_MOST_RIVALS])
+    return f"{told} Nearest of what was tried, no cause: {nearest}." if nearest else told
 
 
 def _by_effect(rivals: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:

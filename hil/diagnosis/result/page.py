@@ -12,6 +12,7 @@ from hil.diagnosis.estimation.gauss_newton import Model
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.manoeuvres import stops
 from hil.diagnosis.result.answer import Answer
+from hil.diagnosis.result.channels_table import channels_section
 from hil.diagnosis.result.cross_validation import probabilities
 from hil.diagnosis.result.page_parts import EXTENDED, NOMINAL, binned_curve, comparison_panels, limits
 from hil.diagnosis.result.page_tables import goodness_of_fit, held_out, moved, numbers, scaled
@@ -44,7 +45,8 @@ def build_report(answer: Answer, sources: Sequence[str]) -> Report:
         numbers=tuple(numbers(answer)),
         sections=(
             _comparison(answer), moved(answer), *goodness_of_fit(answer), _patterns(answer), *_curves(answer),
-            _candidates(answer), held_out(answer), *stops.section(content.get("stops", ())), _limits(answer),
+            _candidates(answer), held_out(answer), *stops.section(content.get("stops", ())),
+            channels_section(content), _limits(answer),
         ),
         provenance={
             "logs": list(sources), "segments": len(diagnosis.dataset.segments),

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from hil.diagnosis.data.channels_read import channels_read
 from hil.diagnosis.data.log import (
     MOTOR_DEMAND,
     MOTOR_TORQUE,
@@ -138,6 +139,7 @@ def check(
         ],
         "estimates": estimates(models.get("braking"), vehicle),
         "needs": undetectable,
+        "channels_read": channels_read(logs),
     }  # fmt: skip
     return Consistency(content, motion, models, causes, errors)
 

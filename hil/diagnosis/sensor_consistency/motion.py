@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hil.diagnosis.data.hints import nothing_shows_speed
 from hil.diagnosis.data.log import PRESSURE, PRESSURE_DEMAND, WHEEL_SPEED, Floats, Log, UnusableError
 
 CELL_S = 0.04
@@ -83,7 +84,7 @@ def motion_of(logs: Sequence[Log], radius_m: float) -> Motion:
     """
     measured = measured_channels(logs)
     if not (set(WHEEL_SPEED) <= measured or "speed_mps" in measured):
-        raise UnusableError("neither all wheel speeds nor a speed in every log; nothing says how the car moved")
+        raise UnusableError(nothing_shows_speed(logs))
     step = max(float(np.median(np.diff(log.t_s))) for log in logs)
     cell_s = CELL_S if step <= 1.05 * CELL_S else step
     parts = [_cell_means(log, measured, cell_s, radius_m) for log in logs]

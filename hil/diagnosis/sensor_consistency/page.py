@@ -7,6 +7,7 @@ import numpy as np
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.manoeuvres import stops
 from hil.diagnosis.manoeuvres.coast_down_page import coast_section
+from hil.diagnosis.result.channels_table import channels_section
 from hil.diagnosis.result.page_parts import EXTENDED, NOMINAL, binned_curve, comparison_panels, limits, rounded
 from hil.diagnosis.sensor_consistency.braking import APPLIED_PA, BrakingModel
 from hil.diagnosis.sensor_consistency.check import Consistency
@@ -35,7 +36,8 @@ def build_report(answer: Consistency, sources: Sequence[str]) -> Report:
         sections=(
             _overview(answer), *_details(answer), _parameters(answer), _relations(answer),
             *stops.section(content.get("stops", ())),
-            *(coast_section(content["coast_down"]) if "coast_down" in content else ()), _limits(answer),
+            *(coast_section(content["coast_down"]) if "coast_down" in content else ()),
+            channels_section(content), _limits(answer),
         ),
         provenance={
             "logs": list(sources), "segments": answer.motion.segments,

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hil.diagnosis.data.log import UnusableError
+from hil.diagnosis.vehicle.bounds import refuse_implausible
 from hil.diagnosis.vehicle.checks import (
     check_bounds,
     check_order,
@@ -190,7 +191,10 @@ def _stated(table: Mapping[str, Any], where: str, base: PlantParameters) -> _Sta
     for key, value in table.items():
         stem = key.removesuffix("_tolerance")
         if stem in DERIVED:
-            _derive(stem, checked_number(value, key, where), key != stem, base, stated, where)
+            number = checked_number(value, key, where)
+            if key == stem:
+                refuse_implausible(where, key, DERIVED[stem][0], number, DERIVED[stem][2])
+            _derive(stem, number, key != stem, base, stated, where)
             continue
         name = ALIASES.get(stem, stem)
         known = name in SPECIAL or name in PARAMETER.sizes or name in LATENCY_KEYS
@@ -207,6 +211,7 @@ def _stated(table: Mapping[str, Any], where: str, base: PlantParameters) -> _Sta
             continue
         given = checked_numbers(value, key, where)
         check_bounds(base, name, key, float(np.mean(given)) if not _by_axle(name, base) else given, where)
+        refuse_implausible(where, key, name, given)
         if isinstance(given, list) and not _by_axle(name, base):
             mean, half_width = float(np.mean(given)), 0.5 * float(np.ptp(given))
             stated.values[name] = mean

@@ -74,3 +74,23 @@ def test_without_motion_or_torque_there_is_no_answer() -> None:
         explain({"t_s": t, "ax_mps2": np.zeros(500)})
     with pytest.raises(UnusableError, match="what braked the car"):
         explain({"t_s": t, "speed_mps": np.full(500, 20.0)})
+
+
+def _written(folder: Path) -> Path:
+    t = np.arange(500) * STEP_S
+    np.savetxt(folder / "a.csv", np.column_stack((t, 20.0 - t)), delimiter=",", header="t_s,speed_mps", comments="")
+    return folder / "a.csv"
+
+
+def test_a_table_of_nobodys_car_is_refused_and_the_shipped_car_is_had_by_its_name(tmp_path: Path) -> None:
+    with pytest.raises(UnusableError, match=r"a.csv: .*give --vehicle SET.toml with mass_kg.*--vehicle paper_car"):
+        explain(_written(tmp_path))
+    for vehicle in ("paper_car", Path("paper_car")):
+        with pytest.raises(UnusableError, match="what braked the car; columns seen: speed_mps"):
+            explain(_written(tmp_path), vehicle)
+
+
+def test_inputs_are_on_trial_before_any_fit() -> None:
+    table = dict(log(THETA.neutral(), 5, 0))
+    with pytest.raises(UnusableError, match=r"speed_mps \[km/h\]"):
+        explain(table | {"speed_mps": 3.6 * table["speed_mps"]})
