@@ -56,8 +56,8 @@ def tooth_speeds(
     """Wheel speeds as a control unit counts them: whole teeth over the time between their edges.
 
     Each message tells the mean speed between the last edge before it and the last edge before the former message,
-    with the time of the last edge. Without a new edge it tells the former speed, but no more than one tooth since the
-    last edge, at its own time; after `REST_S` zero.
+    with the time in the middle of both. Without a new edge it tells the former speed, but no more than one tooth
+    since the last edge, at its own time; after `REST_S` zero.
 
     Parameters
     ----------
@@ -77,9 +77,9 @@ def tooth_speeds(
     stamps, speeds = messages_s.copy(), np.zeros(len(messages_s))
     for k in range(1, len(messages_s)):
         if last[k] > last[k - 1] >= 0:
-            stamps[k] = edge_s[last[k]]
+            stamps[k] = 0.5 * (edge_s[last[k]] + edge_s[last[k - 1]])
             speeds[k] = pitch * (last[k] - last[k - 1]) / (edge_s[last[k]] - edge_s[last[k - 1]])
         elif last[k] >= 0 and messages_s[k] - edge_s[last[k]] < REST_S:
             speeds[k] = min(speeds[k - 1], pitch / (messages_s[k] - edge_s[last[k]]))
     speeds[0] = speeds[1]
-    return stamps, speeds
+    return np.maximum.accumulate(stamps), speeds

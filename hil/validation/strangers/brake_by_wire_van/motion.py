@@ -116,7 +116,7 @@ def late(rows: Vector, n: int, column: int, dead_ms: float) -> float:
 @compiled
 def run(
     start: Vector, car: Numbers, asked_nm: Vector, curvature: Vector, hand_rad: Vector, wind_mps: Vector, hill: Vector,
-    control: Vector, rest_s: float,
+    control: Vector, given: Vector, rest_s: float,
 ) -> Vector:  # fmt: skip
     """Drive until the inputs end, or the van has been at rest for a while.
 
@@ -126,6 +126,7 @@ def run(
     curvature, hand_rad, wind_mps : (n,) at steps of 1 ms, held.
     hill : (3, k) sizes, wave numbers (rad/m) and phases of the grade over the way.
     control : brake gains (N m/Pa) and radius (m) that the control knows: front, rear, radius.  rest_s : to the end.
+    given : (k, 3) demands of clamping in front and behind and of the motor, that stand in for the control; (0, 3) none.
 
     Returns
     -------
@@ -138,7 +139,9 @@ def run(
     front, rear, motor, rested, last = 0.0, 0.0, 0.0, 0.0, count
     h = ROW_S / PARTS
     for n in range(count):
-        if n % TICK_MS == 0:
+        if len(given):
+            front, rear, motor = given[min(n, len(given) - 1)]
+        elif n % TICK_MS == 0:
             motor = motor_demand_nm(asked_nm[n], motor, y[VX], control[2])
             friction = -asked_nm[n] + min(motor, 0.0) if asked_nm[n] < 0.0 else 0.0
             front, rear = pressure_demands_pa(friction, control[0], control[1])

@@ -1,13 +1,14 @@
 """A laden van: one motor on the rear axle, electro-mechanical brakes, a 50 Hz log from the bus."""
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 
 from hil.validation.strangers.brake_by_wire_van.causes import CAUSES, with_hidden
 from hil.validation.strangers.brake_by_wire_van.course import GUST_MPS, GUST_S, REST_S, Course, courses, slope_mps2
 from hil.validation.strangers.brake_by_wire_van.logger import SLOW, STEP, WHITE, Logger, logged, true_logger
-from hil.validation.strangers.brake_by_wire_van.motion import OMEGA, STATES, VX, run
+from hil.validation.strangers.brake_by_wire_van.motion import FRONT_DEMAND, MOTOR_DEMAND, OMEGA, STATES, VX, run
 from hil.validation.strangers.brake_by_wire_van.numbers import (
     FRONT_GAIN_NM_PA,
     RADIUS_M,
@@ -22,6 +23,7 @@ from hil.validation.strangers.signals import Vector
 
 _USUAL_MPS = 16.0
 CONTROL = np.array([FRONT_GAIN_NM_PA, REAR_GAIN_NM_PA, RADIUS_M])
+NONE = np.zeros((0, 3))
 
 
 class BrakeByWireVan:
@@ -47,24 +49,23 @@ class BrakeByWireVan:
         """Four to six logs, 90 to 130 s together."""
         car, logger = with_off(with_hidden(truth(seed), hidden), off)
         driven = courses(np.random.default_rng([seed, 2]))
-        sensing = [np.random.default_rng([seed, 3, k]) if noisy else None for k in range(len(driven))]
+        if noisy:
+            return [
+                logged(motion(car, course), course.asked_nm, car, logger, np.random.default_rng([seed, 3, k]))
+                for k, course in enumerate(driven)
+            ]
+        # demands of the sound van: the control would answer to another speed, which is no signature
         return [
-            logged(motion(car, course), course.asked_nm, car, logger, rng)
-            for course, rng in zip(driven, sensing, strict=True)
+            logged(motion(car, course, given), course.asked_nm, car, logger, None)
+            for course, given in zip(driven, _sound_demands(seed), strict=True)
         ]
 
     def noise(self, seed: int) -> Noise:
-        """Noise of the columns, and what wind and road do."""
-        stems = {
-            "wheel_speed_{}_rad_s": "wheel",
-            "pressure_{}_pa": "pressure",
-            "pressure_demand_{}_pa": "pressure_demand",
-        }
+        """Noise of what is measured (demands are exact), and what wind and road do."""
+        stems = {"wheel_speed_{}_rad_s": "wheel", "pressure_{}_pa": "pressure"}
         kinds = {stem.format(wheel): kind for stem, kind in stems.items() for wheel in WHEELS}
-        rear = {"motor_torque_{}_nm": "motor", "motor_torque_demand_{}_nm": "motor_demand"}
-        kinds |= {stem.format(wheel): kind for stem, kind in rear.items() for wheel in WHEELS[2:]}
+        kinds |= {f"motor_torque_{wheel}_nm": "motor" for wheel in WHEELS[2:]}
         kinds |= {"ax_mps2": "ax", "ay_mps2": "ay", "yaw_rate_rad_s": "yaw", "steer_rad": "steer"}
-        kinds |= {"pedal": "pedal", "throttle": "throttle"}
         car, _ = truth(seed)
         hills = [course.hill for course in courses(np.random.default_rng([seed, 2]))]
         return Noise(
@@ -85,12 +86,25 @@ def truth(seed: int) -> tuple[Numbers, Logger]:
     return true_numbers(rng), true_logger(rng)
 
 
-def motion(car: Numbers, course: Course) -> Vector:
-    """The true motion of one log, lead included, (n, `hil.validation.strangers.brake_by_wire_van.motion.ROW`)."""
+def motion(car: Numbers, course: Course, demands: Vector = NONE) -> Vector:
+    """The true motion of one log, lead included, (n, `hil.validation.strangers.brake_by_wire_van.motion.ROW`).
+
+    Parameters
+    ----------
+    demands : (k, 3) that stand in for the control; (0, 3) none.
+    """
     start = np.zeros(STATES)
     start[VX] = course.speed_mps
     start[OMEGA : OMEGA + 4] = course.speed_mps / car.radius_m
     found: Vector = run(
-        start, car, course.asked_nm, course.curvature, course.hand_rad, course.wind_mps, course.hill, CONTROL, REST_S
-    )
+        start, car, course.asked_nm, course.curvature, course.hand_rad, course.wind_mps, course.hill, CONTROL, demands,
+        REST_S,
+    )  # fmt: skip
     return found
+
+
+@lru_cache(maxsize=4)
+def _sound_demands(seed: int) -> tuple[Vector, ...]:
+    car, _ = truth(seed)
+    driven = courses(np.random.default_rng([seed, 2]))
+    return tuple(motion(car, course)[:, FRONT_DEMAND : MOTOR_DEMAND + 1].copy() for course in driven)

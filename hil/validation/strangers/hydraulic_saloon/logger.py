@@ -60,7 +60,7 @@ class Logger(NamedTuple):
 def true_logger(rng: np.random.Generator, master: bool) -> Logger:
     """The logger of one seed."""
     return Logger(
-        imu_cutoff_hz=rng.uniform(14.0, 26.0), imu_age_s=rng.uniform(0.003, 0.013), wheel_age_s=0.0,
+        imu_cutoff_hz=rng.uniform(12.0, 20.0), imu_age_s=rng.uniform(0.006, 0.014), wheel_age_s=0.0,
         pressure_age_s=rng.uniform(0.001, 0.006), speed_age_s=rng.uniform(0.10, 0.20),
         ax_zero_mps2=float(rng.normal(0.0, 0.02)), ax_gain=1.0 + float(rng.normal(0.0, 0.003)),
         ay_zero_mps2=float(rng.normal(0.0, 0.02)), yaw_zero_rad_s=float(rng.normal(0.0, 0.0008)),

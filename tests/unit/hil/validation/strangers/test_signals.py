@@ -25,7 +25,7 @@ def test_teeth_tell_the_mean_speed_since_the_last_message_and_rest():
     messages = np.arange(0.02, 4.0, 0.02)
     stamps, told = tooth_speeds(t, angle, messages, 44)
     fast = (messages > 0.03) & (messages < 2.0)
-    # the mean over the last 20 ms or so: 10 ms old, one tooth more or less
-    assert np.abs(told[fast] - (30.0 - 10.0 * (stamps[fast] - 0.01))).max() < 0.06
+    # speed falls evenly: the mean between two edges is that of their middle
+    assert np.abs(told[fast] - (30.0 - 10.0 * stamps[fast])).max() < 0.02
     assert np.all(np.diff(stamps) >= 0.0)
     assert told[messages > 3.4].max() == 0.0
