@@ -221,6 +221,10 @@ def _stated(table: Mapping[str, Any], where: str, base: PlantParameters) -> _Sta
         else:
             stated.values[name] = given
             stated.one_axle.difference_update(f"{name}_{axle}" for axle in AXLES)
+    for name in {_without_axle(one) for one in stated.one_axle}:  # the larger of two axles' counts, as of a list
+        halves = [stated.tolerances.get(f"{name}_{axle}", 0.0) for axle in AXLES]
+        if min(halves) > 0.0:
+            stated.tolerances.update((f"{name}_{axle}", max(halves)) for axle in AXLES)
     if _BRAKES in stated.values:  # a hub carrier takes up the torque of a motor in the wheel as it does a caliper's
         stated.values.setdefault(_MOTORS, stated.values[_BRAKES])
         stated.tolerances.setdefault(_MOTORS, stated.tolerances.get(_BRAKES, 0.0))

@@ -219,8 +219,8 @@ def _nuisances(
             limit = np.inf
             if row.reciprocal and (factor := float(p[PARAMETER.slice(row.reciprocal)][0])) > 0.0:
                 limit = max((1.0 / factor - value) / step, 0.0)  # E is 1 at most (Pacejka 2012, eq. 4.E14)
-            at_zero = row.to_zero or (value == 0.0 and lowest(row.parameter) == 0.0)
-            least_z = -value / step if at_zero else -np.inf
+            is_zero = value == 0.0 and not keys.isdisjoint(stated) and lowest(row.parameter) == 0.0
+            least_z = -value / step if row.to_zero else 0.0 if is_zero else -np.inf  # brakes that grip at once
             steps = (step,) * len(at)
             nuisances.append(Nuisance(f"{name}{axle}", at, steps, kind, upper_bound=limit, lower_bound=least_z))
     return nuisances

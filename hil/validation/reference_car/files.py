@@ -40,6 +40,8 @@ _TOLD = (
 )  # fmt: skip
 _SUPPORT, _ROLL_CENTRE_M = 0.03, 0.03
 """Half-widths of the links' support and of the roll centres, as drawings tell them."""
+_OF_EQUATION = {"steering_ratio": 0.02 * NOMINAL.steering_ratio}
+"""Half-width of a number that is exact in this car and stands in another equation of the plant."""
 _ROLL_INERTIA_KG_M2 = 100.0
 """The hidden body rolls at once; with so much it does in 0.03 s, and the plant's steps still follow."""
 
@@ -97,7 +99,7 @@ def vehicle_toml() -> str:
     for name in _TOLD:
         key = _RENAMED.get(name, name)
         lines.append(f"{key} = {float(getattr(NOMINAL, name))!r}")
-        lines.append(f"{key}_tolerance = {TOLERANCE.get(name, 0.0)!r}")
+        lines.append(f"{key}_tolerance = {TOLERANCE.get(name, _OF_EQUATION.get(name, 0.0))!r}")
     lines.append(
         "# factors on the tyre of the size 195/65 R15: slip stiffness, friction, cornering stiffness, relaxation"
     )
@@ -155,7 +157,7 @@ def _suspension(car: Car) -> dict[str, tuple[float | list[float], float]]:
             round(rolling * max(roll)),
         ),
         "suspension_roll_centre_height_m": (0.0, _ROLL_CENTRE_M),
-        "vehicle_roll_inertia_kg_m2": (_ROLL_INERTIA_KG_M2, 0.0),
+        "vehicle_roll_inertia_kg_m2": (_ROLL_INERTIA_KG_M2, 0.05 * _ROLL_INERTIA_KG_M2),
         "vehicle_pitch_inertia_kg_m2": (round(inertia), round(inertia * hypot(dive, 2.0 * frequency))),
     }  # fmt: skip
 

@@ -145,3 +145,13 @@ def test_keys_that_contradict_each_other_are_refused() -> None:
 def test_tolerances_that_no_fit_uses_are_told() -> None:
     remarks = load_vehicle(SIX | {"track_m_tolerance": 0.01, "mass_kg_tolerance": 5.0}).remarks
     assert any(text.endswith("whatever their tolerance: vehicle_track_m") for text in remarks)
+
+
+def test_of_two_stated_axles_the_larger_tolerance_counts_for_both() -> None:
+    discs = {"disc_heat_front_j_k": 3000.0, "disc_heat_front_j_k_tolerance": 900.0, "disc_heat_rear_j_k": 2000.0}
+    for rear, half in ((700.0, 900.0), (0.0, 0.0)):
+        car = load_vehicle(SIX | discs | {"disc_heat_rear_j_k_tolerance": rear})
+        by_name = {one.name: one.step[0] for one in car.nuisances}
+        assert by_name["friction_brake_heat_capacity_j_k_front"] == pytest.approx(HALF_WIDTH_TO_SIGMA * 900.0)
+        own = by_name.get("friction_brake_heat_capacity_j_k_rear")
+        assert own == (pytest.approx(HALF_WIDTH_TO_SIGMA * half) if rear else None)
