@@ -19,8 +19,8 @@ HERE = Path(__file__).parent.parent / "pinned"
 RECORDS = HERE / "records"
 KEYS: dict[str, str] = tomllib.loads((HERE / "keys.toml").read_text(encoding="utf-8"))
 """Paths as recorded (regular expressions), and as they are now; paths that match none have kept their keys."""
-WORDS = ("remarks", "missing", "title", "extension", "pattern", "why")
-"""Texts for people: not compared."""
+WORDS = ("remarks", "missing", "title", "extension", "pattern", "why", "channels_read")
+"""Texts for people, and the account of what was read: not compared."""
 
 
 def _drag(torque_nm: float, onset_s: float | None = None) -> np.ndarray:
