@@ -19,8 +19,11 @@ HERE = Path(__file__).parent.parent / "pinned"
 RECORDS = HERE / "records"
 KEYS: dict[str, str] = tomllib.loads((HERE / "keys.toml").read_text(encoding="utf-8"))
 """Paths as recorded (regular expressions), and as they are now; paths that match none have kept their keys."""
-WORDS = ("remarks", "missing", "title", "extension", "pattern", "why", "stops")
-"""Texts for people, and figures with tests of their own that no fit moves: not compared."""
+WORDS = (
+    "remarks", "missing", "title", "extension", "pattern", "why", "stops", "channels_read", "headline", "text",
+    "moved_numbers", "goodness_of_fit",
+)
+"""Texts for people, the account of what was read, and figures with tests of their own: not compared."""
 
 
 def _drag(torque_nm: float, onset_s: float | None = None) -> np.ndarray:

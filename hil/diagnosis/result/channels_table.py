@@ -6,13 +6,10 @@ from typing import Any
 from hil.diagnosis.result.page_parts import rounded
 from hil.report.report import Cell, Section, Table
 
-_HEAD = (
-    "channel", "column", "unit read", "logs", "rate, Hz", "gaps", "no value, %", "least, SI", "greatest, SI",
-    "late, ms",
-)  # fmt: skip
+_HEAD = ("channel", "read from", "Hz", "gaps", "empty, %", "range, SI", "late, ms")
 _NOTE = (
-    "Rates are those of the samples as they came; a gap is longer than 0.25 s; late is behind the wheel speeds, where "
-    "a log shows it (driven or braked wheels slip, so that they lead by 20 to 80 ms)"
+    "Hz: rate of the samples as they came. Gaps: longer than 0.25 s. Late: behind the wheel speeds, where a log shows "
+    "it; wheels slip, so that by 20 to 80 ms they lead the car."
 )
 
 
@@ -26,19 +23,15 @@ def channels_section(content: Mapping[str, Any]) -> Section:
 
 
 def _row(channel: str, column: str, unit: str, same: Sequence[Mapping[str, Any]]) -> tuple[Cell, ...]:
-    least, greatest = _values(same, "least"), _values(same, "greatest")
-    missing = 100.0 * max(row["nan_share"] for row in same)
+    late = [value for value in _values(same, "lag_s") if value != 0.0]
     return (
         channel,
-        column if column != channel else "same",
-        unit,
-        len(same),
+        unit if column == channel else f"{column} [{unit}]",
         _span(_values(same, "rate_hz"), 1.0),
         sum(row["gaps"] for row in same),
-        rounded(missing),
-        rounded(min(least)) if least else None,
-        rounded(max(greatest)) if greatest else None,
-        _span([value for value in _values(same, "lag_s") if value != 0.0], 1e3),
+        rounded(100.0 * max(row["nan_share"] for row in same)),
+        _span([*_values(same, "least"), *_values(same, "greatest")], 1.0),
+        _span(late, 1e3),
     )
 
 

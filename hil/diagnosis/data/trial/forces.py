@@ -137,7 +137,7 @@ def force_parts(motion: Motion) -> dict[str, tuple[Floats, Floats]]:
         kind = "pressure" if names == PRESSURE else "motor" if names == MOTOR_TORQUE else ""
         if kind:
             others = np.sum([other for key, other in parts.items() if key != names], axis=0)
-            rest = reference - others
+            rest = np.where(motion.fast, reference - others, np.nan)  # brakes hold a car that stands
             share = spread(part) / max(spread(rest), 1e-9)
             if share > 0.3:
                 found[kind] = (rest, part)
