@@ -40,8 +40,8 @@ from hil.diagnosis.simulation.hot_spots import phase_penalty
 from hil.diagnosis.simulation.simulator import Simulator
 
 _BACKWARD, _BACKWARD_SAMPLES = {"speed_mps": -0.5, "wheel_speed": -1.5}, 10
-"""Speed over ground (m/s) and of a wheel (rad/s) below which a car moves backward, beyond noise at rest, and in how many
-samples of one channel."""
+"""Speed over ground (m/s) and of a wheel (rad/s) below which a car moves backward, beyond noise at rest; how many
+samples of one channel show it."""
 
 
 def inseparable_forward(dataset: Dataset) -> dict[str, str]:
