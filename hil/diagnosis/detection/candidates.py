@@ -40,13 +40,20 @@ from hil.diagnosis.parallel import thread_map
 from hil.diagnosis.simulation.hot_spots import phase_penalty
 from hil.diagnosis.simulation.simulator import Simulator
 
-_BACKWARD_MPS = -0.5
-"""Speed below which a car moves backward: beyond the noise of a wheel speed at rest."""
+_BACKWARD, _BACKWARD_SAMPLES = {"speed_mps": -0.5, "wheel_speed": -1.5}, 10
+"""Speed over ground (m/s) and of a wheel (rad/s) below which a car moves backward, beyond noise at rest; how many
+samples of one channel show it."""
 
 
 def inseparable_forward(dataset: Dataset) -> dict[str, str]:
     """Effects that are the same as another one where no log moves backward, by that other one; empty where one does."""
-    backward = any((recording.speed_mps < _BACKWARD_MPS).any() for recording in dataset.recordings)
+    backward = any(
+        (values < limit).sum() >= _BACKWARD_SAMPLES
+        for recording in dataset.recordings
+        for stem, limit in _BACKWARD.items()
+        for name, values in recording.log.channels.items()
+        if name.startswith(stem)
+    )
     return {} if backward else {"caliper_asymmetry": "pad_mu_gain"}
 
 

@@ -212,10 +212,11 @@ def _candidates(answer: Answer) -> Section:
 
 
 def _shown(candidate: Candidate) -> str:
-    """A candidate for people: title, which of several numbers, and place."""
+    """A candidate for people: place first, as charts cut long names, title, which of several numbers."""
     which = "" if len(candidate.effect.strengths) == 1 else f": {candidate.parameter.name.replace('_', ' ')}"
-    where = "" if candidate.location == "car" else f", {place(candidate.location)}"
-    return f"{candidate.effect.title}{which}{where}"
+    where = "" if candidate.location == "car" else f"{place(candidate.location)}: "
+    text = f"{where}{candidate.effect.title}{which}"
+    return text[0].upper() + text[1:]
 
 
 def _differences(title: str, listed: Sequence[FittedHypothesis]) -> list[Chart]:

@@ -30,7 +30,7 @@ def numbers(answer: Answer) -> list[Number]:
         listed.append(Number("its probability", 100.0 * cause["probability"], "%"))
     best = _best_reduced(answer.held_out)
     if best is not None and best.before > 0.0:
-        listed.append(Number(f"Held-out error, {_words(best.channel)}", _reduction(best, bool(answer.json["causes"]))))
+        listed += _reduction(best, bool(answer.json["causes"]))
     if answer.json["causes"] and not any(one.improves_on_tuning for one in answer.held_out):
         listed.append(Number("Held-out error with the cause", "in no channel less than with tuning alone"))
     return listed
@@ -40,14 +40,23 @@ def _words(channel: str) -> str:
     return WORDS[channel].replace("_", " ").removesuffix(" mps2").removesuffix(" mps").removesuffix(" rad s")
 
 
-def _reduction(error: HeldOutError, has_cause: bool) -> str:
-    """From the nominal vehicle over tuning alone to the cause."""
-    (before, unit), (tuned, _), (after, _) = (
-        scaled(v, error.channel) for v in (error.before, error.tuned, error.after)
-    )
-    removed = [100.0 * (1.0 - value / error.before) for value in (error.tuned, error.after)]
-    text = f"{before:g} {unit} nominal, {tuned:g} tuned alone ({removed[0]:.0f} % less)"
-    return f"{text}, {after:g} with the cause ({removed[1]:.0f} % less)" if has_cause else text
+def _reduction(error: HeldOutError, has_cause: bool) -> list[Number]:
+    """Held-out error of the nominal vehicle, by tuning alone, and with the cause."""
+    values = {"nominal": error.before, "tuned alone": error.tuned}
+    if has_cause:
+        values["with the cause"] = error.after
+    return [
+        Number(
+            f"Held-out {_words(error.channel)} error, {name}", *scaled(value, error.channel),
+            note="on manoeuvres no fit saw" if name == "nominal" else _change(value, error.before),
+        )
+        for name, value in values.items()
+    ]  # fmt: skip
+
+
+def _change(value: float, before: float) -> str:
+    share = 100.0 * (value / before - 1.0)
+    return f"{abs(share):.0f} % {'more' if share > 0.0 else 'less'} than nominal"
 
 
 def _best_reduced(errors: Sequence[HeldOutError]) -> HeldOutError | None:
@@ -78,14 +87,15 @@ def moved(answer: Answer) -> Section:
     )
     return Section(
         "Numbers that moved", tables=(Table("As stated and as found", columns, rows, note),),
-        text="Numbers that are uncertain and no cause: the fit moves them first, within what was stated, or, where "
-        "nothing is stated, about the shipped value.",
+        text="Uncertain numbers of the car and the logger, which are no causes: the fit moves them first.",
     )  # fmt: skip
 
 
 def _stated(one: MovedNumber) -> str:
     about = f"{value_text(one.nominal)} ± {short_text(one.half_width, 2)}"
-    return about if one.stated else f"not stated: {about}"
+    if one.stated:
+        return about
+    return f"not stated: the shipped {about}" if one.nominal else f"not stated: {about}"
 
 
 def _interval(one: MovedNumber) -> str:

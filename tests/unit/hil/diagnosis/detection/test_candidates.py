@@ -68,9 +68,12 @@ def test_a_sensor_that_carries_only_noise_has_no_scale(torque_nm, excited):
 
 def test_a_calliper_that_grips_unlike_backward_is_no_candidate_where_no_log_moves_backward():
     """It led before the gain of that brake, which is the same going forward."""
+    t = np.arange(500) * 0.01
     forward, backward = (
-        SimpleNamespace(recordings=[SimpleNamespace(speed_mps=np.array(speeds))])
-        for speeds in ([20.0, 0.0, -0.1], [20.0, 0.0, -1.5])
+        SimpleNamespace(
+            recordings=[SimpleNamespace(log=make_log("a", t, {"wheel_speed_fl_rad_s": np.full(500, speed)}))]
+        )
+        for speed in (-0.2, -20.0)
     )
     assert inseparable_forward(forward) == {"caliper_asymmetry": "pad_mu_gain"}
     assert inseparable_forward(backward) == {}

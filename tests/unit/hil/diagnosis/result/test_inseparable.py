@@ -14,8 +14,9 @@ PADS = {
 
 
 def _diagnosis(speed_mps):
+    channels = {"speed_mps": np.repeat([20.0, speed_mps], 50)}
     return SimpleNamespace(
-        dataset=SimpleNamespace(recordings=[SimpleNamespace(speed_mps=np.array([20.0, speed_mps]))]),
+        dataset=SimpleNamespace(recordings=[SimpleNamespace(log=SimpleNamespace(channels=channels))]),
         vehicle=SimpleNamespace(undiagnosable_effects=()),
     )
 

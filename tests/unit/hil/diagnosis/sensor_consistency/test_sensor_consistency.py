@@ -165,5 +165,6 @@ def test_the_headline_names_all_indistinguishable_effects():
     text = headline(_late_or_filtered())
     assert text == (
         "ax_mps2: Inertial sensor has a further low-pass of 100 ms (95 %: 80 to 120 ms) or one node's samples are "
-        "older than their stamps, or newer; pressure: Pressures are 100 ms newer than their stamps (95 %: 80 to 120 ms)."
+        "older than their stamps, or newer; pressure: Pressures are 100 ms newer than their stamps "
+        "(95 %: 80 to 120 ms)."
     )
