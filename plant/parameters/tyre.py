@@ -86,5 +86,6 @@ class TyreParameters:
     lvyka: Scale
     lsgal: Scale
     relaxation_least_m: Annotated[float, "m", 0.03, 0.3]  # what is left at full sliding or without load
+    partial_sliding: Annotated[float, "", 0.0, 3.0]  # 0 Magic Formula, 0.35 brush, 0.55 exponential (Burckhardt)
     low_speed_mps: Annotated[float, "m/s", 0.1, 10.0]
     low_speed_damping_ns_m: Annotated[float, "N s/m", 0.0, 20000.0]

@@ -56,6 +56,9 @@ _STATED = 0.01
 _THRESHOLD = "friction_brake_threshold_pressure_pa"
 _BALANCE = 0.3
 """Half-width of an axle's cornering stiffness beside the other axle's, where the set does not state the tyres'."""
+_GRIP_UNSTATED = {"tyre_partial_sliding": 0.5, "tyre_pdx2": 0.16}
+"""Half-widths where the set does not state the tyres' friction. Partial sliding: brush 0.38, exponential 0.57
+(`plant.tyre.partly_sliding`). Friction over the load: from none to twice that of the shipped tyre."""
 _BRAKES, _MOTORS = "suspension_brake_support_tangent", "suspension_drive_support_tangent"
 _KNOWN = sorted({*ALIASES, *DERIVED, *SPECIAL, *LATENCY_KEYS, *PARAMETER.sizes})
 _FORMS = ("tyre_", "suspension_")
@@ -257,6 +260,8 @@ def _tolerance(
     tolerance |= {f"brake_gain_{axle}": _STATED * gain for axle, gain in gains.items()}
     for name in missing:
         tolerance[name] = max(tolerance[name], WIDE[name] * _largest(parameters, name))
+    if "tyre_lmux" in missing:
+        tolerance |= {name: half for name, half in _GRIP_UNSTATED.items() if name not in stated.names}
     if "tyre_lky" in missing:
         tolerance["vehicle_slip_angle_share"] = max(tolerance["vehicle_slip_angle_share"], _BALANCE)
     tolerance |= {

@@ -85,7 +85,12 @@ brake_gain_rear_nm_pa = 1.7e-4
   detection threshold of the height, the lift, the dive and whatever else follows the loads is higher.
 - Lift of the axles and drag are those of a wind tunnel: drag acts along the road, and what it does higher up is in
   the lift (SAE J1594).
-- Without a `pad_` key the friction of the pads is one constant, which the brake gains contain.
+- Where a set does not state the friction of the tyres, their longitudinal curve may be that of a brush or an
+  exponential (`tyre_partial_sliding`, +- 0.5), and their friction may go down with the load from not at all to twice as
+  much as the shipped tyre's (`tyre_pdx2`, +- 0.16).
+- Without a `pad_` key the friction of the pads is one constant, which the brake gains contain. Drums are brakes like
+  others, with a threshold of their own; motors on a differential give both wheels of their axle the same torque, and
+  their rotor counts in the inertia of these wheels.
 - Unknown keys are named in the remarks and left out.
 """
 Entries = Mapping[str, Mapping[str, Any]]

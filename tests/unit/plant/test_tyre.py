@@ -6,9 +6,10 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import least_squares
 
 from plant.model import pack
-from plant.tyre import combined, sliding_relaxation
+from plant.tyre import combined, magic, partly_sliding, sliding_relaxation
 from plant.vectors import P
 
 slips = st.floats(-1.0, 1.0)
@@ -73,3 +74,27 @@ def test_relaxation_shortens_with_sliding(plain):
     assert length(0.25, 0.0, 0.16, 0.04) == 0.25
     assert length(0.25, -0.08, 0.16, 0.04) == pytest.approx(0.125)
     assert length(0.25, 1.0, 0.16, 0.04) == 0.04
+
+
+def force_over_peak(x: float, c: float, e: float, d: float, share: float) -> float:
+    """Magic Formula of peak ``d`` and slip stiffness 1 at slip x, with partial sliding."""
+    return magic(1.0 / (c * d), c, d, e, partly_sliding(x, x, share))
+
+
+@pytest.mark.parametrize("form", [
+    lambda x: 1.0 - (1.0 - x / 3.0) ** 3, lambda x: 1.0 - math.exp(-x), math.tanh,
+], ids=["brush", "exponential", "tanh"])  # fmt: skip
+def test_brush_exponential_and_tanh_lie_within_the_magic_formula_with_partial_sliding(form):
+    """At a given slip stiffness and up to 0.8 of the peak; without partial sliding the first two are 2 and 3 % off."""
+    xs = [0.05 * k for k in range(1, 24)]
+
+    def residuals(z):
+        return [force_over_peak(x, *z) - form(x) for x in xs]
+
+    fitted = least_squares(residuals, (1.4, 0.0, 1.0, 0.3), bounds=((0.8, -2.0, 0.5, 0.0), (3.3, 1.0, 2.5, 1.5)))
+    assert max(map(abs, fitted.fun)) < 1e-3
+    assert (fitted.x[3] > 0.3) == (form is not math.tanh)
+
+
+def test_no_partial_sliding_leaves_the_slip_as_it_is_to_the_last_bit():
+    assert [partly_sliding(s, 22.0 * abs(s), 0.0) for s in (-0.3, -1e-9, 0.07)] == [-0.3, -1e-9, 0.07]
