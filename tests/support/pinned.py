@@ -20,8 +20,18 @@ RECORDS = HERE / "records"
 KEYS: dict[str, str] = tomllib.loads((HERE / "keys.toml").read_text(encoding="utf-8"))
 """Paths as recorded (regular expressions), and as they are now; paths that match none have kept their keys."""
 WORDS = (
-    "remarks", "missing", "title", "extension", "pattern", "why", "stops", "channels_read", "headline", "text",
-    "moved_numbers", "goodness_of_fit",
+    "remarks",
+    "missing",
+    "title",
+    "extension",
+    "pattern",
+    "why",
+    "stops",
+    "channels_read",
+    "headline",
+    "text",
+    "moved_numbers",
+    "goodness_of_fit",
 )
 """Texts for people, the account of what was read, and figures with tests of their own: not compared."""
 
