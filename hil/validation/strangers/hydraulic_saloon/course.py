@@ -1,4 +1,4 @@
-"""What a drive with the saloon is made of: stops, stops in two parts, a stop in a bend, coast-downs in neutral."""
+"""What a drive with the saloon is made of: stops, hard stops, stops in two parts and in bends, coast-downs in neutral."""
 
 from dataclasses import dataclass
 
@@ -41,10 +41,10 @@ class Course:
 
 def courses(rng: np.random.Generator) -> list[Course]:
     """Four to six logs, 90 to 130 s together: stops from 40 to 120 km/h in 3 to 8 s, and two coast-downs."""
-    kinds = ["stop", "parts", *rng.choice(["stop", "parts", "bend"], int(rng.integers(1, 3)), p=[0.35, 0.3, 0.35])]
+    kinds = ["hard", "parts", *rng.choice(["stop", "hard", "bend"], int(rng.integers(1, 3)), p=[0.3, 0.3, 0.4])]
     braked = [_braked(str(kind), rng) for kind in rng.permutation(kinds)]
     spent = sum(length for _, length in braked)
-    coast_s = float(np.clip((rng.uniform(102.0, 124.0) - spent) / 2.0, 11.0, 30.0))
+    coast_s = float(np.clip((rng.uniform(102.0, 124.0) - spent) / 2.0, 11.0, 36.0))
     coasts = [_course(rng.uniform(23.0, 34.0), [(coast_s, 0.0)], 0.0, rng) for _ in range(2)]
     found = [course for course, _ in braked]
     for coast in coasts:
@@ -63,7 +63,7 @@ def _braked(kind: str, rng: np.random.Generator) -> tuple[Course, float]:
         return _course(
             speed, [(before_s, 0.0), (LONGEST_STOP_S, wanted)], curvature, rng
         ), before_s + speed / wanted + 1.2
-    least = 45.0 if kind == "stop" else 75.0
+    least = {"stop": 45.0, "parts": 75.0, "hard": 85.0}[kind]
     speed = rng.uniform(least, 120.0) / 3.6
     parts = [(before_s, 0.0)]
     left = speed - 0.12 * before_s
@@ -71,7 +71,7 @@ def _braked(kind: str, rng: np.random.Generator) -> tuple[Course, float]:
         snub_s, snub, pause_s = rng.uniform(1.2, 2.2), rng.uniform(1.5, 3.5), rng.uniform(2.0, 3.5)
         parts += [(snub_s, snub), (pause_s, 0.0)]
         left -= snub_s * snub
-    wanted = float(np.clip(left / stop_s, 1.6, 5.6))
+    wanted = rng.uniform(6.2, 7.4) if kind == "hard" else float(np.clip(left / stop_s, 1.6, 5.6))
     length = sum(part[0] for part in parts) + left / wanted + REST_S
     return _course(speed, [*parts, (LONGEST_STOP_S, wanted)], 0.0, rng), length
 
