@@ -1,4 +1,4 @@
-"""What a drive with the saloon is made of: stops, hard stops, stops in two parts and in bends, coast-downs in neutral."""
+"""What a drive with the saloon is made of: stops, hard and easy, in two parts, in bends; coast-downs in neutral."""
 
 from dataclasses import dataclass
 
