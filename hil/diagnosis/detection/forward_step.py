@@ -10,6 +10,7 @@ import numpy as np
 
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.agreement import agrees
+from hil.diagnosis.detection.at_bounds import candidates_at_bounds
 from hil.diagnosis.detection.candidates import CandidateSet
 from hil.diagnosis.detection.nonparametric_search import NonparametricSearch, SelectionStep
 from hil.diagnosis.detection.onset import add_same_onset_alternatives, estimate_onsets_of_best
@@ -23,6 +24,7 @@ from hil.diagnosis.detection.profile_fit import (
     refit_from_best,
     refit_substitutes,
     refitted,
+    unscored,
 )
 from hil.diagnosis.detection.restart import RefitHypothesis, Refits, refit_from_nominal
 from hil.diagnosis.detection.result import Progress, Settings
@@ -41,7 +43,7 @@ from hil.diagnosis.detection.threshold import (
     RESTART_SHARE,
     DetectionThreshold,
 )
-from hil.diagnosis.estimation.gauss_newton import BIASED_BIRGE_RATIO, Fitter, Model
+from hil.diagnosis.estimation.gauss_newton import BIASED_BIRGE_RATIO, Fitter, Model, Term
 from hil.diagnosis.estimation.information import InformationBlocks
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import Noise
@@ -228,6 +230,7 @@ class ForwardStep:
         fitted = fit_shortlist(fits, tests, allowance.of, threshold, self._biased, self._progress)
         if self._biased:
             fitted = merge_best(fitted, self._fit_shortlist_at_nominal(candidates, noise, allowance, threshold))
+            fitted = merge_best(fitted, self._fit_beyond_bounds(model, noise))
         return fits, *fitted, threshold
 
     def _fit_shortlist_at_nominal(
@@ -245,6 +248,29 @@ class ForwardStep:
         tests = candidates.shortlist(fitter, tests, blocks, nominal, False)
         fits = CandidateFits(fitter, candidates.jacobian, nominal, noise, self._settings.relinearise)
         return fit_shortlist(fits, tests, allowance.of, threshold, False, self._progress)
+
+    def _fit_beyond_bounds(self, model: Model, noise: Noise) -> Fitted:
+        """Quantities whose nuisance parameters are at their bounds, each as a cause fitted from the nominal vehicle.
+
+        The first noise is a guess: what is not explained yet counts as noise. In the little noise that is left where
+        nuisance parameters absorbed a cause, every step overshoots.
+        """
+        beyond = candidates_at_bounds(self._fitter, model, self._state.candidates.candidates)
+        tests = {item.candidate: item for item in self._state.screening.scores}
+        found: list[tuple[ScoreTest, FittedHypothesis]] = []
+        if beyond and self._settings.relinearise:
+            self._progress(f"fitting {len(beyond)} quantities that are at their bounds, from the nominal vehicle")
+        last, nominal = self._fitter, self._nominal_fitter.with_simulator(self._fitter.simulator)
+        _, guess = nominal.start(noise.enabled)
+        none = np.zeros(len(nominal.nuisances))
+        for candidate in beyond if self._settings.relinearise else ():
+            self._fitter = nominal.copy()
+            start = nominal.at(none, (Term(candidate, 0.0),), guess)
+            fitted, own = self._nuisance_fit.fit(start, guess)
+            item = tests[candidate]
+            found.append((item, refitted(unscored(fitted, own, item.information), fitted, own)))
+        self._fitter = last
+        return [item for item, _ in found], [one for _, one in found]
 
     def _lowered_at_fit(
         self, threshold: DetectionThreshold, candidates: CandidateSet, fitted: list[FittedHypothesis]
