@@ -30,7 +30,7 @@ _SHORTEST_S, _LONGEST_S, _TURNING_S = 8.0, 25.0, 3.0
 _RELEASED_PA, _RELEASED_NM = 1e5, 20.0
 _CONTRADICTED = 0.8
 """Share of the time with active brakes or motors that has no demand, beyond which the demands are dropped."""
-_UNASKED_S, _RELEASE_S = 0.5, 0.5
+_UNDEMANDED_S, _RELEASE_S = 0.5, 0.5
 """Least time without a demand that contradicts one, and how long after a demand a release may take, s."""
 _STATE_OF_CHARGE = 0.7  # where no log has it
 _LEAST_MOVING_S = 4.0
@@ -115,15 +115,15 @@ def _without_contradicted_demands(logs: Sequence[Log]) -> Sequence[Log]:
             if log.has(*demands, *measured):
                 demand = np.nanmax([np.abs(log.channels[name]) for name in demands], axis=0)
                 active = np.nanmax([np.abs(log.channels[name]) for name in measured], axis=0) > 5.0 * released
-                unasked = active & ~_lasts(demand >= released, log.t_s, _RELEASE_S)
-                if _duration_s(unasked, log.t_s) > max(_UNASKED_S, _CONTRADICTED * _duration_s(active, log.t_s)):
+                undemanded = active & ~_lasts(demand >= released, log.t_s, _RELEASE_S)
+                if _duration_s(undemanded, log.t_s) > max(_UNDEMANDED_S, _CONTRADICTED * _duration_s(active, log.t_s)):
                     dropped |= set(demands)
     return _without(logs, dropped, "demands left out: brakes or motors act while their demand is zero")
 
 
-def _lasts(asked: Mask, t_s: Floats, time_s: float) -> Mask:
-    """Where something is asked, or was within the last ``time_s``."""
-    last_s = np.maximum.accumulate(np.where(asked, t_s, -np.inf))
+def _lasts(demanded: Mask, t_s: Floats, time_s: float) -> Mask:
+    """Where something is demanded, or was within the last ``time_s``."""
+    last_s = np.maximum.accumulate(np.where(demanded, t_s, -np.inf))
     return np.asarray(t_s - last_s <= time_s)
 
 

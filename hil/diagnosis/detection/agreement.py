@@ -1,4 +1,4 @@
-"""Agreement of the manoeuvres: whether a cause is told alike by all that show it, and by more than one kind of them.
+"""Agreement of the manoeuvres: whether all that show a cause agree on its value, and by more than one kind of them.
 
 Takes a fitted hypothesis; says what divides its gain, and whether its signature may be a direction of the model's form.
 """

@@ -10,7 +10,7 @@ from hil.diagnosis.vehicle.spec import Vehicle
 from hil.report.report import Number, Report, Section, Table, Verdict
 from plant.injection.theta import THETA
 
-_ALONE = "no force is measured: the stops have their figures, causes cannot be told"
+_ALONE = "no force is measured: the stops have their figures, causes cannot be found"
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """Goodness of fit: how far the final model is from every channel, beside its noise and what the channel does.
 
 Takes a diagnosis; gives a `ChannelFit` for each channel, and where the model does not describe the car at all. A white
-innovation with the size of the noise is a model that leaves nothing; a coloured one is told with where it is worst.
+innovation with the size of the noise is a model that leaves nothing; a coloured one stands with where it is worst.
 """
 
 from dataclasses import dataclass

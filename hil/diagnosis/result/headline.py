@@ -38,13 +38,13 @@ def not_described(misfits: Sequence[ChannelFit], rivals: Sequence[Mapping[str, A
     """That the model does not describe the car: in which channel, by how much, where; and what comes nearest."""
     worst = max(misfits, key=lambda one: one.unexplained)
     since_s, until_s = worst.worst_s
-    told = (
+    misfit = (
         f"The model does not describe this car: {worst.channel.replace('_', ' ')} is off by "
         f"{short_text(worst.error)} {worst.unit}, {100.0 * worst.unexplained:.0f} % of what it does, most in "
         f"{worst.worst_log} from {since_s:.1f} to {until_s:.1f} s."
     )
     nearest = "; ".join(_lower(sentence(one, interval=False)) for one in _by_effect(rivals)[:_MOST_RIVALS])
-    return f"{told} Nearest of what was tried, no cause: {nearest}." if nearest else told
+    return f"{misfit} Nearest of what was tried, no cause: {nearest}." if nearest else misfit
 
 
 def _by_effect(rivals: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:

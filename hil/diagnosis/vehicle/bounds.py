@@ -154,7 +154,7 @@ def refuse_implausible(where: str, key: str, name: str, given: float | list[floa
             continue
         shown = f" {unit}" if unit and factor == 1.0 else ""
         raise UnusableError(
-            f"{where}: {key} = {value:g}; expected {low:.4g} to {high:.4g}{shown}, as every road vehicle has"
+            f"{where}: {key}: expected {low:.4g} to {high:.4g}{shown}, as every road vehicle has, got {value:g}"
             f"{_other_unit(key, value, shown.strip(), low, high)}"
         )
 

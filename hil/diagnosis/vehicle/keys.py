@@ -107,8 +107,8 @@ LUMPED: Final = {
     "motor_time_constant_s": 0.7, "ehb_natural_frequency_hz": 0.4, "ehb_damping_ratio": 0.4, "ehb_dead_time_s": 0.5,
 }  # fmt: skip
 """Least half-width, as a share of the value, of what a set states of an actuator's delay where it does not state every
-limit: dead time, lag and rate limit are told as one of them, which of these the model calls by that name or not. A time
-constant of 25 ms may be a dead time of 14 and a lag of 11."""
+limit: dead time, lag and rate limit are often stated as one number. A time constant of 25 ms may be a dead time of 14
+and a lag of 11."""
 
 UNLIMITED: Final = {
     "ehb": ({"build_rate_pa_s": 5e8, "release_rate_pa_s": 5e8},),

@@ -213,8 +213,8 @@ def _stated(table: Mapping[str, Any], where: str, base: PlantParameters) -> _Sta
             stated.widen(name, checked_tolerance(value, key, where, len(given) if isinstance(given, list) else most))
             continue
         given = checked_numbers(value, key, where)
-        check_bounds(base, name, key, float(np.mean(given)) if not _by_axle(name, base) else given, where)
         refuse_implausible(where, key, name, given)
+        check_bounds(base, name, key, float(np.mean(given)) if not _by_axle(name, base) else given, where)
         if isinstance(given, list) and not _by_axle(name, base):
             mean, half_width = float(np.mean(given)), 0.5 * float(np.ptp(given))
             stated.values[name] = mean

@@ -118,10 +118,10 @@ def test_stops_of_which_the_speed_alone_is_known_have_their_figures(tmp_path, ca
         tmp_path / "stop.csv", np.column_stack((log.t_s, log.channels["speed_mps"])), "%.5f", ",",
         header="t_s,speed_mps", comments="",
     )  # fmt: skip
-    assert main(["explain", str(tmp_path / "stop.csv"), "--json"]) == 0
+    assert main(["explain", str(tmp_path / "stop.csv"), "--vehicle", "paper_car", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["verdict"] == "not_testable"
     assert [one["mfdd_mps2"] for one in answer["stops"]] == pytest.approx([6.0], rel=0.01)
-    assert main(["explain", str(tmp_path / "stop.csv"), "--out", str(tmp_path / "out")]) == 0
+    assert main(["explain", str(tmp_path / "stop.csv"), "--vehicle", "paper_car", "--out", str(tmp_path / "out")]) == 0
     assert "MFDD" in capsys.readouterr().out
     assert "Stops" in (tmp_path / "out" / "report.html").read_text()

@@ -86,7 +86,7 @@ def test_a_number_that_was_never_stated_is_not_within_stated_tolerances(diagnosi
 @pytest.mark.parametrize("vehicle", [paper_car(), load_vehicle(SIX)], ids=["shipped", "six"])
 def test_every_number_has_plain_words_and_a_key_that_a_set_may_hold(vehicle):
     tolerances = {}
-    for nuisance in (*vehicle.nuisances, *recording_nuisances(True, 0.004)):
+    for nuisance in (*vehicle.nuisances, *recording_nuisances(True, vehicle.latencies)):
         what = quantity(nuisance, vehicle)
         assert what.what
         assert "_" not in what.what, nuisance.name

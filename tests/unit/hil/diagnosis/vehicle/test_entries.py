@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from hil.diagnosis.data.log import UnusableError
 from hil.diagnosis.simulation.parameter_set import nominal
-from hil.diagnosis.vehicle.keys import ALIASES, DERIVED, LATENCY, LINE, SPECIAL
+from hil.diagnosis.vehicle.keys import ALIASES, DERIVED, LINE, SPECIAL
+from hil.diagnosis.vehicle.latency import ALL_NODES
 from hil.diagnosis.vehicle.load import load_vehicle
 from hil.diagnosis.vehicle.priors import HALF_WIDTH_TO_SIGMA, NuisanceKind
 from hil.diagnosis.vehicle.spec import Vehicle
@@ -87,6 +88,8 @@ def test_a_tolerance_of_zero_says_known_exactly_and_changes_nothing_else() -> No
             exact.add(stem)
         elif stem == "tyre_lky":  # whose state decides whether each axle has its own
             exact |= {f"vehicle_slip_angle_share_{axle}" for axle in ("front", "rear")}
+        elif stem == "tyre_lmux":  # a set that states friction has tyres of the Magic Formula
+            exact.add("tyre_partial_sliding")
         gone = base.keys() - own.keys()
         assert gone <= exact, key
         assert gone == exact or key in DERIVED or "piston_area" in stem, key  # one axle's alone; the brake gains'
@@ -95,7 +98,7 @@ def test_a_tolerance_of_zero_says_known_exactly_and_changes_nothing_else() -> No
             assert (now.kind, now.step, now.lower, now.upper) == (was.kind, was.step, was.lower, was.upper), (key, name)
 
 
-@pytest.mark.parametrize("key", [*KEYS, LATENCY, LINE])
+@pytest.mark.parametrize("key", [*KEYS, ALL_NODES, LINE])
 def test_a_negative_tolerance_or_too_long_a_list_is_refused(key: str) -> None:
     for bad in (-1.0, [0.1] * 7):
         assert "half-width" in str(outcome({f"{key}_tolerance": bad})) or key in DERIVED

@@ -212,8 +212,10 @@ def test_a_tolerance_of_all_nodes_holds_for_demands_and_steering_too() -> None:
     vehicle = load_vehicle(SIX | {"node_latency_s_tolerance": 1e-3})
     assert not any("node_latency" in remark for remark in vehicle.remarks)
     late = _late(vehicle)
-    assert {one.step[0] for name, one in late.items() if name not in ("late_yaw_rate", "late_ground_speed")} == {5e-4}
-    assert late["late_pressure_demand"].lower == 0.0
+    assert {late[f"late_{node}"].step[0] for node in ("imu", "pressure", "motor", "steering")} == {5e-4}
+    for node in ("pressure_demand", "motor_demand"):  # an actuator's dead time beside the frames'
+        assert late[f"late_{node}"].step[0] == pytest.approx(0.0105)
+        assert late[f"late_{node}"].lower == 0.0
     assert any("node_latency_s" in remark for remark in load_vehicle(SIX | {"node_latency_s": 1e-3}).remarks)
 
 
