@@ -162,8 +162,8 @@ def refuse_implausible(where: str, key: str, name: str, given: float | list[floa
 def _other_unit(key: str, value: float, unit: str, low: float, high: float) -> str:
     """The unit in which a value lies within the bounds, and the value to write."""
     if unit == "K" and low <= value + 273.15 <= high:
-        return f": degC? Write {key} = {value + 273.15:.5g}"
+        return f"; degC? Write {key} = {value + 273.15:.5g}"
     for other, factor in _UNITS.get(unit, {}).items():
         if low <= value * factor <= high:
-            return f": {other}? Write {key} = {value * factor:.5g}"
-    return ": another unit, or another quantity? docs/vehicle-set.md has every key with its unit"
+            return f"; {other}? Write {key} = {value * factor:.5g}"
+    return "; another unit, or another quantity? docs/vehicle-set.md has every key with its unit"

@@ -56,7 +56,7 @@ def test_the_cars_that_come_with_brakebench_and_the_reference_car_are_within(tmp
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("brake_gain_front_nm_pa", 26.0, r"= 26; expected 1e-06 to 0.1 N m/Pa.*N m/bar\? Write .* = 0.00026"),
+        ("brake_gain_front_nm_pa", 26.0, r"expected 1e-06 to 0.1 N m/Pa.*got 26; N m/bar\? Write .* = 0.00026"),
         ("brake_gain_rear_nm_per_pa", 150.0, r"N m/MPa\? Write .* = 0.00015|N m/bar\? Write .* = 0.0015"),
         ("mass_kg", 1.65, r"t\? Write mass_kg = 1650"),
         ("wheelbase_m", 2720.0, r"mm\? Write wheelbase_m = 2.72"),
@@ -69,7 +69,7 @@ def test_the_cars_that_come_with_brakebench_and_the_reference_car_are_within(tmp
         ("motor_peak_power_w", 75.0, r"kW\? Write motor_peak_power_w = 75000"),
         ("suspension_ride_rate_n_m", [30.8, 29.9], r"N/mm\? Write .* = 30800"),
         ("front_weight_share", 54.0, r"%\? Write front_weight_share = 0.54"),
-        ("tyre_friction", 100.0, r"tyre_friction = 100; expected"),
+        ("tyre_friction", 100.0, r"tyre_friction: expected .* got 100"),
         ("mass_kg_tolerance", -5.0, r"expected a half-width of 0 or more"),
     ],
 )  # fmt: skip
