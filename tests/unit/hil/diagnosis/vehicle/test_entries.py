@@ -94,6 +94,8 @@ def test_a_tolerance_of_zero_says_known_exactly_and_changes_nothing_else() -> No
         assert gone <= exact, key
         assert gone == exact or key in DERIVED or "piston_area" in stem, key  # one axle's alone; the brake gains'
         for name in base.keys() & own.keys():
+            if (stem, name) == ("tyre_lmux", "tyre_friction_load"):
+                continue  # known better beside a stated friction
             was, now = base[name], own[name]
             assert (now.kind, now.step, now.lower, now.upper) == (was.kind, was.step, was.lower, was.upper), (key, name)
 
