@@ -7,6 +7,7 @@ from pathlib import Path
 
 from hil.cli.options import add_json
 from hil.diagnosis.data.log import UnusableError
+from hil.rt.clock import monotonic_ns
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -51,8 +52,10 @@ def run(args: argparse.Namespace) -> int:
     from hil.diagnosis.sensor_consistency.check import Consistency
     from hil.diagnosis.sensor_consistency.page import build_report as sensor_report
 
+    begun_ns = monotonic_ns()
+
     def progress(text: str) -> None:
-        print(f"  {text} ...", file=sys.stderr)
+        print(f"{(monotonic_ns() - begun_ns) * 1e-9:5.0f} s  {text} ...", file=sys.stderr, flush=True)
 
     try:
         answer = explain(
