@@ -16,11 +16,8 @@ from hil.diagnosis.result.statistics import (
     bootstrap_interval,
     root_mean_square,
     squares_by_segment,
-    surely_positive,
 )
 
-_WORSE = 1.01
-"""Factor of a channel's held-out error beyond which a cause makes it larger, if the segments agree."""
 _TEMPERING = 1.5
 """Divisor of the criterion differences: two hypotheses differ less than an exact noise model would say."""
 
@@ -112,37 +109,30 @@ def confirmed(diagnosis: Diagnosis, progress: Progress) -> Diagnosis:
     """Without the causes that manoeuvres contradict which no fit saw, the cause accepted last first.
 
     A cause is contradicted where the held-out residuals are less likely with it than with the nuisance parameters
-    alone, or where it makes the error of a channel larger.
+    alone. The error of a speed in free run is no such measure: over a few manoeuvres a slow disturbance moves it more
+    than a true cause does.
     """
     fitter, noise = diagnosis.fitter, diagnosis.noise
-    tuned = held_out_residual(fitter, noise, diagnosis.base) if diagnosis.final.terms else {}
+    if not diagnosis.final.terms:
+        return diagnosis
     none = np.zeros(len(fitter.nuisances))
+    tuned = fitter.cost(held_out_residual(fitter, noise, diagnosis.base), none, noise)
     while diagnosis.final.terms:
-        after = held_out_residual(fitter, noise, diagnosis.final)
-        why = _channel_made_worse(after, tuned, fitter.masks)
-        if why is None and fitter.cost(after, none, noise) < fitter.cost(tuned, none, noise):
+        after = fitter.cost(held_out_residual(fitter, noise, diagnosis.final), none, noise)
+        if after < tuned:
             break
-        diagnosis = _without_last(diagnosis, why or "held-out manoeuvres are less likely with it than without")
+        diagnosis = _without_last(diagnosis)
         progress(diagnosis.remarks[-1])
     return diagnosis
 
 
-def _channel_made_worse(after: Tracks, tuned: Tracks, masks: SampleMasks) -> str | None:
-    """The channel whose held-out error a model makes larger, in words; None where there is none."""
-    for name in masks.names:
-        squares, others = _squares(after[name], masks, name), _squares(tuned[name], masks, name)
-        error, before = root_mean_square(squares), root_mean_square(others)
-        if error > _WORSE * before and surely_positive((squares - others)[:, 0]):
-            return f"it makes the held-out error of {name} larger, {before:.3g} to {error:.3g}"
-    return None
-
-
-def _without_last(diagnosis: Diagnosis, why: str) -> Diagnosis:
+def _without_last(diagnosis: Diagnosis) -> Diagnosis:
     """Without the cause accepted last, which may have several terms."""
     last = diagnosis.hypotheses[-1]
     kept = [k for k, listed in enumerate(diagnosis.hypotheses) if listed is not last]
     terms = diagnosis.final.terms
     names = ", ".join(f"{one.candidate.name} = {one.value:.3g}" for k, one in enumerate(terms) if k not in kept)
+    why = "manoeuvres that no fit saw are less likely with it than without"
     remarks = (*diagnosis.remarks, f"{names} is not named: {why}")
     hypotheses = tuple(diagnosis.hypotheses[k] for k in kept)
     diagnosis = replace(diagnosis, hypotheses=hypotheses, remarks=remarks)

@@ -37,12 +37,6 @@ def bootstrap_interval(squares: Floats) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def surely_positive(by_segment: Floats) -> bool:
-    """Whether the sum over the segments is positive in 97.5 % of bootstrap draws of segments."""
-    drawn = np.random.default_rng(0).integers(0, len(by_segment), (_DRAWS, len(by_segment)))
-    return float(np.quantile(by_segment[drawn].sum(axis=1), 0.025)) > 0.0
-
-
 def pattern(
     residual: Floats, valid: Floats, variables: Mapping[str, Floats], stride: int, otherwise: str = "no simple pattern"
 ) -> str:
