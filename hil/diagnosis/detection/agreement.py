@@ -23,9 +23,13 @@ _LEAST_ELSEWHERE = 2.0
 
 
 def agrees(fitter: Fitter, hypothesis: FittedHypothesis, least: float) -> bool:
-    """Whether a cause gains ``least`` with the variance that its manoeuvres show, and more than one kind shows it."""
+    """Whether a cause gains ``least`` with the variance that its manoeuvres show, and more than one kind shows it.
+
+    The gain is divided by the discrepancy of these logs already: the larger of both estimates of one error counts.
+    """
     one = consistencies(fitter, hypothesis.model, hypothesis.noise)[-1]
-    if hypothesis.gain < least * one.variance_inflation:
+    known = hypothesis.discrepancy_factor if np.isfinite(hypothesis.discrepancy_factor) else 1.0
+    if hypothesis.gain < least * max(one.variance_inflation / known, 1.0):
         return False
     candidate = hypothesis.term.candidate
     is_form = candidate.form_sd > 0.0 and candidate.effect.name in MODEL_FORM
