@@ -1,6 +1,7 @@
 """What an armed fault does at its place, tick by tick: the base of all families."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 import numpy as np
@@ -65,7 +66,7 @@ class Act:
         return frames
 
 
-class FrameAct(Act):
+class FrameAct(Act, ABC):
     """A fault of single frames of the vehicle bus: a subclass says what becomes of one.
 
     Each identifier has a random stream of its own, fixed by the seed: what befalls one message does not depend on the
@@ -107,9 +108,9 @@ class FrameAct(Act):
         """Pass a frame that the fault spares; a subclass may remember it."""
         return (frame,)
 
+    @abstractmethod
     def alter(self, frame: Frame) -> Sequence[Frame]:
         """What goes on the bus in the place of a frame."""
-        raise NotImplementedError
 
 
 def _whole(frame: Frame) -> bool:

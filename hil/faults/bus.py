@@ -1,5 +1,6 @@
 """Faults of frames on their way: lost, late, doubled, old, in wrong order; and senders that nobody asked for."""
 
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
 
@@ -191,7 +192,7 @@ class AnsweringSender(SecondSender):
         return (theirs + 1) % COUNTER_MODULUS
 
 
-class _Talker(Act):
+class _Talker(Act, ABC):
     """Sends frames of its own at a rate."""
 
     def __init__(self, injection: Injection, armed_ns: int, real: bool = False) -> None:
@@ -213,9 +214,9 @@ class _Talker(Act):
         self.left -= due
         return [self.one() for _ in range(due)] + frames
 
+    @abstractmethod
     def one(self) -> Frame:
         """The next frame."""
-        raise NotImplementedError
 
 
 class Babble(_Talker):

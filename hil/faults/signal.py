@@ -3,6 +3,7 @@
 Values are raw ones on the wire in the end: a value goes to the nearest step, and to the end of what the bits can hold.
 """
 
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 
 from dbc.frame import BusName, Frame
@@ -33,9 +34,9 @@ class _Signal(FrameAct):
         raw = self.raw(self.signal.read(frame.data))
         return (frame._replace(data=protected_again(self.spec, self.signal.write(frame.data, raw))),)
 
+    @abstractmethod
     def raw(self, raw: int) -> int:
         """Raw value to send in the place of another."""
-        raise NotImplementedError
 
     def value_of(self, raw: int) -> float:
         """A raw value in SI."""

@@ -57,7 +57,7 @@ _TEN, _HUNDRED, _TEN_THOUSAND = np.uint64(10), np.uint64(100), np.uint64(10_000)
 
 
 @inlined
-def word(buffer, p):  # type: ignore[no-untyped-def]
+def word(buffer, p):
     """Eight bytes as one number, the first one lowest: one load, where the compiler sees that no index is negative."""
     at = np.uint64(p)
     value = np.uint64(0)
@@ -67,7 +67,7 @@ def word(buffer, p):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def are_digits(value):  # type: ignore[no-untyped-def]
+def are_digits(value):
     """Whether the eight bytes of a `word` are decimal digits."""
     if value & _FIRST_NIBBLES != _DIGITS:
         return False
@@ -75,7 +75,7 @@ def are_digits(value):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def of_digits(value):  # type: ignore[no-untyped-def]
+def of_digits(value):
     """Value of eight decimal digits."""
     value &= _SECOND_NIBBLES
     value = (value * _TEN + (value >> _EIGHT)) & _TENS
@@ -84,13 +84,13 @@ def of_digits(value):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def byte_of(buffer, p):  # type: ignore[no-untyped-def]
+def byte_of(buffer, p):
     """Value of two hexadecimal digits; `NO_BYTE` and more for what is none."""
     at = np.uint64(p)
     return np.int64(PAIRS[np.int64(buffer[at]) | np.int64(buffer[at + np.uint64(1)]) << 8])
 
 
 @inlined
-def ends(byte):  # type: ignore[no-untyped-def]
+def ends(byte):
     """Whether a byte ends a word: a blank, a tabulator, the end of the line."""
     return byte == 32 or byte == 10 or byte == 13 or byte == 9

@@ -9,8 +9,10 @@ import uuid
 import pytest
 from processes import RUN_LIMIT_S, heed_interrupts
 
+from hil.errors import Verdict
+
 COMMAND = [sys.executable, "-m", "hil.cli.main"]
-INCONCLUSIVE = 4  # the verdict on a run that a busy machine disturbed: it tells nothing, so it is made again
+INCONCLUSIVE = Verdict.INCONCLUSIVE.exit_code  # a busy machine disturbed the run: it tells nothing, and is made again
 RUNS = 3
 
 

@@ -16,22 +16,22 @@ REQUESTS, UNKNOWN = 256, 257
 
 
 @compiled
-def _u8(buffer, at):  # type: ignore[no-untyped-def]
+def _u8(buffer, at):
     return np.int64(buffer[at])  # signed, as numba makes floats of signed and unsigned together
 
 
 @compiled
-def _u16(buffer, at):  # type: ignore[no-untyped-def]
+def _u16(buffer, at):
     return _u8(buffer, at) | _u8(buffer, at + 1) << 8
 
 
 @compiled
-def _u32(buffer, at):  # type: ignore[no-untyped-def]
+def _u32(buffer, at):
     return _u8(buffer, at) | _u8(buffer, at + 1) << 8 | _u8(buffer, at + 2) << 16 | _u8(buffer, at + 3) << 24
 
 
 @compiled
-def _signed_64(buffer, at):  # type: ignore[no-untyped-def]
+def _signed_64(buffer, at):
     high = _u32(buffer, at + 4)
     if high >= 0x8000_0000:
         high -= 0x1_0000_0000
@@ -39,13 +39,13 @@ def _signed_64(buffer, at):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _begins(buffer, at):  # type: ignore[no-untyped-def]
+def _begins(buffer, at):
     """Whether an object's signature stands at ``at``."""
     return buffer[at] == 76 and buffer[at + 1] == 79 and buffer[at + 2] == 66 and buffer[at + 3] == 74
 
 
 @compiled
-def _find(buffer, begin, end):  # type: ignore[no-untyped-def]
+def _find(buffer, begin, end):
     """Where the first signature wholly in begin..end stands; -1 for none."""
     for at in range(begin, end - 3):
         if buffer[at] == 76 and _begins(buffer, at):
@@ -54,7 +54,7 @@ def _find(buffer, begin, end):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def take_objects(  # type: ignore[no-untyped-def]
+def take_objects(
     buffer, begin, outer, final, layout, limits, indices, passed, rejected, names, name_lengths, columns, n
 ):
     """Take objects from ``begin`` on, where one begins; see `FrameBuilder.fill` for what it returns.

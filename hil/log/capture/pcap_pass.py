@@ -17,7 +17,7 @@ _FLAGS_OPTION = 2
 
 
 @compiled
-def _word(buffer, p, little):  # type: ignore[no-untyped-def]
+def _word(buffer, p, little):
     """The 32-bit number at ``p``, which must lie 4 bytes before the end."""
     a, b = int(np.int64(buffer[p])), int(np.int64(buffer[p + 1]))  # signed: int() of a uint8 is not
     c, d = int(np.int64(buffer[p + 2])), int(np.int64(buffer[p + 3]))
@@ -27,7 +27,7 @@ def _word(buffer, p, little):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _frame(buffer, begin, captured, size, link, little, columns, n):  # type: ignore[no-untyped-def]
+def _frame(buffer, begin, captured, size, link, little, columns, n):
     """Write one packet as row ``n`` but for time and channel.
 
     Returns its interface (0 where the link type names none), or -1 for a packet to be left.
@@ -86,9 +86,7 @@ def _frame(buffer, begin, captured, size, link, little, columns, n):  # type: ig
 
 
 @compiled
-def take_records(  # type: ignore[no-untyped-def]
-    buffer, begin, little, unit_ns, link, interfaces, names, name_lengths, columns, n
-):
+def take_records(buffer, begin, little, unit_ns, link, interfaces, names, name_lengths, columns, n):
     """Add the records of a pcap file; ``interfaces`` gives the channel of each interface, -1 for a new one."""
     times, channels = columns[0], columns[1]
     rows, size = times.shape[0], buffer.shape[0]
@@ -109,7 +107,7 @@ def take_records(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _sent(buffer, p, end, little):  # type: ignore[no-untyped-def]
+def _sent(buffer, p, end, little):
     """Whether the options between ``p`` and ``end`` say that the packet was sent."""
     while p + 4 <= end:
         word = _word(buffer, p, little)
@@ -123,9 +121,7 @@ def _sent(buffer, p, end, little):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def take_blocks(  # type: ignore[no-untyped-def]
-    buffer, begin, little, links, scales, offsets, interfaces, names, name_lengths, columns, n
-):
+def take_blocks(buffer, begin, little, links, scales, offsets, interfaces, names, name_lengths, columns, n):
     """Add the enhanced packets of one section of a pcapng file.
 
     For each interface of the section: ``links`` its link type, ``scales`` (k, 4) multiplier, divisor and power of two

@@ -13,7 +13,7 @@ _CHUNK = 1024
 
 
 @inlined
-def _hash(key, seed, mask):  # type: ignore[no-untyped-def]
+def _hash(key, seed, mask):
     """Place of a key; the seed is drawn anew in each process, so that no log can be made to collide."""
     x = (key ^ seed) & 0x3FFF_FFFF_FFFF_FFFF
     x = ((x ^ (x >> 29)) * 0x2545_F491) & 0x3FFF_FFFF_FFFF_FFFF
@@ -22,7 +22,7 @@ def _hash(key, seed, mask):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _swapped(x):  # type: ignore[no-untyped-def]
+def _swapped(x):
     """The word with its bytes in reverse order."""
     x = ((x & 0x00FF00FF00FF00FF) << 8) | ((x >> 8) & 0x00FF00FF00FF00FF)
     x = ((x & 0x0000FFFF0000FFFF) << 16) | ((x >> 16) & 0x0000FFFF0000FFFF)
@@ -30,7 +30,7 @@ def _swapped(x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def fill_hash(keys, values, seed, places, found):  # type: ignore[no-untyped-def]
+def fill_hash(keys, values, seed, places, found):
     """Fill an open-addressing table (``places`` all -1, a power of two, at least twice as long as ``keys``)."""
     mask = places.shape[0] - 1
     for i in range(keys.shape[0]):
@@ -42,7 +42,7 @@ def fill_hash(keys, values, seed, places, found):  # type: ignore[no-untyped-def
 
 
 @inlined
-def _take_note(per_slot, slot, n, number):  # type: ignore[no-untyped-def]
+def _take_note(per_slot, slot, n, number):
     """Count a frame of another length than the database says, and see whether it came on a new channel."""
     if n < per_slot[slot, 0]:
         per_slot[slot, 4] += 1
@@ -54,7 +54,7 @@ def _take_note(per_slot, slot, n, number):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _identifiers(ids, wide, flags, found):  # type: ignore[no-untyped-def]
+def _identifiers(ids, wide, flags, found):
     """Standard identifiers of data frames, 2048 for all other frames."""
     for i in range(found.shape[0]):
         found[i] = min(ids[i], np.uint32(2048))
@@ -64,7 +64,7 @@ def _identifiers(ids, wide, flags, found):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def assign_standard(columns, channels, dense, per_slot, slots, left, totals):  # type: ignore[no-untyped-def]
+def assign_standard(columns, channels, dense, per_slot, slots, left, totals):
     """Find the slot of every data frame with a standard identifier that a message has, and count.
 
     Parameters
@@ -133,7 +133,7 @@ def assign_standard(columns, channels, dense, per_slot, slots, left, totals):  #
 
 
 @compiled
-def assign_left(left, columns, channels, tables, unknown, per_slot, slots, totals):  # type: ignore[no-untyped-def]
+def assign_left(left, columns, channels, tables, unknown, per_slot, slots, totals):
     """Find the slot of the other frames, and count; parameters as of `assign_standard`.
 
     Parameters
@@ -216,7 +216,7 @@ def assign_left(left, columns, channels, tables, unknown, per_slot, slots, total
 
 
 @compiled
-def scatter(slots, words, stride, position, rows, first):  # type: ignore[no-untyped-def]
+def scatter(slots, words, stride, position, rows, first):
     """Sort frames by slot (stable): row numbers, and the first word of each.
 
     ``position`` holds where each slot begins and is moved on; ``words`` has ``stride`` words a frame.
@@ -240,7 +240,7 @@ def scatter(slots, words, stride, position, rows, first):  # type: ignore[no-unt
 
 
 @compiled
-def extract(words, jobs, ints, floats, as_int, as_float, counts, scratch):  # type: ignore[no-untyped-def]
+def extract(words, jobs, ints, floats, as_int, as_float, counts, scratch):
     """Cut signals out of words.
 
     Parameters
@@ -323,7 +323,7 @@ def extract(words, jobs, ints, floats, as_int, as_float, counts, scratch):  # ty
 
 
 @compiled
-def leave_out(words, numbers, values, rows, kept):  # type: ignore[no-untyped-def]
+def leave_out(words, numbers, values, rows, kept):
     """Leave out the values that are not available.
 
     Parameters

@@ -16,7 +16,7 @@ _I = tuple(int(i) for i in Id)
 
 
 @compiled
-def count_rows(  # type: ignore[no-untyped-def]
+def count_rows(
     columns, whole, ids, keys, places, intervals, channels, bit_ps, frame_bits, codes, scratch, scratch_bits
 ):
     """Count the rows of one table.

@@ -11,7 +11,7 @@ _ASC_REMOTE, _ASC_FD = 0x10, 0x1000  # in the flags of a CANFD line
 
 
 @inlined
-def _blanks(buffer, p, size):  # type: ignore[no-untyped-def]
+def _blanks(buffer, p, size):
     """Behind blanks and tabs; -1 where there is none."""
     begin = p
     while p < size and (buffer[p] == 32 or buffer[p] == 9):
@@ -20,7 +20,7 @@ def _blanks(buffer, p, size):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _is(buffer, p, size, word):  # type: ignore[no-untyped-def]
+def _is(buffer, p, size, word):
     """Whether a word stands here, and a blank or the end of the line behind it."""
     n = len(word)
     if p + n >= size:
@@ -37,9 +37,7 @@ _RX, _TX, _TXRQ = (82, 120), (84, 120), (84, 120, 82, 113)
 
 
 @compiled
-def take_lines(  # type: ignore[no-untyped-def]
-    buffer, begin, numbers, state, origin, relative, base, names, name_lengths, columns, n
-):
+def take_lines(buffer, begin, numbers, state, origin, relative, base, names, name_lengths, columns, n):
     """Add frames of lines; see `hil.log.text.lines.LineParser.take` and `FrameBuilder.fill`.
 
     ``numbers`` has the channel by its number in the log, -1 where it is new. ``state`` is changed: offset of the last

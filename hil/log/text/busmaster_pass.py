@@ -11,7 +11,7 @@ _REMOTE, _FD, _SENT = 1, 4, 32
 
 
 @inlined
-def _number(buffer, p, size, most):  # type: ignore[no-untyped-def]
+def _number(buffer, p, size, most):
     """Decimal number of at most ``most`` digits, and where it ends; -1 for none."""
     value, begin = 0, p
     while p < size and p - begin < most and 48 <= buffer[p] <= 57:
@@ -21,9 +21,7 @@ def _number(buffer, p, size, most):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def take_lines(  # type: ignore[no-untyped-def]
-    buffer, begin, numbers, state, start_ns, mode, base, names, name_lengths, columns, n
-):
+def take_lines(buffer, begin, numbers, state, start_ns, mode, base, names, name_lengths, columns, n):
     """Add frames of lines; see `hil.log.text.lines.LineParser.take` and `FrameBuilder.fill`.
 
     ``numbers`` has the channel by its number in the log, -1 where it is new. ``state`` is changed: midnight before

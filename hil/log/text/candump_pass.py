@@ -13,7 +13,7 @@ _TWO_BYTES, _TWO_ZEROS = np.uint64(16), np.uint64(0x3030)
 
 
 @inlined
-def _stamp(buffer, p, size):  # type: ignore[no-untyped-def]
+def _stamp(buffer, p, size):
     """Nanoseconds of ``(s.f) ``, and what follows; -1 where it is another form."""
     if p + _QUICK <= size and buffer[p + 11] == 46 and buffer[p + 18] == 41 and buffer[p + 19] == 32:
         first, last = word(buffer, p + 1), word(buffer, p + 12) << _TWO_BYTES | _TWO_ZEROS
@@ -45,7 +45,7 @@ def _stamp(buffer, p, size):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def take_lines(buffer, begin, names, name_lengths, columns, n):  # type: ignore[no-untyped-def]
+def take_lines(buffer, begin, names, name_lengths, columns, n):
     """Add lines ``(s.f) name ID#DATA``; see `hil.log.text.lines.LineParser.take` and `FrameBuilder.fill`."""
     times, channels, ids, wide, lengths, data, flags = columns
     rows, width, size = times.shape[0], data.shape[1], buffer.shape[0]

@@ -26,7 +26,7 @@ for _bit, _word in enumerate((b"remote", b"error", b"fd", b"brs", b"esi", b"tx")
 
 
 @compiled
-def _number(buffer, p, most):  # type: ignore[no-untyped-def]
+def _number(buffer, p, most):
     """Value of up to ``most`` decimal digits, and where they end; nothing is taken where there is none."""
     value, stop, size = 0, p + most, buffer.shape[0]
     while p < size and p < stop and 48 <= buffer[p] <= 57:
@@ -36,7 +36,7 @@ def _number(buffer, p, most):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _seconds(buffer, p):  # type: ignore[no-untyped-def]
+def _seconds(buffer, p):
     """Nanoseconds of ``-s.f`` before a comma, and what follows it; -1 for a stamp of another form."""
     size = buffer.shape[0]
     if p + _QUICK <= size and buffer[p + 10] == _POINT and buffer[p + 20] == _COMMA:  # as we write it, it may be
@@ -68,7 +68,7 @@ def _seconds(buffer, p):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _name(buffer, p, names, name_lengths, before):  # type: ignore[no-untyped-def]
+def _name(buffer, p, names, name_lengths, before):
     """Number of a known channel name, quoted or not, before a comma, and what follows it; -1 for any other."""
     size = buffer.shape[0]
     quoted = p < size and buffer[p] == _QUOTE
@@ -98,7 +98,7 @@ def _name(buffer, p, names, name_lengths, before):  # type: ignore[no-untyped-de
 
 
 @compiled
-def _words(buffer, p):  # type: ignore[no-untyped-def]
+def _words(buffer, p):
     """Flags of words with one blank between them, before a comma, and what follows it; -1 for any other."""
     bits, size = 0, buffer.shape[0]
     if p < size and buffer[p] == _COMMA:
@@ -130,7 +130,7 @@ def _words(buffer, p):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _line_end(buffer, p):  # type: ignore[no-untyped-def]
+def _line_end(buffer, p):
     """Begin of the next line where this one ends at ``p``, -1 where it does not."""
     size = buffer.shape[0]
     if p < size and buffer[p] == 13:
@@ -141,12 +141,12 @@ def _line_end(buffer, p):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _length_fits(length, fd):  # type: ignore[no-untyped-def]
+def _length_fits(length, fd):
     return length <= 8 or (fd and (length in (12, 16, 20, 24, 32, 48, 64)))
 
 
 @inlined
-def _short_name(names, name_lengths, channel):  # type: ignore[no-untyped-def]
+def _short_name(names, name_lengths, channel):
     """A channel's name with its comma as a `word`, and the mask of its bytes; a mask of 0 for one that is longer."""
     text, length = np.uint64(0), 0
     if channel < names.shape[0] and 0 < name_lengths[channel] < 8:
@@ -162,7 +162,7 @@ def _short_name(names, name_lengths, channel):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def take_rows(buffer, begin, names, name_lengths, columns, n):  # type: ignore[no-untyped-def]
+def take_rows(buffer, begin, names, name_lengths, columns, n):
     """Add our own rows, ``time_s,channel,id,extended,flags,length,data``."""
     times, channels, ids, wide, lengths, data, flags = columns
     rows, width, size = times.shape[0], data.shape[1], buffer.shape[0]
@@ -234,7 +234,7 @@ def take_rows(buffer, begin, names, name_lengths, columns, n):  # type: ignore[n
 
 
 @compiled
-def take_python_can(buffer, begin, names, name_lengths, columns, n):  # type: ignore[no-untyped-def]
+def take_python_can(buffer, begin, names, name_lengths, columns, n):
     """Add python-can's rows, ``timestamp,0xID,extended,remote,error,dlc,BASE64``, all of the only channel."""
     times, channels, ids, wide, lengths, data, flags = columns
     rows, width, size = times.shape[0], data.shape[1], buffer.shape[0]
@@ -313,7 +313,7 @@ def take_python_can(buffer, begin, names, name_lengths, columns, n):  # type: ig
 
 
 @compiled
-def _cell_is(buffer, p, word):  # type: ignore[no-untyped-def]
+def _cell_is(buffer, p, word):
     """The begin of what follows a lower-case word and a comma, whatever its case; -1 where another word stands."""
     if p + len(word) >= buffer.shape[0]:
         return -1
@@ -328,7 +328,7 @@ _RX, _TX = tuple(b"rx"), tuple(b"tx")
 
 
 @compiled
-def take_gvret(buffer, begin, directed, buses, names, name_lengths, columns, n):  # type: ignore[no-untyped-def]
+def take_gvret(buffer, begin, directed, buses, names, name_lengths, columns, n):
     """Add rows of GVRET's CSV, ``microseconds,ID,extended,[direction,]bus,length,byte,...``.
 
     ``directed`` says whether there is a direction; ``buses`` gives the channel of each bus number, -1 for a new one.

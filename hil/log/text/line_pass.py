@@ -29,14 +29,14 @@ _WORD_LENGTHS = np.array([6, 5, 2, 3, 3, 2])
 
 
 @inlined
-def _put(out, at, text):  # type: ignore[no-untyped-def]
+def _put(out, at, text):
     for k in range(text.shape[0]):
         out[at + k] = text[k]
     return at + text.shape[0]
 
 
 @inlined
-def _padded(out, at, value, base, width, fill):  # type: ignore[no-untyped-def]
+def _padded(out, at, value, base, width, fill):
     """A number that is not negative, at least ``width`` wide."""
     size, rest = 1, value // base
     while rest:
@@ -52,7 +52,7 @@ def _padded(out, at, value, base, width, fill):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _zeroed(out, at, value, width):  # type: ignore[no-untyped-def]
+def _zeroed(out, at, value, width):
     """Just ``width`` decimal digits."""
     for k in range(width):
         out[at + width - 1 - k] = _ZERO + value % 10
@@ -61,7 +61,7 @@ def _zeroed(out, at, value, width):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _stamp(out, at, value, unit, digits, width):  # type: ignore[no-untyped-def]
+def _stamp(out, at, value, unit, digits, width):
     """A stamp in ns as decimal fraction of ``unit`` ns with ``digits`` behind the point, its integer ``width`` wide."""
     whole, fraction, step = value // unit, value % unit, unit
     if value < 0:  # away from zero, and never the number itself, which may have no positive counterpart
@@ -88,7 +88,7 @@ def _stamp(out, at, value, unit, digits, width):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _bytes(out, at, data, row, count):  # type: ignore[no-untyped-def]
+def _bytes(out, at, data, row, count):
     """Bytes, a blank before each."""
     for j in range(count):
         byte = int(data[row, j])
@@ -100,7 +100,7 @@ def _bytes(out, at, data, row, count):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _code(count):  # type: ignore[no-untyped-def]
+def _code(count):
     """Length code of CAN FD."""
     if count <= 8:
         return count
@@ -110,7 +110,7 @@ def _code(count):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def asc_rows(out, columns, first, stop, numbers, start, fine):  # type: ignore[no-untyped-def]
+def asc_rows(out, columns, first, stop, numbers, start, fine):
     """Lines of ASC; ``numbers`` are those of the channels, row by row."""
     times, _, ids, wide, lengths, data, flags = columns
     at = 0
@@ -168,7 +168,7 @@ def asc_rows(out, columns, first, stop, numbers, start, fine):  # type: ignore[n
 
 
 @compiled
-def trc_rows(out, columns, first, stop, numbers, start, before):  # type: ignore[no-untyped-def]
+def trc_rows(out, columns, first, stop, numbers, start, before):
     """Lines of TRC 2.1, ``before`` of which were written."""
     times, _, ids, wide, lengths, data, flags = columns
     at = 0
@@ -215,7 +215,7 @@ def trc_rows(out, columns, first, stop, numbers, start, before):  # type: ignore
 
 
 @compiled
-def candump_rows(out, columns, first, stop, names, starts, fine, directed):  # type: ignore[no-untyped-def]
+def candump_rows(out, columns, first, stop, names, starts, fine, directed):
     """Lines of candump's log form."""
     times, channels, ids, wide, lengths, data, flags = columns
     at = 0
@@ -257,7 +257,7 @@ def candump_rows(out, columns, first, stop, names, starts, fine, directed):  # t
 
 
 @compiled
-def csv_rows(out, columns, first, stop, names, starts):  # type: ignore[no-untyped-def]
+def csv_rows(out, columns, first, stop, names, starts):
     """Lines of our CSV; ``names`` are quoted where they must be."""
     times, channels, ids, wide, lengths, data, flags = columns
     at = 0

@@ -12,7 +12,7 @@ _FD, _SWITCH, _STATE, _SENT = 4, 8, 16, 32
 
 
 @inlined
-def _blanks(buffer, p, size):  # type: ignore[no-untyped-def]
+def _blanks(buffer, p, size):
     """Behind blanks; -1 where there is none."""
     begin = p
     while p < size and buffer[p] == 32:
@@ -21,7 +21,7 @@ def _blanks(buffer, p, size):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def take_lines(buffer, begin, delta, state, names, name_lengths, columns, n):  # type: ignore[no-untyped-def]
+def take_lines(buffer, begin, delta, state, names, name_lengths, columns, n):
     """Add frames of lines; see `hil.log.text.lines.LineParser.take` and `FrameBuilder.fill`.
 
     ``delta`` tells that stamps of less than ten digits are distances. ``state`` is changed: their sum (ns); behind

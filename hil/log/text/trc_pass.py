@@ -10,7 +10,7 @@ _N, _O, _T, _B, _I, _D_SMALL, _R, _L_SMALL, _L, _D = 78, 79, 84, 66, 73, 100, 82
 
 
 @compiled
-def take_lines(buffer, begin, letters, numbers, origin, names, name_lengths, columns, n):  # type: ignore[no-untyped-def]
+def take_lines(buffer, begin, letters, numbers, origin, names, name_lengths, columns, n):
     """Add frames of lines; see `hil.log.text.lines.LineParser.take` and `FrameBuilder.fill`.
 
     ``letters`` are those of the columns, ``D`` the last one; ``numbers`` has the channel by its bus number, -1 where
