@@ -158,7 +158,9 @@ class ForwardStep:
         step = self._fit_candidates()
         if isinstance(step, Restarted):
             return step
-        best, self._fitter = self._state.nonparametric.best(self._fitter, step, self._refit_from_nominal)
+        best, self._fitter = self._state.nonparametric.best(
+            self._fitter, step, self._refit_from_nominal, self._linearised_at
+        )
         if best is not None:
             model, noise = self._fitter.alternate_noise_and_fit(best.model, best.noise, 1)
             return _added(step, best, model, noise, step.significant)
@@ -303,6 +305,12 @@ class ForwardStep:
         self._progress("fitting again from the nominal vehicle")
         refits = refit_from_nominal(self._nuisance_fit, fitted, model, refit, reference, relinearised, rival_criterion)
         return refits, self._fitter.denoised(model)
+
+    def _linearised_at(self, fitter: Fitter, model: Model) -> Fitter:
+        """With the Jacobian of the nuisance parameters at a model."""
+        self._fitter = fitter
+        self._nuisance_fit.relinearise_cached(model.z, model.terms)
+        return self._fitter
 
     def _best_significant(self, step: SelectionStep) -> FittedHypothesis | None:
         """The best significant hypothesis, also given a better one that is not significant."""

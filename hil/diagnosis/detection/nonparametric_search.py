@@ -11,10 +11,10 @@ import numpy as np
 
 from hil.diagnosis.detection.group_score_test import GroupScoreTest, best_of_each_term, fitted_hypothesis
 from hil.diagnosis.detection.nonparametric import BASIS_SIZE, NONPARAMETRIC_TERMS, BasisFunction
-from hil.diagnosis.detection.profile_fit import CandidateFits, FittedHypothesis, at_bound, criterion
+from hil.diagnosis.detection.profile_fit import CandidateFits, FittedHypothesis, at_bound, criterion, refitted
 from hil.diagnosis.detection.restart import RefitHypothesis, Refits
 from hil.diagnosis.detection.result import Progress, Settings
-from hil.diagnosis.detection.shape import fit_shape_parameters
+from hil.diagnosis.detection.shape import fit_shape_parameters, refit_shape_parameter
 from hil.diagnosis.detection.significance import FormErrorAllowance, LocalDiscrepancy
 from hil.diagnosis.detection.threshold import (
     FORM_ERROR,
@@ -34,6 +34,8 @@ RefitFromNominal = Callable[
     [Fitter, Model, Sequence[FittedHypothesis], RefitHypothesis, float, int, float], tuple[Refits, Fitter]
 ]
 """See `hil.diagnosis.detection.restart`; the fitter comes back with inputs denoised by the model."""
+LinearisedAt = Callable[[Fitter, Model], Fitter]
+"""The fitter with the Jacobian of the nuisance parameters at a model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +98,7 @@ class NonparametricSearch:
         self._test: GroupScoreTest | None = None
 
     def best(
-        self, fitter: Fitter, step: SelectionStep, refit_from_nominal: RefitFromNominal
+        self, fitter: Fitter, step: SelectionStep, refit_from_nominal: RefitFromNominal, linearised_at: LinearisedAt
     ) -> tuple[FittedHypothesis | None, Fitter]:
         """The best term, if it is preferred to the best listed cause and significant; the fitter of the last fits.
 
@@ -110,7 +112,7 @@ class NonparametricSearch:
             self._progress("simulating nonparametric terms")
             fitter = fitter.at_baseline(model)
             self._test = GroupScoreTest(fitter, fitter.parameter_set(model.z, model.terms))
-        attempt = _Attempt(fitter, step, self._test, refit_from_nominal)
+        attempt = _Attempt(fitter, step, self._test, refit_from_nominal, linearised_at)
         one = attempt.best()
         self._progress(f"best nonparametric term: {attempt.text(one)}, gain {attempt.reference - one.cost:.0f}")
         least = attempt.least(one, self._settings.alpha)
@@ -125,9 +127,11 @@ class NonparametricSearch:
             return None, attempt.fitter
         shaped, fitter = fit_shape_parameters(step.fits, fitter, self._candidates, one)
         attempt.fitter = fitter
+        if shaped is not None and attempt.is_preferred_to(one, shaped, True, least):
+            shaped = attempt.refit_shaped(shaped, one)
         if shaped is None or attempt.is_preferred_to(one, shaped, True, least):
-            return one, fitter
-        return shaped, fitter
+            return one, attempt.fitter
+        return shaped, attempt.fitter
 
 
 class _Attempt:
@@ -137,9 +141,11 @@ class _Attempt:
     """
 
     def __init__(
-        self, fitter: Fitter, step: SelectionStep, test: GroupScoreTest, refit_from_nominal: RefitFromNominal
-    ) -> None:
-        self._step, self._test, self._refit_from_nominal = step, test, refit_from_nominal
+        self, fitter: Fitter, step: SelectionStep, test: GroupScoreTest, refit_from_nominal: RefitFromNominal,
+        linearised_at: LinearisedAt,
+    ) -> None:  # fmt: skip
+        self._step, self._test = step, test
+        self._refit_from_nominal, self._linearised_at = refit_from_nominal, linearised_at
         self.reference = step.reference
         scores, self.fitter = test.scores(fitter, step.model, step.noise)
         tops = best_of_each_term(scores, NONPARAMETRIC_WITH_OWN_NOISE)
@@ -178,6 +184,14 @@ class _Attempt:
         )
         self.reference = min(self.reference, without[0].cost)
         return refits
+
+    def refit_shaped(self, shaped: FittedHypothesis, one: FittedHypothesis) -> FittedHypothesis | None:
+        """A listed cause with a shape, from the nominal vehicle and with a Jacobian of its own, as the term ``one``."""
+        ((shaped,), _), fitter = self._refit_from_nominal(
+            self.fitter, self._step.model, [shaped], refitted, self.reference, 1, np.inf
+        )
+        self.fitter = self._linearised_at(fitter, shaped.model)
+        return refit_shape_parameter(self.fitter, shaped, one)
 
     def is_preferred(self, one: FittedHypothesis, least: float) -> bool:
         """To the best listed cause."""

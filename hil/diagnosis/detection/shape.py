@@ -18,7 +18,7 @@ from hil.diagnosis.detection.profile_fit import CandidateFits, FittedHypothesis,
 from hil.diagnosis.detection.threshold import SHAPE_MIN_SHARE
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
 from hil.diagnosis.estimation.information import finite_difference_jacobian, information_blocks, solve
-from hil.diagnosis.estimation.model_discrepancy import variance_inflation
+from hil.diagnosis.estimation.model_discrepancy import FORM_SHARE, variance_inflation
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.estimation.uncertainty import FORM_SD_SHARE
 from hil.diagnosis.noise.model import Noise
@@ -81,6 +81,7 @@ def fit_shape_parameters(
             shape,
             at,
             suspension_stated=one.suspension_stated,
+            form_sd=one.form_sd,
         )
         for one in listed
         for shape in one.effect.parameters
@@ -112,14 +113,38 @@ def fit_shape_parameters(
     return _fitted(fitter, bare, start, nonparametric), fitter
 
 
+def refit_shape_parameter(
+    fitter: Fitter, listed: FittedHypothesis, nonparametric: FittedHypothesis
+) -> FittedHypothesis | None:
+    """A hypothesis of `fit_shape_parameters` with its shape fitted again, given the Jacobian of ``fitter``."""
+    candidate, *others = listed.term.candidate, *listed.model.terms[:-1]
+    assert isinstance(candidate, ShapedCandidate)
+    bare = fitter.at(listed.model.z, others, nonparametric.noise)
+    return _fitted(fitter, bare, replace(candidate, deviation=0.0), nonparametric)
+
+
 def _cost(pair: tuple[Model, ShapedCandidate]) -> float:
     return pair[0].cost
 
 
 def _grid(shape: Parameter) -> list[float]:
     """Values of a shape parameter to test."""
-    wide = shape.high > _WIDE_RATIO * shape.low > 0.0
-    return list(map(float, (np.geomspace if wide else np.linspace)(shape.low, shape.high, _GRID)))
+    return list(map(float, (np.geomspace if _wide(shape) else np.linspace)(shape.low, shape.high, _GRID)))
+
+
+def _wide(shape: Parameter) -> bool:
+    return shape.high > _WIDE_RATIO * shape.low > 0.0
+
+
+def _neighbours(shape: Parameter, at: float) -> tuple[float, float]:
+    """One step of the grid to either side of a value, within the bounds."""
+    if _wide(shape):
+        factor = (shape.high / shape.low) ** (1.0 / (_GRID - 1))
+        below, above = at / factor, at * factor
+    else:
+        step = (shape.high - shape.low) / (_GRID - 1)
+        below, above = at - step, at + step
+    return max(below, shape.low), min(above, shape.high)
 
 
 def _fitted(
@@ -147,15 +172,14 @@ def _fitted(
         tried.append((at, min(models, key=lambda model: model.cost)))
         return tried[-1][1].cost
 
-    grid = _grid(start.shape)
-    index = grid.index(start.at)
-    neighbours = grid[max(index - 1, 0)], grid[min(index + 1, len(grid) - 1)]
+    neighbours = _neighbours(start.shape, start.at)
     if bare.cost - cost(start.at) < SHAPE_MIN_SHARE * (bare.cost - nonparametric.cost):
         return None
     minimize_scalar(cost, bounds=neighbours, method="bounded", options={"maxiter": _ROUNDS})
     at, model = min(tried, key=lambda one: one[1].cost)
     by_noise = _deviation(at, model.cost, [(other, of.cost) for other, of in tried], start.shape)
-    by_form = FORM_SD_SHARE * (neighbours[1] - neighbours[0])
+    form_share = hypot(FORM_SD_SHARE, FORM_SHARE if start.form_sd else 0.0)  # as for the value beside it
+    by_form = form_share * (neighbours[1] - neighbours[0])
     deviation = hypot(
         by_noise * sqrt(variance_inflation(start)), by_form, _deviation_by_nuisances(fitter, model, noise, by_noise)
     )
