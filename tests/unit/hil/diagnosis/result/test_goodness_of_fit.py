@@ -48,13 +48,26 @@ def test_a_car_that_the_model_describes(diagnosis):
     assert speed.worst_error >= speed.error
 
 
-def test_brakes_that_do_something_else_are_no_car_of_ours(diagnosis):
-    """From the middle on the measured car rolls on while the simulated one brakes."""
-    drifted = {name: values.copy() for name, values in diagnosis.final.residual.items()}
+def _rolls_on(diagnosis, model):
+    """A model of the car that brakes while the measured one, from the middle on, rolls on."""
+    drifted = {name: values.copy() for name, values in model.residual.items()}
     late = np.arange(len(drifted["wheel.mean"])) * diagnosis.fitter.masks.sample_s - 10.0
     drifted["wheel.mean"][:, 0] += np.maximum(late, 0.0)
-    other = replace(diagnosis, final=replace(diagnosis.final, residual=drifted))
-    speed = {one.track: one for one in goodness_of_fit(other)}["wheel.mean"]
+    return replace(model, residual=drifted)
+
+
+def test_brakes_that_do_something_else_are_no_car_of_ours(diagnosis):
+    final, told = (_rolls_on(diagnosis, one) for one in (diagnosis.final, diagnosis.nominal))
+    speed = {one.track: one for one in goodness_of_fit(replace(diagnosis, final=final, nominal=told))}["wheel.mean"]
     assert not speed.described
     assert speed.worst_s[1] > 10.0
     assert speed.whiteness_p < 1e-3
+
+
+def test_a_fit_that_drifts_is_no_other_car(diagnosis):
+    """What the vehicle as told describes, the model describes."""
+    final = _rolls_on(diagnosis, diagnosis.final)
+    speed = {one.track: one for one in goodness_of_fit(replace(diagnosis, final=final))}["wheel.mean"]
+    assert speed.unexplained > 0.1
+    assert speed.error_as_told < 0.1 * speed.error
+    assert speed.described
