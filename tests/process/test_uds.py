@@ -6,13 +6,11 @@ import time
 import can
 import numpy as np
 import pytest
-from processes import wait_until
-from uds_whole_list import STANDING, plugged_in, run_the_whole_list
+from uds_whole_list import STANDING, plugged_in, run_the_whole_list, until_normal
 
 from dbc.bench_messages import EcuTiming
 from dbc.contract import spec_of
 from dbc.frame import BusName, Frame
-from dbc.messages import BrakeMode, BrakeStatus
 from hil.bus.channel import bench_channel
 from hil.bus.open import open_bus
 
@@ -24,14 +22,7 @@ def standing(tmp_path, start, channel):
     for role in ("plant", "ecu"):
         start(role, "standing.toml", "--bus", channel)
     with can.Bus(interface="brakebench", channel=channel.partition(":")[2]) as bus:
-        spec = spec_of(BrakeStatus)
-
-        def normal():
-            message = bus.recv(1.0)
-            known = message is not None and message.arbitration_id == spec.can_id
-            return known and spec.decode(bytes(message.data))[0] == BrakeMode.NORMAL
-
-        wait_until(normal, "NORMAL")
+        until_normal(bus)
         yield bus
 
 

@@ -8,11 +8,14 @@ from itertools import pairwise
 import can
 import isotp
 import pytest
+from processes import wait_until
 from uds_tester import client_over
 from udsoncan.connections import PythonIsoTpConnection
 from udsoncan.exceptions import NegativeResponseException
 
+from dbc.contract import spec_of
 from dbc.diagnostic_ids import PERIODIC, REQUEST, RESPONSE
+from dbc.messages import BrakeMode, BrakeStatus
 from ecu.diagnostics.calibration import PARAMETERS
 from ecu.diagnostics.identifiers import IDENTIFIERS
 from ecu.law.trouble_codes import CODES
@@ -25,6 +28,18 @@ pedal = [[0.0, 0.0]]
 [end]
 duration_s = 3600.0
 """
+
+
+def until_normal(bus: can.BusABC) -> None:
+    """Wait until the controller on a bus is in NORMAL."""
+    spec = spec_of(BrakeStatus)
+
+    def normal() -> bool:
+        message = bus.recv(1.0)
+        known = message is not None and message.arbitration_id == spec.can_id
+        return known and spec.decode(bytes(message.data))[0] == BrakeMode.NORMAL
+
+    wait_until(normal, "NORMAL")
 
 
 @contextmanager
