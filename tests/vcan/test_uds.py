@@ -16,7 +16,6 @@ def test_the_whole_list_on_vcan(lab_vcan0: str, tmp_path: Path) -> None:
     started = [
         subprocess.Popen([*COMMAND, role, scenario.name, "--bus", f"socketcan:{lab_vcan0}"], cwd=tmp_path)
         for role in ("plant", "ecu")
-        for role in ("plant", "ecu")
     ]
     try:
         with can.Bus(interface="socketcan", channel=lab_vcan0) as bus:

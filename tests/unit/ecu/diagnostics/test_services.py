@@ -8,6 +8,9 @@ import pytest
 from uds_tester import functional
 from udsoncan.exceptions import NegativeResponseException
 
+from dbc.diagnostic_ids import REQUEST, REQUEST_FUNCTIONAL, RESPONSE
+from dbc.frame import BusName, Frame
+from dbc.isotp import segment
 from dbc.messages import WheelSpeedFront
 from ecu.diagnostics.calibration import PARAMETERS
 from ecu.diagnostics.identifiers import IDENTIFIERS
@@ -306,3 +309,35 @@ def test_suppressed_answers_and_functional_requests(bench):
     assert bench.server.session == 3
     assert functional(tester, "10 81") == []
     assert bench.server.session == 1
+
+
+def test_a_request_to_everybody_amid_a_long_one(bench):
+    dids = list(IDENTIFIERS)[:5]
+    long = segment(b"\x22" + b"".join(did.to_bytes(2, "big") for did in dids))
+    step = bench.rig.step
+    sent = []
+    for data in long:
+        silent = Frame(BusName.VEHICLE, REQUEST_FUNCTIONAL, b"\x02\x3e\x80")
+        sent += step(1, [Frame(BusName.VEHICLE, REQUEST, data), silent])
+        sent += step(1, [Frame(BusName.VEHICLE, REQUEST_FUNCTIONAL, b"\x02\x3e\x00")])
+    sent += [frame for _ in range(10) for frame in step(1)]
+    answers = [frame.data for frame in sent if frame.can_id == RESPONSE]
+    present = [data for data in answers if data[:3] == b"\x02\x7e\x00"]
+    assert len(present) == len(long) - 1  # the last one comes while the long answer is on its way
+    assert sum(data[0] == 0x30 for data in answers) == 1
+    assert sum(data[:4] == b"\x03\x7f\x22\x78" for data in answers) == 1
+    assert sum(data[0] >> 4 == 1 for data in answers) == 1
+
+
+def test_an_answer_that_nobody_takes_is_given_up(bench):
+    step = bench.rig.step
+    supported = Frame(BusName.VEHICLE, REQUEST, b"\x02\x19\x0a")
+    sent = step(1, [supported])
+    for _ in range(90):
+        sent += step(1, [supported])
+    first = [frame.data for frame in sent if frame.can_id == RESPONSE]
+    assert [data[0] for data in first] == [0x03, 0x11]  # 0x78, the first frame, nothing more
+    for _ in range(30):
+        step(1)
+    assert not bench.server.awake
+    assert bench.tester.ask("3e 00") == ["7e 00"]
