@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from hil.cli.columns import say, terminal_width
+from hil.cli.decode_uds import add_uds, check_options, run_uds
 from hil.cli.log_options import (
     LOGS,
     add_databases,
@@ -63,19 +64,23 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     )
     parser.add_argument("--limit-mb", metavar="N", type=float, help="read at most so much of each log (unpacked)")
     parser.add_argument("--e2e-legacy", action="store_true", help="check by the check value of older recordings")
+    add_uds(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Summarise, write the signals, say what is missing."""
-    databases_, files = databases(args.dbc)
+    check_options(args)
     choice = _choice(args)
+    if args.uds:
+        return run_uds(args, choice, _limit_bytes(args))
+    databases_, files = databases(args.dbc)
     wanted = choice.wanted(databases_)
     rates = bit_rates(args.bitrate)
     contents = Contents(databases_, wanted, rates, args.e2e_legacy)
     _check_out(args)
-    limit = None if args.limit_mb is None else int(args.limit_mb * 1_000_000)
+    limit = _limit_bytes(args)
     warnings = (*databases_.warnings, *(w for one in databases_.all() for w in one.warnings))
     with (
         Logs(paths(args.log), ReadOptions(timezone=args.timezone), limit) as logs,
@@ -113,9 +118,15 @@ def _choice(args: argparse.Namespace) -> Choice:
     return Choice(tuple(args.channel), begin, end, words_of(args.messages), words_of(args.signals))
 
 
-def _check_out(args: argparse.Namespace) -> None:
-    if args.limit_mb is not None and not 0 < args.limit_mb < 1e9:
+def _limit_bytes(args: argparse.Namespace) -> int | None:
+    if args.limit_mb is None:
+        return None
+    if not 0 < args.limit_mb < 1e9:
         raise BrakebenchError(f"--limit-mb {args.limit_mb:g}: expected a number of megabytes above 0")
+    return int(args.limit_mb * 1_000_000)
+
+
+def _check_out(args: argparse.Namespace) -> None:
     if args.out is not None:
         from hil.log.export.messages import check_target
 

@@ -15,6 +15,7 @@ from hil.uds.addresses import Addresses, Identifier, keys_of
 from hil.uds.words import FOREIGN, Kind, Names, Said, describe
 
 _CHANNEL_SHIFT = 32
+_STOP = 4  # transmission mode of ReadDataByPeriodicIdentifier
 
 
 class Spoken(NamedTuple):
@@ -87,6 +88,7 @@ class _Request(NamedTuple):
     service: int | None
     end_ns: int
     wanted: bool
+    data: bytes
 
 
 class Conversation:
@@ -129,12 +131,14 @@ class Conversation:
 
     def _take(self, time_ns: int, key: int, data: bytes, channels: tuple[str, ...]) -> list[Spoken]:
         pdu = parse(data)
+        under_way = key in self._under_way
         joined = self._joiner.take(time_ns, key, data)
+        late = bool(joined) and joined[0].error is LinkError.N_TIMEOUT_CR
         for one in joined:
             self._under_way.discard(one.can_id)
         if pdu is None:
             self.counts.frames[NO_ISOTP] += 1
-        elif pdu.kind is PduKind.CONSECUTIVE and not (key in self._under_way or joined):
+        elif pdu.kind is PduKind.CONSECUTIVE and (late or not under_way):
             self.counts.frames[NO_FIRST] += 1
         else:
             self.counts.frames[_KINDS[pdu.kind]] += 1
@@ -188,12 +192,12 @@ class Conversation:
         with_sub = said.service in names.WITH_SUBFUNCTION and len(joined.data) > 1
         quiet = with_sub and bool(joined.data[1] & names.SUPPRESS_BIT)
         if self.addresses.is_functional(identifier):
-            self._asked_all[place] = identifier, _Request(said.service, joined.end_ns, wanted=False)
+            self._asked_all[place] = identifier, _Request(said.service, joined.end_ns, False, joined.data)
             return
         before = self._asked.get((place, identifier))
         if before is not None and before.wanted:
             self.counts.unanswered += 1
-        self._asked[place, identifier] = _Request(said.service, joined.end_ns, wanted=not quiet)
+        self._asked[place, identifier] = _Request(said.service, joined.end_ns, not quiet, joined.data)
 
     def _answer(self, joined: JoinedMessage, place: int, identifier: Identifier, said: Said) -> int | None:
         partner = self.addresses.partner(identifier)
@@ -202,10 +206,20 @@ class Conversation:
             if said.kind is not Kind.PENDING:
                 self._asked[place, partner] = asked._replace(wanted=False)
                 if said.kind is Kind.ANSWER and said.service == 0x2A:
-                    self._periodic.setdefault((place, identifier), set()).update(range(256))
+                    self._send_periodically((place, identifier), asked.data)
             return joined.start_ns - asked.end_ns
         to_all = self._asked_all.get(place)
         if to_all is not None and to_all[1].service == said.service:
             return joined.start_ns - to_all[1].end_ns
         self.counts.unasked += 1
         return None
+
+    def _send_periodically(self, where: tuple[int, Identifier], request: bytes) -> None:
+        """Take note of the periodic data that a request begins or ends; without identifiers the end is that of all."""
+        active = self._periodic.setdefault(where, set())
+        if request[1:2] != bytes((_STOP,)):
+            active.update(request[2:])
+        elif len(request) > 2:
+            active.difference_update(request[2:])
+        else:
+            active.clear()
