@@ -109,9 +109,7 @@ def _line(one: Spoken, first_ns: int) -> str:
     if len(one.data) > SHOWN_BYTES:
         shown += f" ... {len(one.data)} bytes]"
     time_s = (one.start_ns - first_ns) * 1e-9
-    return printable(
-        f"{time_s:12.6f}  {one.channel:8}  {one.identifier!s:8}  {kind:8}  {after:>8}  {text}  {shown}"
-    )
+    return printable(f"{time_s:12.6f}  {one.channel:8}  {one.identifier!s:8}  {kind:8}  {after:>8}  {text}  {shown}")
 
 
 def summary_lines(conversation: Conversation) -> list[str]:
@@ -131,8 +129,11 @@ def summary_lines(conversation: Conversation) -> list[str]:
     odd = [(counts.unanswered, "requests without an answer"), (counts.unasked, "answers without a request")]
     lines += [f"{n:,} {what}" for n, what in odd if n]
     lines += [f"{n:,} messages incomplete: {error.value}" for error, n in counts.broken.items()]
-    lines += [f"{counts.frames[NO_FIRST]:,} consecutive frames without a first frame"] if counts.frames[NO_FIRST] else []
-    lines += [f"{counts.frames[NO_ISOTP]:,} frames that are not ISO-TP"] if counts.frames[NO_ISOTP] else []
+    left = [
+        (counts.frames[NO_FIRST], "consecutive frames without a first frame"),
+        (counts.frames[NO_ISOTP], "frames that are not ISO-TP"),
+    ]
+    lines += [f"{n:,} {what}" for n, what in left if n]
     for (channel, identifier), n in sorted(counts.identifiers.items()):
         lines.append(printable(f"{channel} {identifier}{_role(conversation.addresses, identifier)}: {n:,} messages"))
     return lines

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
+from hil.errors import BrakebenchError, Verdict
 from hil.uds import names
 from hil.uds.dtc import ALL_CODES, dtc_text, obd_text, status_text
 
@@ -23,11 +24,20 @@ class Kind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Did:
-    """A data identifier of a known ECU: its name, its bytes (None: any number), and what they say."""
+    """A data identifier of a known ECU.
+
+    Attributes
+    ----------
+    name : one word, as it is asked for.
+    length : its bytes; None where they may be any number.
+    value : what its bytes say, with unit.
+    coded : bytes of a value as a person writes it; BrakebenchError where it is none.
+    """
 
     name: str
     length: int | None = None
     value: Callable[[bytes], str] | None = None
+    coded: Callable[[str], bytes] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +83,13 @@ class Said:
     text: str
 
 
-class _CutShort(Exception):
-    """Fewer bytes than the service needs."""
+class CutShortError(BrakebenchError):
+    """A message has fewer bytes than its service needs."""
+
+    exit_code = Verdict.BROKEN.exit_code
+
+    def __init__(self) -> None:
+        super().__init__("the answer is cut short: it has fewer bytes than its service needs")
 
 
 class _Bytes:
@@ -85,7 +100,7 @@ class _Bytes:
 
     def take(self, n: int) -> bytes:
         if len(self.left) < n:
-            raise _CutShort
+            raise CutShortError
         taken, self.left = self.left[:n], self.left[n:]
         return taken
 
@@ -172,7 +187,7 @@ def _line(service: int, data: bytes, known: Names, answer: bool) -> str:
             words.append(value_text(rest.rest()))
         if quiet:
             words.append("no answer wanted")
-    except _CutShort:
+    except CutShortError:
         words.append(f"cut short at {len(data) + 1} bytes")
     return ", ".join(filter(None, words))
 
@@ -358,19 +373,29 @@ def _with_status(known: Names, number: int, status: int) -> str:
     return f"{known.dtc_text(number)} [{status_text(status)}]"
 
 
-def _snapshots(rest: _Bytes, known: Names) -> list[str]:
-    """Records of data identifiers; only with an ECU whose lengths are known can they be told apart."""
-    words = []
+def snapshots(records: bytes, known: Names) -> list[tuple[int, int, bytes]]:
+    """Part snapshot records: record number, data identifier, value.
+
+    Only an ECU whose lengths are known tells where a value ends; else the first one takes all the rest.
+    """
+    rest, found = _Bytes(records), []
     while rest.left:
         record, count = rest.number(), rest.number()
-        words.append(f"record {record}")
         for _ in range(count):
             did = rest.number(2)
             length = known.dids[did].length if did in known.dids else None
-            data = rest.rest() if length is None else rest.take(length)
-            words.append(f"{known.did_text(did)} = {known.value_text(did, data)}")
+            found.append((record, did, rest.rest() if length is None else rest.take(length)))
             if length is None:
-                return words
+                return found
+    return found
+
+
+def _snapshots(rest: _Bytes, known: Names) -> list[str]:
+    words, shown = [], -1
+    for record, did, data in snapshots(rest.rest(), known):
+        words += [f"record {record}"] if record != shown else []
+        words.append(f"{known.did_text(did)} = {known.value_text(did, data)}")
+        shown = record
     return words
 
 
