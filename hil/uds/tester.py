@@ -17,6 +17,7 @@ from udsoncan.Request import Request
 from hil.errors import BrakebenchError, Verdict
 from hil.rt.clock import monotonic_ns
 from hil.uds.dtc import ALL_CODES
+from hil.uds.names import WITH_SUBFUNCTION
 from hil.uds.transport import IsoTpConnection
 from hil.uds.words import FOREIGN, Names, Said, describe, refusal_text, service_text
 
@@ -108,15 +109,20 @@ class Tester:
     def ask(self, payload: bytes) -> bytes:
         """Send a request of a service of the standard, return its positive answer; empty where it wants none."""
         request = Request.from_payload(payload)
-        try:
-            known = request.service is not None and request.get_payload() == payload
-        except ValueError:  # no sub-function
-            known = False
-        if not known:
+        with_sub = payload[:1] and payload[0] in WITH_SUBFUNCTION
+        if request.service is None or len(payload) < 1 + bool(with_sub):
             raise BrakebenchError(
                 f"{payload.hex(' ').upper()}: no whole request of ISO 14229; its service stands first, such as 3E 00"
             )
-        answer = self._asked(payload, lambda: self._client.send_request(request))
+        if not with_sub:  # udsoncan takes the second byte of services it does not know more of for one
+            request.suppress_positive_response = False
+            request.subfunction = 0
+
+        def send() -> Any:
+            with self._client.payload_override(payload):  # as it is, byte by byte
+                return self._client.send_request(request)
+
+        answer = self._asked(payload, send)
         return bytes(answer.original_payload) if answer is not None else b""
 
     def say(self, answer: bytes) -> Said:
