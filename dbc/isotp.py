@@ -188,6 +188,7 @@ class Link:
         self.errors: list[LinkError] = []
         self.flow: tuple[int, int] | None = None
         self._out: list[bytes] = []
+        self._flows: list[bytes] = []
         self._sending: _Sending | None = None
         self._receiving: _Receiving | None = None
 
@@ -203,7 +204,7 @@ class Link:
 
     def send(self, now_ns: int, message: bytes) -> None:
         """Begin to send a message; RuntimeError while another is on its way."""
-        if self._sending is not None:
+        if self.sending:
             raise RuntimeError("a message is still being sent; look at `sending` first")
         first, *left = segment(message, self.frame_bytes, self.padding)
         self._out.append(first)
@@ -236,7 +237,8 @@ class Link:
     def frames(self, now_ns: int) -> list[bytes]:
         """Data bytes of the frames that are due."""
         self._expire(now_ns)
-        out, self._out = self._out[: self.burst], self._out[self.burst :]
+        out = [*self._flows, *self._out]
+        self._flows, self._out = [], []
         s = self._sending
         while s is not None and s.flow_until_ns is None and s.due_ns <= now_ns and len(out) < self.burst:
             out.append(s.left.pop(0))
@@ -295,7 +297,7 @@ class Link:
 
     def _flow(self, status: FlowStatus) -> None:
         data = flow_control(status, self.block_size, self.st_min)
-        self._out.append(_filled(data, self.padding))
+        self._flows.append(_filled(data, self.padding))
 
     def _give_up_sending(self, error: LinkError) -> None:
         self._sending = None
