@@ -14,11 +14,11 @@ from hil.log.account import printable
 from hil.log.choice import Choice
 from hil.log.several import Logs
 from hil.log.source import ReadOptions
+from hil.uds import own
 from hil.uds.addresses import Addresses, Identifier
 from hil.uds.conversation import NO_FIRST, NO_ISOTP, Conversation, Spoken
 from hil.uds.find_pairs import PairFinder
-from hil.uds.own import names_of, own_pairs
-from hil.uds.words import SHOWN_BYTES, Kind, hex_text, service_text
+from hil.uds.words import FOREIGN, SHOWN_BYTES, Kind, Names, hex_text, service_text
 
 _NOT_WITH = ("out", "messages", "signals", "resample", "names", "bitrate", "dbc", "e2e_legacy")
 
@@ -59,13 +59,19 @@ def run_uds(args: argparse.Namespace, choice: Choice, limit_bytes: int | None) -
     addresses = Addresses.parse(told) if told else None
     with (
         Logs(paths(args.log), ReadOptions(timezone=args.timezone), limit_bytes) as logs,
-        Progress(1 if addresses else 2) as progress,
+        Progress(2) as progress,
     ):
+        finder = PairFinder(own.SIGN, (own.REQUEST, own.ANSWER, own.PERIODIC))
+        finder.take(choice.frames(logs.tables(progress)))
+        foreign = {name for name in finder.strange if name not in finder.signed}
         if addresses is None:
-            finder = PairFinder()
-            finder.take(choice.frames(logs.tables(progress)))
-            addresses = Addresses.of([*own_pairs(), *finder.pairs()])
-            progress.part(1, "reading")
+            pairs = finder.pairs() + ([(own.REQUEST, own.ANSWER)] if set(logs.channels) - foreign else [])
+            addresses = Addresses.of(pairs, periodic=(own.PERIODIC,) if set(logs.channels) - foreign else ())
+
+        def names_of(channel: str, identifier: Identifier) -> Names:
+            return FOREIGN if channel in foreign else own.names_of(identifier)
+
+        progress.part(1, "reading")
         conversation = Conversation(addresses, names_of)
         frames = 0
 

@@ -1,7 +1,8 @@
 """What ``brakebench diag`` can ask: each action's arguments, and the lines and values of its answer."""
 
 import argparse
-from collections.abc import Callable
+import difflib
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from hil.errors import BrakebenchError
@@ -41,8 +42,27 @@ def _bytes(text: str, what: str) -> bytes:
 
 
 def _did(known: "Names", text: str) -> int:
-    by_name = {one.name: did for did, one in known.dids.items()}
-    return by_name[text] if text in by_name else number(text, "data identifier", 0xFFFF, "a name or 0xF190")
+    by_name = _by_name({did: one.name for did, one in known.dids.items()})
+    found = by_name.get(_plain(text))
+    return number(text, "data identifier", 0xFFFF, _such(text, by_name, "0xF190")) if found is None else found
+
+
+def _plain(name: str) -> str:
+    return name.lower().replace(" ", "_")
+
+
+def _by_name(names: Mapping[int, str]) -> dict[str, int]:
+    """Numbers by their names as they are typed; of two with one name the first."""
+    by_name: dict[str, int] = {}
+    for value, name in names.items():
+        by_name.setdefault(_plain(name), value)
+    return by_name
+
+
+def _such(text: str, by_name: Mapping[str, int], example: str) -> str:
+    """What would do in the place of a name that is not known."""
+    close = difflib.get_close_matches(_plain(text), by_name, 3)
+    return f"a name ({', '.join(close or list(by_name)[:3])}, ...) or {example}" if by_name else example
 
 
 def _add_read_dtc(parser: argparse.ArgumentParser) -> None:
@@ -91,7 +111,7 @@ def _code_values(known: "Names", one: "FoundDtc") -> dict[str, Any]:
 def _one_code(tester: "Tester", code: int) -> Answer:
     """Status, snapshot and extended data of a code."""
     from hil.uds.tester import FoundDtc, RefusedError
-    from hil.uds.words import hex_text, snapshots
+    from hil.uds.words import snapshots
 
     wanted = code.to_bytes(3, "big") + b"\xff"
     snapshot = tester.ask(b"\x19\x04" + wanted)
@@ -110,7 +130,7 @@ def _one_code(tester: "Tester", code: int) -> Answer:
     except RefusedError as error:
         return [*lines, f"  no extended data: {error}"], values
     values["extended"] = extended.hex()
-    return [*lines, f"  extended data  {hex_text(extended) or 'none'}"], values
+    return [*lines, f"  extended data  {', '.join(tester.known.extended_text(extended)) or 'none'}"], values
 
 
 def _did_values(known: "Names", did: int, data: bytes) -> dict[str, Any]:
@@ -174,16 +194,14 @@ def _add_routine(parser: argparse.ArgumentParser) -> None:
 
 
 def _routine(tester: "Tester", args: argparse.Namespace) -> Answer:
-    from hil.uds.words import value_text
-
-    by_name = {name: routine for routine, name in tester.known.routines.items()}
-    such = f"one of {', '.join(by_name)}" if by_name else "an identifier such as 0x0203"
-    routine = by_name.get(args.routine)
+    by_name = _by_name({routine: one.name for routine, one in tester.known.routines.items()})
+    routine = by_name.get(_plain(args.routine))
     if routine is None:
-        routine = number(args.routine, "routine", 0xFFFF, such)
+        routine = number(args.routine, "routine", 0xFFFF, _such(args.routine, by_name, "0x0203"))
     sub = ("start", "stop", "result").index(args.what) + 1
     answer = tester.ask(bytes((0x31, sub)) + routine.to_bytes(2, "big") + _bytes(args.data, "option"))[4:]
-    text = f"{args.what}: {tester.known.routine_text(routine)}{f' = {value_text(answer)}' if answer else ''}"
+    result = f" = {tester.known.routine_value(routine, answer)}" if answer else ""
+    text = f"{args.what}: {tester.known.routine_text(routine)}{result}"
     return [text], {"routine": routine, "what": args.what, "data": answer.hex()}
 
 

@@ -93,11 +93,13 @@ class Addresses:
     partners : request and answer of connections beside the standard ones, in both directions.
     functional : identifiers of requests to all, beside the standard ones.
     standard : standard identifiers are taken as well.
+    periodic : identifiers of periodic data, one value a frame, without ISO-TP.
     """
 
     partners: dict[Identifier, Identifier]
     functional: frozenset[Identifier]
     standard: bool
+    periodic: frozenset[Identifier] = frozenset()
 
     @classmethod
     def of(
@@ -105,13 +107,14 @@ class Addresses:
         pairs: Iterable[tuple[Identifier, Identifier]],
         functional: Iterable[Identifier] = (),
         standard: bool = True,
+        periodic: Iterable[Identifier] = (),
     ) -> "Addresses":
         """Addresses of connections (request, answer)."""
         partners: dict[Identifier, Identifier] = {}
         for request, answer in pairs:
             partners[answer] = request
             partners.setdefault(request, answer)
-        return cls(partners, frozenset(functional), standard)
+        return cls(partners, frozenset(functional), standard, frozenset(periodic))
 
     @classmethod
     def parse(cls, words: Iterable[str]) -> "Addresses":
@@ -144,6 +147,6 @@ class Addresses:
 
     def among(self, keys: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
         """Whether each key is one of these identifiers."""
-        told = np.array([one.key for one in (*self.partners, *self.functional)], np.int64)
+        told = np.array([one.key for one in (*self.partners, *self.functional, *self.periodic)], np.int64)
         mask = np.isin(keys, told)
         return mask | standard_keys(keys) if self.standard else mask

@@ -15,7 +15,7 @@ from hil.uds.addresses import Addresses, Identifier, keys_of
 from hil.uds.words import FOREIGN, Kind, Names, Said, describe
 
 _CHANNEL_SHIFT = 32
-_STOP = 4  # transmission mode of ReadDataByPeriodicIdentifier
+_PERIODIC, _STOP = 0x2A, 4  # ReadDataByPeriodicIdentifier, and its mode that ends it
 
 
 class Spoken(NamedTuple):
@@ -49,7 +49,8 @@ class Counts:
 
     Attributes
     ----------
-    frames : by kind: single, first, consecutive, flow control, without a first frame, not ISO-TP.
+    frames : by kind: single, first, consecutive, flow control, periodic data, without a first frame,
+        not ISO-TP.
     messages : complete ones by kind.
     broken : incomplete ones by reason.
     unanswered : requests to one ECU that want an answer and have none.
@@ -75,7 +76,7 @@ class Counts:
         return not self.broken and not self.lost_frames
 
 
-NO_FIRST, NO_ISOTP = "consecutive without a first frame", "not ISO-TP"
+NO_FIRST, NO_ISOTP, PERIODIC = "consecutive without a first frame", "not ISO-TP", "periodic data"
 _KINDS = {
     PduKind.SINGLE: "single",
     PduKind.FIRST: "first",
@@ -97,10 +98,10 @@ class Conversation:
     Parameters
     ----------
     addresses : identifiers of diagnostics.
-    names_of : what is known of the ECU behind an identifier of requests or answers.
+    names_of : what is known of the ECU behind an identifier of a channel.
     """
 
-    def __init__(self, addresses: Addresses, names_of: Callable[[Identifier], Names] = lambda _: FOREIGN) -> None:
+    def __init__(self, addresses: Addresses, names_of: Callable[[str, Identifier], Names] = lambda *_: FOREIGN) -> None:
         self.addresses = addresses
         self.counts = Counts()
         self._names_of = names_of
@@ -130,6 +131,9 @@ class Conversation:
             yield last
 
     def _take(self, time_ns: int, key: int, data: bytes, channels: tuple[str, ...]) -> list[Spoken]:
+        if data and Identifier.of_key(key & ((1 << _CHANNEL_SHIFT) - 1)) in self.addresses.periodic:
+            self.counts.frames[PERIODIC] += 1
+            return [self._read(JoinedMessage(key, time_ns, time_ns, len(data), data), channels)]
         pdu = parse(data)
         under_way = key in self._under_way
         joined = self._joiner.take(time_ns, key, data)
@@ -150,7 +154,7 @@ class Conversation:
         """A message in words, fitted to the requests so far."""
         place, key = joined.can_id >> _CHANNEL_SHIFT, joined.can_id & ((1 << _CHANNEL_SHIFT) - 1)
         identifier = Identifier.of_key(key)
-        said = self._say(joined, place, identifier)
+        said = self._say(joined, place, channels[place], identifier)
         after_ns = None
         if joined.error is None:
             self.counts.messages[said.kind] += 1
@@ -173,13 +177,13 @@ class Conversation:
             after_ns,
         )
 
-    def _say(self, joined: JoinedMessage, place: int, identifier: Identifier) -> Said:
-        known = self._names_of(identifier)
+    def _say(self, joined: JoinedMessage, place: int, channel: str, identifier: Identifier) -> Said:
+        known = self._names_of(channel, identifier)
+        if identifier in self.addresses.periodic:
+            return Said(Kind.OTHER, _PERIODIC, known.periodic_text(joined.data))
         low = joined.data[0] if joined.data else -1
         if low in self._periodic.get((place, identifier), ()) and not self._is_due(joined.data, place, identifier):
-            did = 0xF200 | low
-            value = known.value_text(did, joined.data[1:])
-            return Said(Kind.OTHER, 0x2A, f"periodic data, {known.did_text(did)} = {value}")
+            return Said(Kind.OTHER, _PERIODIC, known.periodic_text(joined.data))
         return describe(joined.data, known)
 
     def _is_due(self, data: bytes, place: int, identifier: Identifier) -> bool:
@@ -205,7 +209,7 @@ class Conversation:
         if partner is not None and asked is not None and asked.service == said.service:
             if said.kind is not Kind.PENDING:
                 self._asked[place, partner] = asked._replace(wanted=False)
-                if said.kind is Kind.ANSWER and said.service == 0x2A:
+                if said.kind is Kind.ANSWER and said.service == _PERIODIC:
                     self._send_periodically((place, identifier), asked.data)
             return joined.start_ns - asked.end_ns
         to_all = self._asked_all.get(place)

@@ -28,9 +28,23 @@ class _Asked(NamedTuple):
 
 
 class PairFinder:
-    """Takes the frames of a log and tells the connections that it met, beside the standard ones."""
+    """Takes the frames of a log and tells the connections that it met, beside the standard ones.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    sign : an identifier that is looked for.
+    own : identifiers of diagnostics that are known.
+
+    Attributes
+    ----------
+    signed, strange : channels with frames of it; channels with frames that are no diagnostics.
+    """
+
+    def __init__(self, sign: Identifier | None = None, own: Iterable[Identifier] = ()) -> None:
+        self.signed: set[str] = set()
+        self.strange: set[str] = set()
+        self._sign = -1 if sign is None else sign.key
+        self._own = np.array([one.key for one in own], np.int64)
         self._ruled_out: set[int] = set()  # channel and key in one number
         self._asked: dict[tuple[int, int], _Asked] = {}
         self._pairs: dict[tuple[int, int], None] = {}
@@ -59,7 +73,9 @@ class PairFinder:
     def _take(self, table: FrameTable) -> None:
         keys = keys_of(table.can_id, table.extended)
         data_frame = (table.flags & (FrameFlag.REMOTE | FrameFlag.ERROR)) == 0
-        rows = np.flatnonzero(data_frame & ~standard_keys(keys))
+        rows = np.flatnonzero(data_frame & ~standard_keys(keys) & ~np.isin(keys, self._own))
+        for mask, names in ((keys[rows] == self._sign, self.signed), (keys[rows] != self._sign, self.strange)):
+            names.update(table.channels[k] for k in np.unique(table.channel[rows][mask]).tolist())
         both = keys[rows] | table.channel[rows].astype(np.int64) << _CHANNEL_SHIFT
         if self._ruled_out:
             kept = ~np.isin(both, np.fromiter(self._ruled_out, np.int64))

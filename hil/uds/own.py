@@ -1,28 +1,103 @@
 """What is known of our own ECU by name: its identifiers on the bus, data identifiers, codes, routines."""
 
+import struct
+from collections.abc import Callable, Iterator
+
+from dbc import diagnostic_ids
+from dbc.contract import spec_of
+from dbc.messages import BrakeMode, BrakeStatus
+from ecu.diagnostics import routines
+from ecu.diagnostics.actuators import DEMANDS
+from ecu.diagnostics.identifiers import FIRST_QUANTITY, IDENTIFIERS
+from ecu.diagnostics.identifiers import Identifier as DataIdentifier
+from ecu.diagnostics.quantities import QUANTITIES
+from ecu.diagnostics.security import REQUEST_SEED, key_of
+from ecu.diagnostics.services import EXTENDED_RECORDS
+from ecu.diagnostics.trouble_memory import dtc_of
 from ecu.law.trouble_codes import CODES
+from hil.errors import BrakebenchError
 from hil.uds.addresses import Identifier
-from hil.uds.words import FOREIGN, Names
+from hil.uds.words import FOREIGN, Did, Names, value_text
 
-REQUEST, ANSWER, FUNCTIONAL = Identifier(0x7E0, False), Identifier(0x7E8, False), Identifier(0x7DF, False)
-LEVEL = 1
+REQUEST, ANSWER = Identifier(diagnostic_ids.REQUEST, False), Identifier(diagnostic_ids.RESPONSE, False)
+FUNCTIONAL, PERIODIC = Identifier(diagnostic_ids.REQUEST_FUNCTIONAL, False), Identifier(diagnostic_ids.PERIODIC, False)
+LEVEL = (REQUEST_SEED + 1) // 2
 """Level of security access."""
-OWN = Names(dtcs={code.number << 8: code.name for code in CODES})
+SIGN = Identifier(spec_of(BrakeStatus).can_id, False)
+"""Our ECU is on a bus where this message is."""
+_NAMED = {"mode": lambda value: BrakeMode(int(value)).name}
+
+__all__ = ["ANSWER", "FUNCTIONAL", "LEVEL", "OWN", "PERIODIC", "REQUEST", "SIGN", "key_of", "names_of"]
 
 
-def key_of(seed: bytes) -> bytes:
-    """Key of a seed."""
-    return seed
+def _number(value: float, name: str) -> str:
+    if name in _NAMED and value in tuple(BrakeMode):
+        return _NAMED[name](value)
+    return f"{value:.7g}"
 
 
-__all__ = ["ANSWER", "FUNCTIONAL", "LEVEL", "OWN", "REQUEST", "key_of", "names_of", "own_pairs"]
+def _value(form: str, unit: str, name: str) -> Callable[[bytes], str]:
+    shown = "" if unit in ("", "1") else f" {unit}"
+    first = 1 if form == ">Bf" else 0  # in front of a quantity stands the tick it is of
+
+    def read(data: bytes) -> str:
+        numbers = struct.unpack(form, data)[first:]
+        return ", ".join(_number(number, name) for number in numbers) + shown
+
+    return read
 
 
-def own_pairs() -> list[tuple[Identifier, Identifier]]:
-    """Connections of our ECU."""
-    return [(REQUEST, ANSWER)]
+def _coded(form: str, name: str) -> Callable[[str], bytes]:
+    """Bytes of a number as it is typed; the ECU says whether it may be."""
+
+    def code(text: str) -> bytes:
+        try:
+            return struct.pack(form, float(text))
+        except (ValueError, OverflowError, struct.error):
+            raise BrakebenchError(f"{name}: expected a number, got {text!r}") from None
+
+    return code
+
+
+def _dids() -> Iterator[tuple[int, Did]]:
+    for did, one in IDENTIFIERS.items():
+        yield did, _did(one)
+    for did, demand in DEMANDS.items():
+        yield did, Did(demand.name, 4, _value(">f", demand.unit, demand.name), _coded(">f", demand.name))
+
+
+def _did(one: DataIdentifier) -> Did:
+    if one.form == "text":
+        return Did(one.name, one.size or None, value_text)
+    if one.form == "3B":
+        return Did(one.name, one.size, lambda data: data.hex("-"))
+    coded = _coded(one.form, one.name) if one.form == ">1d" else None
+    return Did(one.name, one.size, _value(one.form, one.unit, one.name), coded)
+
+
+def _routine(number: int) -> Did:
+    def value(data: bytes) -> str:
+        state, results = routines.State(data[0]).name.lower().replace("_", " "), data[1:]
+        if number == routines.SELF_TEST and len(results) == 4:
+            supplied, codes, mode = struct.unpack(">HBB", results)
+            return f"{state}, sources supplied 0x{supplied:03X}, active codes {codes}, mode {BrakeMode(mode).name}"
+        if number == routines.PRESSURE_ZERO and len(results) == 16:
+            return f"{state}, {', '.join(f'{pressure:.7g}' for pressure in struct.unpack('>4f', results))} Pa"
+        return f"{state}, {results.hex(' ')}" if results else state
+
+    return Did(routines.NAMES[number], None, value)
+
+
+OWN = Names(
+    dids=dict(_dids()),
+    dtcs={dtc_of(code): code.name for code in CODES},
+    routines={number: _routine(number) for number in routines.NAMES},
+    records=EXTENDED_RECORDS,
+    periodic={FIRST_QUANTITY & 0xFF | k: FIRST_QUANTITY + k for k in range(len(QUANTITIES))},
+)
+"""All that our ECU calls by name."""
 
 
 def names_of(identifier: Identifier) -> Names:
-    """Names of the ECU behind an identifier."""
-    return OWN if identifier in (REQUEST, ANSWER, FUNCTIONAL) else FOREIGN
+    """Names of the ECU behind an identifier, on a bus that has our ECU."""
+    return OWN if identifier in (REQUEST, ANSWER, FUNCTIONAL, PERIODIC) else FOREIGN

@@ -46,7 +46,11 @@ class Names:
 
     dids: Mapping[int, Did] = field(default_factory=dict)
     dtcs: Mapping[int, str] = field(default_factory=dict)
-    routines: Mapping[int, str] = field(default_factory=dict)
+    routines: Mapping[int, Did] = field(default_factory=dict)
+    records: Mapping[int, str] = field(default_factory=dict)
+    """Extended data records of a code, of one byte each."""
+    periodic: Mapping[int, int] = field(default_factory=dict)
+    """Data identifiers by the byte that stands for them in periodic messages."""
 
     def did_text(self, did: int) -> str:
         """Identifier with its name, where it has one."""
@@ -59,7 +63,25 @@ class Names:
 
     def routine_text(self, routine: int) -> str:
         """Routine identifier with its name, where it has one."""
-        return f"0x{routine:04X} {self.routines.get(routine, '')}".rstrip()
+        return f"0x{routine:04X} {self.routines[routine].name if routine in self.routines else ''}".rstrip()
+
+    def routine_value(self, routine: int, data: bytes) -> str:
+        """What a routine answers."""
+        known = self.routines.get(routine)
+        return known.value(data) if known is not None and known.value is not None and data else value_text(data)
+
+    def periodic_text(self, data: bytes) -> str:
+        """A periodic message: the byte of its data identifier, its value, padding."""
+        did = self.periodic.get(data[0], 0xF200 | data[0])
+        length = self.dids[did].length if did in self.dids else None
+        value = data[1:] if length is None else data[1 : 1 + length]
+        return f"periodic data, {self.did_text(did)} = {self.value_text(did, value)}"
+
+    def extended_text(self, records: bytes) -> list[str]:
+        """Extended data records of a code; only of an ECU whose records are known can they be told apart."""
+        if len(records) % 2 == 0 and set(records[::2]) <= set(self.records):
+            return [f"{self.records[k]} {v}" for k, v in zip(records[::2], records[1::2], strict=True)]
+        return [f"record {records[0]} = {hex_text(records[1:])}"] if records else []
 
     def value_text(self, did: int, data: bytes) -> str:
         """Value of a data identifier: in its unit where that is known, as text where it is text, else its bytes."""
@@ -292,13 +314,16 @@ def _io(rest: _Bytes, sub: int, known: Names, answer: bool) -> list[str]:
     did = rest.number(2)
     control = named(names.IO_CONTROLS, rest.number()) if rest.left else ""
     data = rest.rest()
-    return [known.did_text(did), control, hex_text(data)]
+    return [known.did_text(did), control, known.value_text(did, data)]
 
 
 def _routine(rest: _Bytes, sub: int, known: Names, answer: bool) -> list[str]:
-    routine = known.routine_text(rest.number(2))
-    data = rest.rest()
-    return [f"{routine} = {value_text(data)}" if answer and data else routine, "" if answer else hex_text(data)]
+    routine, data = rest.number(2), rest.rest()
+    text = known.routine_text(routine)
+    return [
+        f"{text} = {known.routine_value(routine, data)}" if answer and data else text,
+        *([] if answer else [hex_text(data)]),
+    ]
 
 
 def _reset(rest: _Bytes, sub: int, known: Names, answer: bool) -> list[str]:
@@ -351,7 +376,7 @@ def _report(rest: _Bytes, sub: int, known: Names, answer: bool) -> list[str]:
         if sub in (0x18, 0x19):
             rest.take(1)
         words = [_with_status(known, rest.number(3), rest.number())]
-        return words + (_snapshots(rest, known) if sub in (0x04, 0x18) else _extended(rest))
+        return words + (_snapshots(rest, known) if sub in (0x04, 0x18) else known.extended_text(rest.rest()))
     return []
 
 
@@ -397,10 +422,6 @@ def _snapshots(rest: _Bytes, known: Names) -> list[str]:
         words.append(f"{known.did_text(did)} = {known.value_text(did, data)}")
         shown = record
     return words
-
-
-def _extended(rest: _Bytes) -> list[str]:
-    return [f"record {rest.number()} = {hex_text(rest.rest())}"] if rest.left else []
 
 
 _PARTS: Mapping[int, Callable[[_Bytes, int, Names, bool], list[str]]] = {

@@ -14,7 +14,7 @@ from hil.uds.words import Did, Kind, Names, describe
 OWN = Names(
     dids={0x0100: Did("mode", 1, lambda data: f"mode {data[0]}"), 0x0101: Did("speed", 2, lambda d: f"{d[0]} m/s")},
     dtcs={0x100100: "pedal_lost"},
-    routines={0x0203: "self_test"},
+    routines={0x0203: Did("self_test")},
 )
 SAID = [
     ("10 03", "DiagnosticSessionControl, extended"),
@@ -53,7 +53,7 @@ SAID = [
     ("2C 01 F2 01 01 00 01 01", "DynamicallyDefineDataIdentifier, define by identifier, 0xF201, "
      "1 bytes from byte 1 of 0x0100 mode"),
     ("2E 01 00 05", "WriteDataByIdentifier, 0x0100 mode = mode 5"),
-    ("2F 01 00 03 01", "InputOutputControlByIdentifier, 0x0100 mode, short-term adjustment, 01"),
+    ("2F 01 00 03 01", "InputOutputControlByIdentifier, 0x0100 mode, short-term adjustment, mode 1"),
     ("31 01 02 03 FF", "RoutineControl, start, 0x0203 self_test, FF"),
     ("71 03 02 03 00", "RoutineControl, result, 0x0203 self_test = 00"),
     ("34 00 22 10 00 00 20", "RequestDownload, format 0x00, 32 bytes at 0x1000"),
