@@ -41,8 +41,9 @@ def _bytes(text: str, what: str) -> bytes:
         raise BrakebenchError(f"{what} {text!r}: expected bytes in hexadecimal, such as 0A1B") from None
 
 
-def _did(known: "Names", text: str) -> int:
-    by_name = _by_name({did: one.name for did, one in known.dids.items()})
+def _did(known: "Names", text: str, coded: bool = False) -> int:
+    """Number of a data identifier by name or number; ``coded``: among those that take values."""
+    by_name = _by_name({did: one.name for did, one in known.dids.items() if one.coded is not None or not coded})
     found = by_name.get(_plain(text))
     return number(text, "data identifier", 0xFFFF, _such(text, by_name, "0xF190")) if found is None else found
 
@@ -174,7 +175,7 @@ def _add_write(parser: argparse.ArgumentParser) -> None:
 
 
 def _write(tester: "Tester", args: argparse.Namespace) -> Answer:
-    did = _did(tester.known, args.did)
+    did = _did(tester.known, args.did, coded=True)
     data = _value(tester.known, did, args.value)
     tester.ask(b"\x2e" + did.to_bytes(2, "big") + data)
     shown = f"{tester.known.did_text(did)} = {tester.known.value_text(did, data)}"
@@ -266,7 +267,7 @@ def _add_io(parser: argparse.ArgumentParser) -> None:
 def _io(tester: "Tester", args: argparse.Namespace) -> Answer:
     if (args.value is None) == (args.control == "adjust"):
         raise BrakebenchError(f"io {args.control}: expected {'a' if args.value is None else 'no'} value")
-    did = _did(tester.known, args.did)
+    did = _did(tester.known, args.did, coded=True)
     data = b"" if args.value is None else _value(tester.known, did, args.value)
     answer = tester.ask(b"\x2f" + did.to_bytes(2, "big") + bytes((_CONTROLS[args.control],)) + data)
     _hold(tester, args.hold)

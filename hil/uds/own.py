@@ -26,6 +26,7 @@ LEVEL = (REQUEST_SEED + 1) // 2
 SIGN = Identifier(spec_of(BrakeStatus).can_id, False)
 """Our ECU is on a bus where this message is."""
 _NAMED = {"mode": lambda value: BrakeMode(int(value)).name}
+_RECORDS = {"fault detection counter": lambda data: str(int.from_bytes(data, "big", signed=True))}
 
 __all__ = ["ANSWER", "FUNCTIONAL", "LEVEL", "OWN", "PERIODIC", "REQUEST", "SIGN", "key_of", "names_of"]
 
@@ -92,7 +93,7 @@ OWN = Names(
     dids=dict(_dids()),
     dtcs={dtc_of(code): code.name for code in CODES},
     routines={number: _routine(number) for number in routines.NAMES},
-    records=EXTENDED_RECORDS,
+    records={record: Did(name, 1, _RECORDS.get(name)) for record, name in EXTENDED_RECORDS.items()},
     periodic={FIRST_QUANTITY & 0xFF | k: FIRST_QUANTITY + k for k in range(len(QUANTITIES))},
 )
 """All that our ECU calls by name."""

@@ -47,7 +47,7 @@ class Names:
     dids: Mapping[int, Did] = field(default_factory=dict)
     dtcs: Mapping[int, str] = field(default_factory=dict)
     routines: Mapping[int, Did] = field(default_factory=dict)
-    records: Mapping[int, str] = field(default_factory=dict)
+    records: Mapping[int, Did] = field(default_factory=dict)
     """Extended data records of a code, of one byte each."""
     periodic: Mapping[int, int] = field(default_factory=dict)
     """Data identifiers by the byte that stands for them in periodic messages."""
@@ -80,7 +80,8 @@ class Names:
     def extended_text(self, records: bytes) -> list[str]:
         """Extended data records of a code; only of an ECU whose records are known can they be told apart."""
         if len(records) % 2 == 0 and set(records[::2]) <= set(self.records):
-            return [f"{self.records[k]} {v}" for k, v in zip(records[::2], records[1::2], strict=True)]
+            pairs = [(self.records[records[k]], records[k + 1 : k + 2]) for k in range(0, len(records), 2)]
+            return [f"{one.name} {one.value(data) if one.value is not None else data[0]}" for one, data in pairs]
         return [f"record {records[0]} = {hex_text(records[1:])}"] if records else []
 
     def value_text(self, did: int, data: bytes) -> str:
