@@ -17,7 +17,7 @@ _NUMBER = 8  # bytes
 
 
 class Parameter(NamedTuple):
-    """One value of the set: so many ``numbers`` of 64 bits, or a text where there are none."""
+    """One value of the set: so many ``numbers`` of 64 bits, or a text of so many ``letters`` where there are none."""
 
     table: str
     name: str
@@ -27,11 +27,12 @@ class Parameter(NamedTuple):
     high: float
     numbers: int
     writable: bool
+    letters: int = 0
 
     @property
     def size(self) -> int:
-        """Bytes on the wire; 0 for a text of any length."""
-        return _NUMBER * self.numbers
+        """Bytes on the wire."""
+        return _NUMBER * self.numbers + self.letters
 
 
 def _parameters() -> Iterator[tuple[int, Parameter]]:
@@ -46,7 +47,8 @@ def _parameters() -> Iterator[tuple[int, Parameter]]:
             elif hint is bool:
                 one = Parameter(table, name, "1", True, 0, 1, 1, False)
             else:
-                one = Parameter(table, name, "", False, 0.0, 0.0, 0, False)
+                letters = max(map(len, typing.get_args(hint)))
+                one = Parameter(table, name, "", False, 0.0, 0.0, 0, False, letters)
             yield FIRST_DID + 0x100 * i + k, one
 
 
@@ -57,7 +59,7 @@ def read(one: Parameter, parameters: EcuParameters) -> bytes:
     """Value as on the wire."""
     value: Any = getattr(getattr(parameters, one.table), one.name)
     if isinstance(value, str):
-        return value.encode("ascii")
+        return value.ljust(one.letters).encode("ascii")
     values = value if isinstance(value, tuple) else (value,)
     return struct.pack(f">{len(values)}d", *values)
 

@@ -18,7 +18,7 @@ FIRST_QUANTITY = 0xF200
 
 
 class Identifier(NamedTuple):
-    """``size`` in bytes, 0 where a text may have any; ``form``: how its bytes are to be read (`struct`, or text)."""
+    """``size`` in bytes; ``form``: how its bytes are to be read (`struct`, or text)."""
 
     name: str
     unit: str
@@ -32,17 +32,17 @@ def _text(name: str, text: str) -> Identifier:
 
 
 IDENTIFICATION: dict[int, Identifier] = {
-    0xF187: _text("spare part number", "BRAKEBENCH-ECU"),
-    0xF188: _text("software number", "BRAKEBENCH-LAW"),
-    0xF189: _text("software version", "0001"),
+    0xF187: _text("spare_part_number", "BRAKEBENCH-ECU"),
+    0xF188: _text("software_number", "BRAKEBENCH-LAW"),
+    0xF189: _text("software_version", "0001"),
     0xF18A: _text("supplier", "BRAKEBENCH"),
-    0xF18B: Identifier("manufacturing date (BCD)", "", "3B", 3, lambda _: bytes((0x20, 0x26, 0x01))),
-    0xF18C: _text("serial number", "00000001"),
-    0xF190: _text("vehicle identification number", "BRAKEBENCH0000001"),
-    0xF191: _text("hardware number", "EMULATED-ECU"),
-    0xF193: _text("hardware version", "0001"),
-    0xF195: _text("software version of the supplier", "0001"),
-    0xF197: _text("system name", "BRAKE BLENDING CONTROLLER"),
+    0xF18B: Identifier("manufacturing_date", "", "3B", 3, lambda _: bytes((0x20, 0x26, 0x01))),
+    0xF18C: _text("serial_number", "00000001"),
+    0xF190: _text("vehicle_identification_number", "BRAKEBENCH0000001"),
+    0xF191: _text("hardware_number", "EMULATED-ECU"),
+    0xF193: _text("hardware_version", "0001"),
+    0xF195: _text("software_version_of_the_supplier", "0001"),
+    0xF197: _text("system_name", "BRAKE BLENDING CONTROLLER"),
 }
 
 
@@ -60,13 +60,13 @@ class Group(NamedTuple):
 
 
 SNAPSHOT: dict[int, Group] = {
-    0x0200: Group("time since the law's start", "s", ">f", lambda t, _: (t,)),
-    0x0201: Group("mode", "1", ">B", lambda _, f: (f.mode,)),
-    0x0202: Group("speed", "m/s", ">f", lambda _, f: (f.speed_mps,)),
-    0x0203: Group("demanded deceleration", "m/s2", ">f", lambda _, f: (f.demanded_deceleration_mps2,)),
-    0x0204: Group("pedal travel, both channels", "1", ">2f", lambda _, f: f.pedal),
-    0x0205: Group("pressures", "Pa", ">4f", lambda _, f: f.pressure_pa),
-    0x0206: Group("motor currents", "A", ">4f", lambda _, f: f.motor_current_a),
+    0x0200: Group("snapshot_time", "s", ">f", lambda t, _: (t,)),
+    0x0201: Group("snapshot_mode", "1", ">B", lambda _, f: (f.mode,)),
+    0x0202: Group("snapshot_speed", "m/s", ">f", lambda _, f: (f.speed_mps,)),
+    0x0203: Group("snapshot_demanded_deceleration", "m/s2", ">f", lambda _, f: (f.demanded_deceleration_mps2,)),
+    0x0204: Group("snapshot_pedal_travel", "1", ">2f", lambda _, f: f.pedal),
+    0x0205: Group("snapshot_pressures", "Pa", ">4f", lambda _, f: f.pressure_pa),
+    0x0206: Group("snapshot_motor_currents", "A", ">4f", lambda _, f: f.motor_current_a),
 }
 
 

@@ -118,7 +118,8 @@ class DiagnosticServer:
         if view.outputs.mode != BrakeMode.INIT:
             self._services.memory.complete()
         try:
-            answer = bytes((request[0] + POSITIVE,)) + self._services.serve(now_ns, request, view)
+            body = self._services.serve(now_ns, request, view)
+            answer = bytes((request[0] + POSITIVE,)) + body
             if len(answer) > MOST_ANSWER:
                 raise Refused(Nrc.RESPONSE_TOO_LONG)
         except Refused as refused:
