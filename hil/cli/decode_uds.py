@@ -22,6 +22,8 @@ from hil.uds.words import FOREIGN, SHOWN_BYTES, Kind, Names, hex_text, service_t
 
 _NOT_WITH = ("out", "messages", "signals", "resample", "names", "bitrate", "dbc", "e2e_legacy")
 
+_MOST_TEXT = 400  # letters of a message in a line: lists of all codes are longer
+
 
 def add_uds(parser: argparse.ArgumentParser) -> None:
     """``--uds`` and its identifiers."""
@@ -111,6 +113,8 @@ def _line(one: Spoken, first_ns: int) -> str:
     else:
         service = "" if one.said.service is None else f" of {service_text(one.said.service)}"
         kind, text = "broken", f"{len(one.data)} of {one.length} bytes{service}: {one.error.value}"
+    if len(text) > _MOST_TEXT:
+        text = f"{text[:_MOST_TEXT]} ... (all of it with --json)"
     shown = f"[{hex_text(one.data)}]" if len(one.data) <= SHOWN_BYTES else f"[{one.data[:SHOWN_BYTES].hex(' ').upper()}"
     if len(one.data) > SHOWN_BYTES:
         shown += f" ... {len(one.data)} bytes]"

@@ -43,7 +43,11 @@ def _bytes(text: str, what: str) -> bytes:
 
 def _did(known: "Names", text: str, coded: bool = False) -> int:
     """Number of a data identifier by name or number; ``coded``: among those that take values."""
-    by_name = _by_name({did: one.name for did, one in known.dids.items() if one.coded is not None or not coded})
+    from hil.uds.names import DIDS
+
+    of_standard = {} if coded else {_plain(name): did for did, name in DIDS.items()}
+    own = _by_name({did: one.name for did, one in known.dids.items() if one.coded is not None or not coded})
+    by_name = of_standard | own
     found = by_name.get(_plain(text))
     return number(text, "data identifier", 0xFFFF, _such(text, by_name, "0xF190")) if found is None else found
 

@@ -13,10 +13,9 @@ import numpy.typing as npt
 
 from hil.log.frames import FrameFlag, FrameTable
 from hil.uds.addresses import Identifier, keys_of, standard_keys
-from hil.uds.names import NEGATIVE_RESPONSE, RESPONSE_OFFSET, SERVICES
+from hil.uds.names import NEGATIVE_RESPONSE, REPEATED, RESPONSE_OFFSET, SERVICES
 
 ANSWER_WITHIN_NS = 5_000_000_000  # P2* of ISO 14229-2
-_REPEATED = {0x10: 1, 0x11: 1, 0x19: 1, 0x22: 2, 0x27: 1, 0x28: 1, 0x2E: 2, 0x2F: 2, 0x31: 3, 0x3E: 1, 0x85: 1}
 _CHANNEL_SHIFT = 32
 _SHOWN = 5  # bytes of a message that are looked at: service and what an answer repeats
 
@@ -96,7 +95,7 @@ class PairFinder:
     def _hear(self, time_ns: int, key: int, meaning: int, message: bytes) -> None:
         channel = key >> _CHANNEL_SHIFT
         if meaning > 0:
-            repeated = bytearray(message[1 : 1 + _REPEATED.get(meaning, 0)])
+            repeated = bytearray(message[1 : 1 + REPEATED.get(meaning, 0)])
             if repeated and meaning not in (0x22, 0x2E, 0x2F):
                 repeated[0] &= 0x7F  # without the bit that asks for no answer
             self._asked[channel, meaning] = _Asked(time_ns, key, bytes(repeated))

@@ -52,6 +52,20 @@ OBD_SERVICES: Mapping[int, str] = {
 }
 WITH_SUBFUNCTION = frozenset({0x10, 0x11, 0x19, 0x27, 0x28, 0x29, 0x2C, 0x31, 0x3E, 0x83, 0x85, 0x86, 0x87})
 """Services whose second byte is a sub-function, with its bit that asks for no positive answer."""
+REPEATED: Mapping[int, int] = {
+    0x10: 1,
+    0x11: 1,
+    0x19: 1,
+    0x22: 2,
+    0x27: 1,
+    0x28: 1,
+    0x2E: 2,
+    0x2F: 2,
+    0x31: 3,
+    0x3E: 1,
+    0x85: 1,
+}
+"""Bytes of a request behind its service that a positive answer repeats: sub-function, identifier."""
 
 NEGATIVE_CODES: Mapping[int, str] = {
     0x10: "general reject",

@@ -25,15 +25,14 @@ LEVEL = (REQUEST_SEED + 1) // 2
 """Level of security access."""
 SIGN = Identifier(spec_of(BrakeStatus).can_id, False)
 """Our ECU is on a bus where this message is."""
-_NAMED = {"mode": lambda value: BrakeMode(int(value)).name}
 _RECORDS = {"fault detection counter": lambda data: str(int.from_bytes(data, "big", signed=True))}
 
 __all__ = ["ANSWER", "FUNCTIONAL", "LEVEL", "OWN", "PERIODIC", "REQUEST", "SIGN", "key_of", "names_of"]
 
 
 def _number(value: float, name: str) -> str:
-    if name in _NAMED and value in tuple(BrakeMode):
-        return _NAMED[name](value)
+    if name.endswith("mode") and value in tuple(BrakeMode):
+        return BrakeMode(int(value)).name
     return f"{value:.7g}"
 
 

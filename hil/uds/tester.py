@@ -17,13 +17,14 @@ from udsoncan.Request import Request
 from hil.errors import BrakebenchError, Verdict
 from hil.rt.clock import monotonic_ns
 from hil.uds.dtc import ALL_CODES
-from hil.uds.names import RESPONSE_OFFSET, WITH_SUBFUNCTION
+from hil.uds.names import REPEATED, RESPONSE_OFFSET, SUPPRESS_BIT, WITH_SUBFUNCTION
 from hil.uds.transport import IsoTpConnection
 from hil.uds.words import FOREIGN, Names, Said, describe, refusal_text, service_text
 
 ANSWER_WITHIN_S = 1.0
 """P2 of the tester where none is given: the 50 ms of ISO 14229-2 and what a gateway or a busy machine adds."""
 PENDING_WITHIN_S = 10.0  # P2* of the tester: twice the 5 s of ISO 14229-2
+_READ = 0x22  # of several identifiers the ECU may leave out the first
 ALL_WITHIN_S = 120.0  # of a request that the ECU holds up with response pending
 
 
@@ -129,7 +130,15 @@ class Tester:
                 raise
 
         answer = self._asked(payload, send)
-        return bytes(answer.original_payload) if answer is not None else b""
+        if answer is None:
+            return b""
+        got = bytes(answer.original_payload)
+        n = REPEATED.get(payload[0], 0) if payload[0] != _READ or len(payload) == 3 else 0
+        if got[1 : 1 + n] != bytes(
+            (payload[1] & ~SUPPRESS_BIT, *payload[2 : 1 + n]) if with_sub else payload[1 : 1 + n]
+        ):
+            raise NoAnswerError(f"{self.say(payload).text}: something else was answered: {got.hex(' ').upper()}")
+        return got
 
     def say(self, answer: bytes) -> Said:
         """An answer in words."""
