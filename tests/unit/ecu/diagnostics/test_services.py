@@ -2,6 +2,7 @@
 
 import math
 import struct
+from itertools import pairwise
 
 import pytest
 from uds_tester import functional
@@ -274,7 +275,7 @@ def test_periodic_reading_at_100_hz(bench):
         records = [struct.unpack(">BBf", data[:6]) for data in tester.periodic if data[0] == low]
         assert len(records) == 100
         counts = [count for _, count, _ in records]
-        assert all((b - a) & 0xFF == 1 for a, b in zip(counts, counts[1:], strict=False))
+        assert all((b - a) & 0xFF == 1 for a, b in pairwise(counts))
     times = [struct.unpack(">BBf", data[:6])[2] for data in tester.periodic if data[0] == 0]
     assert times[-1] - times[0] == pytest.approx(0.99, abs=1e-3)
     assert tester.ask("2a 02 06") == ["6a"]
