@@ -212,12 +212,12 @@ def _routine(tester: "Tester", args: argparse.Namespace) -> Answer:
 
 def _add_session(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME", help="default, programming, extended, safety system, or a number")
-    _add_hold(parser)
+    _add_hold(parser, "stay so long, with tester present")
     parser.set_defaults(do=_session, action="session")
 
 
-def _add_hold(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--hold", type=float, default=0.0, metavar="S", help="stay so long, with tester present")
+def _add_hold(parser: argparse.ArgumentParser, words: str) -> None:
+    parser.add_argument("--hold", type=float, default=0.0, metavar="S", help=words)
 
 
 def session_number(text: str) -> int:
@@ -264,7 +264,7 @@ def _add_io(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("did", metavar="DID", help="what is controlled: a name of our ECU's, or 0x1234")
     parser.add_argument("control", choices=tuple(_CONTROLS))
     parser.add_argument("value", nargs="?", metavar="VALUE", help="of adjust: bytes, or a value in its unit")
-    _add_hold(parser)
+    _add_hold(parser, "hold it so long, then return control (else the ECU's session ends it)")
     parser.set_defaults(do=_io, action="io")
 
 
@@ -273,9 +273,15 @@ def _io(tester: "Tester", args: argparse.Namespace) -> Answer:
         raise BrakebenchError(f"io {args.control}: expected {'a' if args.value is None else 'no'} value")
     did = _did(tester.known, args.did, coded=True)
     data = b"" if args.value is None else _value(tester.known, did, args.value)
-    answer = tester.ask(b"\x2f" + did.to_bytes(2, "big") + bytes((_CONTROLS[args.control],)) + data)
-    _hold(tester, args.hold)
-    return [tester.say(answer).text], {"did": did, "data": answer[4:].hex()}
+    head = b"\x2f" + did.to_bytes(2, "big")
+    answer = tester.ask(head + bytes((_CONTROLS[args.control],)) + data)
+    lines = [tester.say(answer).text]
+    if args.hold:
+        try:
+            _hold(tester, args.hold)
+        finally:
+            lines.append(tester.say(tester.ask(head + bytes((_CONTROLS["return"],)))).text)
+    return lines, {"did": did, "data": answer[4:].hex()}
 
 
 def _add_request(parser: argparse.ArgumentParser) -> None:

@@ -67,6 +67,8 @@ def test_data_routines_and_the_rest(ask, ecu):
     assert "written" in ask("write", "0x0100", 40 * "55")  # a request of several frames
     assert ask("routine", "0x0203", "start") == "start: 0x0203 = 00\n"
     assert "short-term adjustment, 7F" in ask("io", "0x0100", "adjust", "7f")
+    assert "return control to the ECU" in ask("io", "0x0100", "adjust", "7f", "--hold", "0.01")
+    assert ecu.asked[-3:] == [b"\x2f\x01\x00\x03\x7f", b"\x3e\x80", b"\x2f\x01\x00\x00"]
     assert ask("reset") == "ECUReset, hard reset\n"
     assert ask("session", "extended", "--hold", "0.01") == "DiagnosticSessionControl, extended, P2 50 ms, P2* 5000 ms\n"
     assert ecu.asked[-1] == b"\x3e\x80"
