@@ -86,7 +86,7 @@ def frame_of(can_id, data):
 
 @pytest.mark.parametrize("number", [500, pytest.param(10_000, marks=pytest.mark.slow)])
 def test_malformed_requests(bench, number):
-    rig, node, mob = bench.rig, bench.rig.node, Mob(1)
+    rig, node, mob = bench.rig, bench.rig.node, Mob(2)
     told, shadow = Reassembler(), Link(most_bytes=MOST_REQUEST)
     requests, answers, pending = Counter(), Counter(), Counter()
     tick = moved = since_change = 0
