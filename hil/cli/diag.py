@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     from dbc.frame import BusName
     from hil.bus.channel import resolve
     from hil.bus.open import open_bus
-    from hil.uds.own import names_of
+    from hil.uds.own import PERIODIC, REQUEST, names_of
 
     spec = resolve(args.bus)
     check_transmit(spec, args.transmit)
@@ -91,7 +91,8 @@ def run(args: argparse.Namespace) -> int:
     code = 0
     lines: list[str] = []
     with open_bus(spec, BusName.VEHICLE) as bus:
-        tester = Tester(IsoTpConnection(bus, request, answer, functional), known, args.timeout, tell)
+        connection = IsoTpConnection(bus, request, answer, functional, PERIODIC if request == REQUEST else None)
+        tester = Tester(connection, known, args.timeout, tell)
         try:
             _prepare(tester, args)
             lines, facts["result"] = args.do(tester, args)
@@ -151,7 +152,8 @@ def _identifiers(args: argparse.Namespace) -> Any:
 
 
 def _prepare(tester: "Tester", args: argparse.Namespace) -> None:
-    from hil.uds.own import LEVEL, key_of
+    from ecu.diagnostics.security import key_of
+    from hil.uds.own import LEVEL
 
     if args.session is not None:
         tester.session(session_number(args.session))

@@ -5,6 +5,7 @@ import difflib
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from hil.cli.diag_measure import add_measure
 from hil.errors import BrakebenchError
 
 if TYPE_CHECKING:
@@ -15,7 +16,6 @@ Answer = tuple[list[str], Any]
 Do = Callable[["Tester", argparse.Namespace], Answer]
 LISTED = 0x0D
 """Status mask of `read-dtc`: failed now, pending, confirmed, which a workshop asks for."""
-_PRESENT_EVERY_S = 2.0  # ISO 14229-2: S3 client, 2 s, well before the server's 5 s
 
 
 def number(text: str, what: str, most: int, such: str) -> int:
@@ -237,6 +237,7 @@ def _session(tester: "Tester", args: argparse.Namespace) -> Answer:
 def _hold(tester: "Tester", seconds: float) -> None:
     """Keep the session alive, and with it what it holds."""
     from hil.rt.clock import WallClock
+    from hil.uds.tester import PRESENT_EVERY_S
 
     if not 0.0 <= seconds < 86_400.0:
         raise BrakebenchError(f"--hold {seconds:g}: expected seconds, less than a day")
@@ -244,7 +245,7 @@ def _hold(tester: "Tester", seconds: float) -> None:
     until_ns = clock.now_ns() + round(seconds * 1e9)
     while (now_ns := clock.now_ns()) < until_ns:
         tester.present()
-        clock.sleep_until(min(until_ns, now_ns + round(_PRESENT_EVERY_S * 1e9)))
+        clock.sleep_until(min(until_ns, now_ns + round(PRESENT_EVERY_S * 1e9)))
 
 
 def _add_reset(parser: argparse.ArgumentParser) -> None:
@@ -301,6 +302,7 @@ ACTIONS: tuple[tuple[str, str, Callable[[argparse.ArgumentParser], None]], ...] 
     ("clear", "clear trouble codes", _add_clear),
     ("read", "read data by identifier", _add_read),
     ("write", "write data by identifier", _add_write),
+    ("measure", "read quantities of our ECU's law periodically", add_measure),
     ("routine", "start or stop a routine, or ask for its result", _add_routine),
     ("session", "change the session", _add_session),
     ("reset", "restart the ECU", _add_reset),

@@ -2,6 +2,7 @@
 
 import struct
 from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 from dbc import diagnostic_ids
 from dbc.contract import spec_of
@@ -10,8 +11,8 @@ from ecu.diagnostics import routines
 from ecu.diagnostics.actuators import DEMANDS
 from ecu.diagnostics.identifiers import FIRST_QUANTITY, IDENTIFIERS
 from ecu.diagnostics.identifiers import Identifier as DataIdentifier
-from ecu.diagnostics.quantities import QUANTITIES
-from ecu.diagnostics.security import REQUEST_SEED, key_of
+from ecu.diagnostics.quantities import QUANTITIES, RECORD_BYTES
+from ecu.diagnostics.security import REQUEST_SEED
 from ecu.diagnostics.services import EXTENDED_RECORDS
 from ecu.diagnostics.trouble_memory import dtc_of
 from ecu.law.trouble_codes import CODES
@@ -26,8 +27,6 @@ LEVEL = (REQUEST_SEED + 1) // 2
 SIGN = Identifier(spec_of(BrakeStatus).can_id, False)
 """Our ECU is on a bus where this message is."""
 _RECORDS = {"fault detection counter": lambda data: str(int.from_bytes(data, "big", signed=True))}
-
-__all__ = ["ANSWER", "FUNCTIONAL", "LEVEL", "OWN", "PERIODIC", "REQUEST", "SIGN", "key_of", "names_of"]
 
 
 def _number(value: float, name: str) -> str:
@@ -96,6 +95,22 @@ OWN = Names(
     periodic={FIRST_QUANTITY & 0xFF | k: FIRST_QUANTITY + k for k in range(len(QUANTITIES))},
 )
 """All that our ECU calls by name."""
+
+
+class Sample(NamedTuple):
+    """A quantity of the law as one periodic frame tells it; ``tick`` is the low byte of the law's tick number."""
+
+    name: str
+    tick: int
+    value: float
+
+
+def sample_of(data: bytes) -> Sample | None:
+    """Read a periodic frame; None where it is none of ours."""
+    if len(data) <= RECORD_BYTES or data[0] >= len(QUANTITIES):
+        return None
+    tick, value = struct.unpack_from(">Bf", data, 1)
+    return Sample(QUANTITIES[data[0]].name, tick, value)
 
 
 def names_of(identifier: Identifier) -> Names:

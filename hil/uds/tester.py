@@ -24,6 +24,10 @@ from hil.uds.words import FOREIGN, Names, Said, describe, refusal_text, service_
 ANSWER_WITHIN_S = 1.0
 """P2 of the tester where none is given: the 50 ms of ISO 14229-2 and what a gateway or a busy machine adds."""
 PENDING_WITHIN_S = 10.0  # P2* of the tester: twice the 5 s of ISO 14229-2
+PRESENT_EVERY_S = 2.0
+"""Between two requests that keep a session alive: S3 of the client in ISO 14229-2, well before the ECU's 5 s."""
+EXTENDED_SESSION = 3
+_PERIODIC, _STOP = 0x2A, 4  # ReadDataByPeriodicIdentifier, and its mode that ends it
 _READ = 0x22  # of several identifiers the ECU may leave out the first
 ALL_WITHIN_S = 120.0  # of a request that the ECU holds up with response pending
 
@@ -159,6 +163,28 @@ class Tester:
     def present(self) -> None:
         """Keep the session alive; no answer is wanted."""
         self.ask(bytes((0x3E, 0x80)))
+
+    def measure(self, rate: int, lows: bytes, seconds: float) -> list[tuple[int, bytes]]:
+        """Have periodic data sent for a while, in an extended session: time of reception, ns, and data of each frame.
+
+        Parameters
+        ----------
+        rate : transmission mode of ReadDataByPeriodicIdentifier, 1 slow, 2 medium, 3 fast.
+        lows : low bytes of the data identifiers.
+        """
+        self.session(EXTENDED_SESSION)
+        self._connection.take_periodic(0.0)
+        self.ask(bytes((_PERIODIC, rate)) + lows)
+        taken: list[tuple[int, bytes]] = []
+        try:
+            while seconds > 0.0:
+                part_s = min(seconds, PRESENT_EVERY_S)
+                taken += self._connection.take_periodic(part_s)
+                seconds -= part_s
+                self.present()
+        finally:
+            self.ask(bytes((_PERIODIC, _STOP)))
+        return taken + self._connection.take_periodic(0.0)
 
     def codes(self, mask: int) -> list[FoundDtc]:
         """Trouble codes of which any bit of the mask is set in the status."""

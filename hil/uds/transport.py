@@ -39,13 +39,21 @@ class IsoTpConnection(BaseConnection):
     bus : joined by the caller, and left by it.
     request, answer : identifiers of the ECU.
     functional : requests go to this identifier, so to all ECUs; only this ECU's answers are taken.
+    periodic : identifier of its periodic data, whose frames `take_periodic` gives.
 
     Raises
     ------
     BrakebenchError : one identifier for both, or one of 11 and one of 29 bits.
     """
 
-    def __init__(self, bus: Bus, request: Identifier, answer: Identifier, functional: Identifier | None = None) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        request: Identifier,
+        answer: Identifier,
+        functional: Identifier | None = None,
+        periodic: Identifier | None = None,
+    ) -> None:
         super().__init__(bus.name)
         if request == answer or request.extended != answer.extended:
             raise BrakebenchError(
@@ -53,7 +61,8 @@ class IsoTpConnection(BaseConnection):
             )
         self.trouble: list[str] = []
         """What went wrong below the messages since the last request."""
-        self._bus, self._functional = bus, functional
+        self._bus, self._functional, self._periodic = bus, functional, periodic
+        self._samples: list[tuple[int, bytes]] = []
         self._arrived: deque[isotp.CanMessage] = deque()
         self._open = False
         mode = isotp.AddressingMode.Normal_29bits if request.extended else isotp.AddressingMode.Normal_11bits
@@ -126,11 +135,23 @@ class IsoTpConnection(BaseConnection):
                 raise SilenceError("no answer")
             self._receive(_STEP_S if self._stack.is_rx_active() else min(left_s, 0.05))
 
+    def take_periodic(self, seconds: float) -> list[tuple[int, bytes]]:
+        """Listen so long; time of reception, ns, and data of every frame of periodic data since the last call."""
+        until_ns = monotonic_ns() + int(seconds * 1e9)
+        while (left_ns := until_ns - monotonic_ns()) > 0:
+            self._receive(left_ns * 1e-9)
+            self._stack.process()
+        taken, self._samples = self._samples, []
+        return taken
+
     def _receive(self, timeout_s: float) -> None:
         for item in self._bus.receive(max(0.0, timeout_s)):
             if isinstance(item, LinkEvent):
                 if item.state in _LOST:
                     self.trouble.append(f"{item.state}: {item.number} frames {item.detail}".rstrip())
+                continue
+            if (item.can_id, item.extended) == self._periodic:
+                self._samples.append((item.time_ns, item.data))
                 continue
             self._arrived.append(isotp.CanMessage(item.can_id, len(item.data), item.data, extended_id=item.extended))
 

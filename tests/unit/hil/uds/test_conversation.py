@@ -14,6 +14,7 @@ from hil.log.frames import FrameTable
 from hil.uds.addresses import Addresses, Identifier, standard_partner
 from hil.uds.conversation import NO_FIRST, NO_ISOTP, Conversation
 from hil.uds.find_pairs import PairFinder
+from hil.uds.own import names_of
 from hil.uds.words import Did, Kind, Names
 
 VIN_REQUEST, VIN = b"\x22\xf1\x90", b"\x62\xf1\x90WAUZZZ4M1HA000001"
@@ -133,6 +134,30 @@ def test_nothing_is_lost_in_silence(messages, seed, data):
     first = sum(frame in starts for frame in damaged if frame[0] >> 4 == 1)
     single = sum(frame[0] >> 4 == 0 for frame in damaged)
     assert len(joined) == first + single  # every begin is told, complete or not
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(0, 10_000_000_000),
+            st.sampled_from((0x7A0, 0x7A8, 0x7A9, 0x7DF, 0x7E8, 0x18DA10F1, 0x100)),
+            st.binary(max_size=12).filter(lambda data: len(data) in (*range(9), 12)),
+        ),
+        max_size=30,
+    )
+)
+def test_any_frames_are_read_without_an_error_and_counted(frames):
+    """Whatever stands in a log, stamps that run back included."""
+    periodic = Identifier(0x7A9, False)
+    pair = Identifier(0x7A0, False), Identifier(0x7A8, False)
+    messages, counts = read(frames, Addresses.of([pair], periodic=[periodic]), names_of=lambda _, i: names_of(i))
+    assert sum(counts.frames.values()) == sum(can_id != 0x100 for _, can_id, _ in frames)
+    assert sum(counts.messages.values()) + sum(counts.broken.values()) == len(messages)
+    assert all(message.said.text for message in messages)
+    finder = PairFinder()
+    finder.take([table_of(frames)])
+    assert all(request != answer for request, answer in finder.pairs())
 
 
 def test_why_a_message_is_incomplete_is_said():
