@@ -37,8 +37,8 @@ def test_every_sub_function(bench, session):
             if sub in service.sub:
                 continue
             nrc = "12" if session in service.sessions else "7f"
-            assert tester.ask(f"{sid:02x} {sub:02x}", 3) == [f"7f {sid:02x} {nrc}"]
-            assert functional(tester, f"{sid:02x} {sub | 0x80:02x}", 3) == []
+            assert tester.ask(f"{sid:02x} {sub:02x}", 2) == [f"7f {sid:02x} {nrc}"]
+            assert functional(tester, f"{sid:02x} {sub | 0x80:02x}", 2) == []
 
 
 # a whole request of each service with its answer in the extended session, the lock closed, the car standing
