@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from hil.cli.columns import say, terminal_width
-from hil.cli.decode_uds import add_uds, check_options, run_uds
 from hil.cli.log_options import (
     LOGS,
     add_databases,
@@ -33,6 +32,8 @@ from hil.log.several import Logs
 from hil.log.source import ReadOptions
 from hil.log.summary.contents import Contents
 from hil.log.summary.values import Summary
+
+_NOT_WITH = ("out", "messages", "signals", "resample", "names", "bitrate", "dbc", "e2e_legacy")  # --uds
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -64,16 +65,18 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     )
     parser.add_argument("--limit-mb", metavar="N", type=float, help="read at most so much of each log (unpacked)")
     parser.add_argument("--e2e-legacy", action="store_true", help="check by the check value of older recordings")
-    add_uds(parser)
+    _add_uds(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Summarise, write the signals, say what is missing."""
-    check_options(args)
+    _check_uds(args)
     choice = _choice(args)
     if args.uds:
+        from hil.cli.decode_uds import run_uds  # the names of our ECU take as long to load as a small log
+
         return run_uds(args, choice, _limit_bytes(args))
     databases_, files = databases(args.dbc)
     wanted = choice.wanted(databases_)
@@ -111,6 +114,31 @@ def run(args: argparse.Namespace) -> int:
             lines += ["", f"signals: {printable(args.out)} ({rows:,} rows, {len(contents.signals)} signals)"]
         say(lines)
     return _exit_code(logs, contents, summary)
+
+
+def _add_uds(parser: argparse.ArgumentParser) -> None:
+    """``--uds`` and its identifiers."""
+    parser.add_argument("--uds", action="store_true", help="print diagnostic requests and answers (UDS over ISO-TP)")
+    parser.add_argument(
+        "--uds-ids",
+        metavar="REQUEST:ANSWER,...",
+        action="append",
+        default=[],
+        help="identifiers of diagnostics, hexadecimal (714:77E, 18DA01F1:18DAF101, or one alone for requests to all); "
+        "otherwise they are found: the standard ones, ours, and pairs on which requests are answered",
+    )
+
+
+def _check_uds(args: argparse.Namespace) -> None:
+    """Refuse options that have no meaning with or without ``--uds``."""
+    if not args.uds:
+        if args.uds_ids:
+            raise BrakebenchError("--uds-ids says where diagnostics are; give --uds as well")
+        return
+    for name in _NOT_WITH:
+        if getattr(args, name):
+            option = f"--{name.replace('_', '-')}"
+            raise BrakebenchError(f"{option}: --uds prints messages of diagnostics, not signals; leave {option} out")
 
 
 def _choice(args: argparse.Namespace) -> Choice:

@@ -9,7 +9,6 @@ from typing import Any
 from hil.cli.columns import say
 from hil.cli.log_options import check_found, paths, unused, words_of
 from hil.cli.progress import Progress
-from hil.errors import BrakebenchError
 from hil.log.account import printable
 from hil.log.choice import Choice
 from hil.log.several import Logs
@@ -18,41 +17,10 @@ from hil.uds import own
 from hil.uds.addresses import Addresses, Identifier
 from hil.uds.conversation import NO_FIRST, NO_ISOTP, Conversation, Spoken
 from hil.uds.find_pairs import PairFinder
-from hil.uds.words import FOREIGN, SHOWN_BYTES, Kind, Names, hex_text, service_text
-
-_NOT_WITH = ("out", "messages", "signals", "resample", "names", "bitrate", "dbc", "e2e_legacy")
+from hil.uds.known import FOREIGN, SHOWN_BYTES, Names, hex_text
+from hil.uds.words import Kind, service_text
 
 _MOST_TEXT = 400  # letters of a message in a line: lists of all codes are longer
-
-
-def add_uds(parser: argparse.ArgumentParser) -> None:
-    """``--uds`` and its identifiers."""
-    parser.add_argument("--uds", action="store_true", help="print diagnostic requests and answers (UDS over ISO-TP)")
-    parser.add_argument(
-        "--uds-ids",
-        metavar="REQUEST:ANSWER,...",
-        action="append",
-        default=[],
-        help="identifiers of diagnostics, hexadecimal (714:77E, 18DA01F1:18DAF101, or one alone for requests to all); "
-        "otherwise they are found: the standard ones, ours, and pairs on which requests are answered",
-    )
-
-
-def check_options(args: argparse.Namespace) -> None:
-    """Refuse options that have no meaning with or without ``--uds``.
-
-    Raises
-    ------
-    BrakebenchError : it names the option.
-    """
-    if not args.uds:
-        if args.uds_ids:
-            raise BrakebenchError("--uds-ids says where diagnostics are; give --uds as well")
-        return
-    for name in _NOT_WITH:
-        if getattr(args, name):
-            option = f"--{name.replace('_', '-')}"
-            raise BrakebenchError(f"{option}: --uds prints messages of diagnostics, not signals; leave {option} out")
 
 
 def run_uds(args: argparse.Namespace, choice: Choice, limit_bytes: int | None) -> int:

@@ -9,8 +9,8 @@ from hil.cli.diag_measure import add_measure
 from hil.errors import BrakebenchError
 
 if TYPE_CHECKING:
+    from hil.uds.known import Names
     from hil.uds.tester import FoundDtc, Tester
-    from hil.uds.words import Names
 
 Answer = tuple[list[str], Any]
 Do = Callable[["Tester", argparse.Namespace], Answer]
@@ -115,8 +115,8 @@ def _code_values(known: "Names", one: "FoundDtc") -> dict[str, Any]:
 
 def _one_code(tester: "Tester", code: int) -> Answer:
     """Status, snapshot and extended data of a code."""
+    from hil.uds.dtc_report import snapshots
     from hil.uds.tester import FoundDtc, RefusedError
-    from hil.uds.words import snapshots
 
     wanted = code.to_bytes(3, "big") + b"\xff"
     snapshot = tester.ask(b"\x19\x04" + wanted)

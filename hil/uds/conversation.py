@@ -12,7 +12,8 @@ from dbc.isotp_log import JoinedMessage, Reassembler
 from hil.log.frames import FrameFlag, FrameTable
 from hil.uds import names
 from hil.uds.addresses import Addresses, Identifier, keys_of
-from hil.uds.words import FOREIGN, Kind, Names, Said, describe
+from hil.uds.known import FOREIGN, Names
+from hil.uds.words import Kind, Said, describe
 
 _CHANNEL_SHIFT = 32
 _PERIODIC, _STOP = 0x2A, 4  # ReadDataByPeriodicIdentifier, and its mode that ends it

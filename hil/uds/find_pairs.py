@@ -72,9 +72,11 @@ class PairFinder:
     def _take(self, table: FrameTable) -> None:
         keys = keys_of(table.can_id, table.extended)
         data_frame = (table.flags & (FrameFlag.REMOTE | FrameFlag.ERROR)) == 0
-        rows = np.flatnonzero(data_frame & ~standard_keys(keys) & ~np.isin(keys, self._own))
-        for mask, names in ((keys[rows] == self._sign, self.signed), (keys[rows] != self._sign, self.strange)):
-            names.update(table.channels[k] for k in np.unique(table.channel[rows][mask]).tolist())
+        other = data_frame & ~standard_keys(keys)
+        rows = np.flatnonzero(other)
+        sign = keys == self._sign
+        for mask, names in ((other & sign, self.signed), (other & ~sign & ~np.isin(keys, self._own), self.strange)):
+            names.update(table.channels[k] for k in np.unique(table.channel[mask]).tolist())
         both = keys[rows] | table.channel[rows].astype(np.int64) << _CHANNEL_SHIFT
         if self._ruled_out:
             kept = ~np.isin(both, np.fromiter(self._ruled_out, np.int64))

@@ -18,7 +18,7 @@ from ecu.diagnostics.trouble_memory import dtc_of
 from ecu.law.trouble_codes import CODES
 from hil.errors import BrakebenchError
 from hil.uds.addresses import Identifier
-from hil.uds.words import FOREIGN, Did, Names, value_text
+from hil.uds.known import FOREIGN, Did, Names, value_text
 
 REQUEST, ANSWER = Identifier(diagnostic_ids.REQUEST, False), Identifier(diagnostic_ids.RESPONSE, False)
 FUNCTIONAL, PERIODIC = Identifier(diagnostic_ids.REQUEST_FUNCTIONAL, False), Identifier(diagnostic_ids.PERIODIC, False)

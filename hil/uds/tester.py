@@ -17,9 +17,10 @@ from udsoncan.Request import Request
 from hil.errors import BrakebenchError, Verdict
 from hil.rt.clock import monotonic_ns
 from hil.uds.dtc import ALL_CODES
+from hil.uds.known import FOREIGN, Names
 from hil.uds.names import REPEATED, RESPONSE_OFFSET, SUPPRESS_BIT, WITH_SUBFUNCTION
 from hil.uds.transport import IsoTpConnection
-from hil.uds.words import FOREIGN, Names, Said, describe, refusal_text, service_text
+from hil.uds.words import Said, describe, refusal_text, service_text
 
 ANSWER_WITHIN_S = 1.0
 """P2 of the tester where none is given: the 50 ms of ISO 14229-2 and what a gateway or a busy machine adds."""

@@ -6,7 +6,9 @@ import json
 import pytest
 from uds_logs import MS, candump_of, exchange
 
+from dbc.contract import spec_of
 from dbc.isotp import segment
+from dbc.messages import BrakeStatus
 from hil.cli import decode
 from hil.errors import BrakebenchError
 from hil.log.convert import convert
@@ -137,3 +139,19 @@ def test_wrong_use(session, tmp_path):
             run(session, "--uds", *words)
     (tmp_path / "none.log").write_text("(1.0) can0 7E0#R\n")
     assert run(tmp_path / "none.log", "--uds") == 0
+
+
+def test_our_names_are_for_our_ecu(tmp_path, capsys):
+    """The same identifiers on a bus of another car mean something else."""
+    said = exchange(0x7A0, 0x7A8, b"\x22\xf2\x06", b"\x62\xf2\x06\x07\x41\x20\x00\x00", 0)
+    periodic = [(50 * MS, 0x7A9, b"\x06\x08\x41\x20\x00\x00\xcc\xcc")]
+    ours = [(60 * MS, spec_of(BrakeStatus).can_id, bytes(8))]
+    others = [(70 * MS, 0x316, b"\x05\x20\xea\x0a\x20\x1a\x00\x7f")]
+    path = tmp_path / "a.log"
+    for frames, mine in ((said + periodic, True), (said + ours + others, True), (said + others, False)):
+        path.write_text(candump_of(frames))
+        assert run(path, "--uds") == 0
+        out = capsys.readouterr().out
+        assert ("0xF206 speed = 10 m/s" in out) is mine
+        assert ("0xF206 = 07 41 20 00 00" in out) is not mine
+        assert ("periodic data, 0xF206 speed" in out) is (periodic[0] in frames)

@@ -14,8 +14,9 @@ from hil.log.frames import FrameTable
 from hil.uds.addresses import Addresses, Identifier, standard_partner
 from hil.uds.conversation import NO_FIRST, NO_ISOTP, Conversation
 from hil.uds.find_pairs import PairFinder
+from hil.uds.known import Did, Names
 from hil.uds.own import names_of
-from hil.uds.words import Did, Kind, Names
+from hil.uds.words import Kind
 
 VIN_REQUEST, VIN = b"\x22\xf1\x90", b"\x62\xf1\x90WAUZZZ4M1HA000001"
 STANDARD = Addresses.of([])

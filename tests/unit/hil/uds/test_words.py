@@ -9,7 +9,8 @@ from udsoncan import services
 from hil.errors import BrakebenchError
 from hil.uds import names
 from hil.uds.dtc import dtc_number, dtc_text, status_text
-from hil.uds.words import Did, Kind, Names, describe
+from hil.uds.known import Did, Names
+from hil.uds.words import Kind, describe
 
 OWN = Names(
     dids={0x0100: Did("mode", 1, lambda data: f"mode {data[0]}"), 0x0101: Did("speed", 2, lambda d: f"{d[0]} m/s")},
