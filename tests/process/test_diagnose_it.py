@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 from processes import RUN_LIMIT_S, wait_until
+from uds_ecu import ForeignEcu
+
+from hil.errors import INTERRUPTED_EXIT_CODE
 
 PAGE = (Path(__file__).parents[2] / "docs" / "diagnose-it.md").read_text()
 BLOCKS = re.findall(r"```(\w*)\n(.*?)```", PAGE.split("## Reference")[0], re.DOTALL)
@@ -89,3 +92,15 @@ def test_an_ecu_without_a_car(start, brakebench, channel, tmp_path):
         assert facts["messages"]["refusal"] == 3
     assert texts[0] == texts[1]
     assert any("supported codes, " in text and "pedal_lost" in text for text in texts[0])
+
+
+@pytest.mark.slow
+def test_an_output_is_given_back_after_an_interrupt(start, channel):
+    with ForeignEcu(channel, 0x714, 0x77E) as ecu:
+        ids = ("--bus", channel, "--request-id", "714", "--response-id", "77E")
+        tester = start("diag", "io", "0x0100", "adjust", "7f", "--hold", "600", *ids)
+        wait_until(lambda: b"\x3e\x80" in ecu.asked, "tester present")
+        tester.send_signal(signal.SIGINT)
+        tester.communicate(timeout=RUN_LIMIT_S)
+        assert tester.returncode == INTERRUPTED_EXIT_CODE
+        assert ecu.asked[-1] == b"\x2f\x01\x00\x00"
