@@ -22,6 +22,7 @@ COMMANDS = (
     "plant",
     "record",
     "inject",
+    "diag",
     "replay",
     "decode",
     "convert",
