@@ -13,7 +13,7 @@ import cantools
 
 DATABASE = cantools.database.load_file(Path(__file__).with_name("rav4_brake.dbc"), database_format="dbc")
 BRAKE, ACC = (DATABASE.get_message_by_name(name) for name in ("BRAKE", "ACC_CONTROL"))
-FULL_PEDAL_MPS2 = 9.0
+FULL_PEDAL_MPS2 = 5.4
 
 
 def toyota_sum(can_id, data):
@@ -30,6 +30,7 @@ def command(brake):
 
 
 def main(interface, channel):
+    """Command what the pedal asks for, for ever."""
     import can
 
     brake, due = None, time.monotonic()

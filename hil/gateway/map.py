@@ -13,6 +13,7 @@ from dbc.contract import MessageSpec, contract
 from dbc.database import Message, Signal
 from dbc.frame import BusName
 from hil.diagnosis.data.channel_map import to_si
+from hil.diagnosis.data.log import UnusableError
 from hil.gateway.database import UserDatabase, load
 from hil.gateway.error import GatewayError
 from hil.gateway.protection import Protection
@@ -160,7 +161,10 @@ def _conversion(table: Table, signal: Signal, where: str) -> Conversion:
         if set(_CONVERSION) & set(table):
             raise GatewayError(f"{where}: above: a switch has no {', '.join(_CONVERSION)}")
         return Conversion(1.0, 0.0, finite(table, "above", None, where))
-    factor, offset = to_si(str(table.get("unit", "")), where)
+    try:
+        factor, offset = to_si(str(table.get("unit", "")), where)
+    except UnusableError as error:
+        raise GatewayError(str(error)) from error
     sign = whole(table, "sign", -1, 1, where, 1)
     factor *= finite(table, "scale", 1.0, where) * sign
     return Conversion(factor, offset + finite(table, "offset", 0.0, where))

@@ -18,7 +18,7 @@ from plant.node import PlantNode
 EXAMPLES = Path(__file__).parents[4] / "examples"
 TRUTH = spec_of(TruthMotion)
 RADIUS_M = 0.308
-END_NS = 8_000_000_000
+END_NS = 9_500_000_000
 
 
 @pytest.fixture(scope="module")
@@ -101,10 +101,10 @@ def test_their_database_alone_reads_a_stop(rav4_ecu, stop):
     off = max(map(abs, errors["wheel"]))
     print(f"stopped within {motion[last].distance_m:.1f} m; wheel speed off by at most {off:.2f} m/s")
     assert motion[last].speed_mps == pytest.approx(0.0, abs=0.05)
-    assert 30.0 < motion[last].distance_m < 90.0
+    assert 60.0 < motion[last].distance_m < 85.0
     assert np.percentile(np.abs(errors["wheel"]), 90) < 0.6  # slip and a tick
     assert abs(np.median(errors["acceleration"])) < 0.3
-    assert 3000.0 < braked < 10_200.0
+    assert 2000.0 < braked < 10_200.0
     for name, cycle_ms in {"WHEEL_SPEEDS": 12, "KINEMATICS": 12, "SPEED": 24, "BRAKE": 12, "BRAKE_2": 24}.items():
         assert set(np.diff(times[name])) == {cycle_ms * 1_000_000}, name
 
