@@ -4,6 +4,7 @@ Nothing is passed on that is not fresh: a message is sent while all its sources 
 the receivers' own supervision finds what it would find without a gateway, later by at most the age allowed here.
 """
 
+import math
 from collections.abc import Callable, Sequence
 
 from dbc.exchange import Receiver, Transmitter
@@ -27,6 +28,10 @@ class TheirSide:
     ----------
     gateway_map : the map.
     say : takes, for people, which message begins to be sent, or is held back and why.
+
+    Attributes
+    ----------
+    names : messages that it sends, by identifier and whether it is extended.
     """
 
     def __init__(self, gateway_map: GatewayMap, say: Say = _quiet) -> None:
@@ -35,6 +40,8 @@ class TheirSide:
         self._receiver = Receiver(types)
         self._why: dict[str, str] = {}
         self._say = say
+        sending = [one.sending.message for one in gateway_map.theirs]
+        self.names = {(message.can_id, message.extended): message.name for message in sending}
 
     @property
     def sent(self) -> int:
@@ -114,13 +121,14 @@ class _Hearing:
 
 
 class OurSide:
-    """Takes the frames of their bus and gives those of ours; parameters as of `TheirSide`."""
+    """Takes the frames of their bus and gives those of ours; parameters and attributes as of `TheirSide`."""
 
     def __init__(self, gateway_map: GatewayMap, say: Say = _quiet) -> None:
         self._plans = gateway_map.ours
         self._hearing = {(one.message.can_id, one.message.extended): _Hearing(one) for one in gateway_map.heard}
         self._by_name = {one.heard.message.name: one for one in self._hearing.values()}
         self._transmitter = Transmitter()
+        self.names = {(one.spec.can_id, False): one.spec.name for one in gateway_map.ours}
         self._why: dict[str, str] = {}
         self._say = say
         self.sent = 0
@@ -171,7 +179,8 @@ def _ours(source: FromTheirs, payload: bytes) -> float | None:
     raw = read(source.signal, payload)
     if raw == source.none or not selected(source.heard.message, source.signal, payload):
         return None
-    return physical(source.signal, raw) * source.conversion.factor + source.conversion.offset
+    value = physical(source.signal, raw) * source.conversion.factor + source.conversion.offset
+    return value if math.isfinite(value) else None
 
 
 class BehindGateway:

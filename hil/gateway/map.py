@@ -156,6 +156,14 @@ def load_map(path: Path) -> GatewayMap:
     return GatewayMap(path, database, theirs, tuple(ours), tuple(receive.found.values()))
 
 
+def _oldest_ns(table: Table, cycle: int, where: str) -> int:
+    """How old a source may be: ``max_age_ms``, else by its cycle (ns)."""
+    age_ms = finite(table, "max_age_ms", _CYCLES_OLD * cycle / 1e6, where)
+    if age_ms <= 0.0:
+        raise GatewayError(f"{where}: max_age_ms: expected more than 0, got {age_ms:g}")
+    return round(age_ms * 1e6)
+
+
 def _conversion(table: Table, signal: Signal, where: str) -> Conversion:
     if "above" in table:
         if set(_CONVERSION) & set(table):
@@ -165,7 +173,9 @@ def _conversion(table: Table, signal: Signal, where: str) -> Conversion:
         factor, offset = to_si(str(table.get("unit", "")), where)
     except UnusableError as error:
         raise GatewayError(str(error)) from error
-    sign = whole(table, "sign", -1, 1, where, 1)
+    sign = table.get("sign", 1)
+    if sign not in (-1, 1):
+        raise GatewayError(f"{where}: sign: expected 1 or -1, got {sign!r}")
     factor *= finite(table, "scale", 1.0, where) * sign
     return Conversion(factor, offset + finite(table, "offset", 0.0, where))
 
@@ -206,10 +216,7 @@ def _to_theirs(database: UserDatabase, name: str, table: Any, where: str) -> ToT
     sending = sending_of(database, name, table, start, where)
     if not sending.cycle_ns:
         raise GatewayError(f"{where}: the database states no cycle time; expected cycle_ms")
-    oldest = {
-        source.spec.name: round(finite(table, "max_age_ms", _CYCLES_OLD * source.spec.cycle_ns / 1e6, where) * 1e6)
-        for source in sources
-    }
+    oldest = {source.spec.name: _oldest_ns(table, source.spec.cycle_ns, where) for source in sources}
     return ToTheirs(sending, tuple(sources), oldest)
 
 
@@ -264,7 +271,7 @@ def _heard(message: Message, table: Any, where: str) -> Heard:
     counter = counter_of(table, message, where)
     return Heard(
         message,
-        round(finite(table, "max_age_ms", _CYCLES_OLD * cycle / 1e6, where) * 1e6),
+        _oldest_ns(table, cycle, where),
         protection_of(table, message, where),
         None if counter is None else (signal_of(message, counter[0], where), counter[1]),
     )

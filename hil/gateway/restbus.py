@@ -4,7 +4,7 @@ import re
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
-from dbc.frame import Frame, LinkEvent, Received
+from dbc.frame import Frame, Received
 from hil.gateway.database import UserDatabase
 from hil.gateway.error import GatewayError
 from hil.gateway.sent import Sending, SentMessage
@@ -66,15 +66,14 @@ class RestBus:
 
     Attributes
     ----------
-    others : frames of somebody else with an identifier of ours, by message.
+    names : messages by identifier and whether it is extended.
     """
 
     def __init__(self, sending: Sequence[Sending]) -> None:
         self._sent = {one.message.name: SentMessage(one) for one in sending}
-        self._names = {(one.message.can_id, one.message.extended): one.message.name for one in sending}
+        self.names = {(one.message.can_id, one.message.extended): one.message.name for one in sending}
         self._off: set[str] = set()
         self._changed: set[str] = set()
-        self.others: dict[str, int] = {}
 
     @property
     def sent(self) -> int:
@@ -82,12 +81,7 @@ class RestBus:
         return sum(one.count for one in self._sent.values())
 
     def step(self, now_ns: int, inbox: Sequence[Received]) -> list[Frame]:
-        """Send what is due, and what was edited and has no cycle."""
-        for item in inbox:
-            if not isinstance(item, LinkEvent):
-                name = self._names.get((item.can_id, item.extended))
-                if name is not None:
-                    self.others[name] = self.others.get(name, 0) + 1
+        """Send what is due, and what was edited and has no cycle; nothing of the inbox is used."""
         frames = []
         for name, one in self._sent.items():
             if (one.due(now_ns) or name in self._changed) and name not in self._off:

@@ -4,9 +4,9 @@ import contextlib
 import os
 import select
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
-from dbc.frame import BusName, LinkEvent, Received
+from dbc.frame import BusName, Frame, LinkEvent, Received
 from hil.bus.bus import Bus
 from hil.bus.channel import resolve
 from hil.bus.open import open_bus
@@ -22,6 +22,8 @@ from hil.rt.realtime import request_realtime, request_timer_slack
 PERIOD_NS = 1_000_000
 """Of the ticks: cycle times of a database are whole milliseconds."""
 _MOST_LINE = 4096  # letters of a line on standard input
+
+_TOO = "{}: somebody else sends it, too"
 
 Say = Callable[[str], None]
 
@@ -39,14 +41,20 @@ def serve_gateway(gateway_map: GatewayMap, ours: str, theirs: str, realtime: boo
         raise GatewayError(f"gateway: our bus and theirs are both {ours}; expected two")
     stop = StopSignal()
     with contextlib.ExitStack() as stack:
-        our_bus = stack.enter_context(open_bus(ours, BusName.VEHICLE))
-        their_bus = stack.enter_context(open_bus(theirs, BusName.VEHICLE))
+        with stop.at_once():
+            our_bus = stack.enter_context(open_bus(ours, BusName.VEHICLE))
+            their_bus = stack.enter_context(open_bus(theirs, BusName.VEHICLE))
         their_side, our_side = TheirSide(gateway_map, say), OurSide(gateway_map, say)
         loop = _loop(realtime, say)
         say(f"{gateway_map.path.name}: ours on {ours}, theirs on {theirs}")
+        others = set[str]()
         for tick in loop.ticks():
-            their_bus.send(their_side.step(tick.now_ns, _received(our_bus, say)))
-            our_bus.send(our_side.step(tick.now_ns, _received(their_bus, say)))
+            from_ours, from_theirs = _received(our_bus, say), _received(their_bus, say)
+            their_bus.send(their_side.step(tick.now_ns, from_ours))
+            our_bus.send(our_side.step(tick.now_ns, from_theirs))
+            for name in (_named(from_ours, our_side.names) | _named(from_theirs, their_side.names)) - others:
+                others.add(name)
+                say(_TOO.format(name))
             if stop.asked:
                 break
         say(
@@ -59,10 +67,12 @@ def serve_restbus(restbus: RestBus, spec: str, realtime: bool, say: Say) -> None
     """Run a rest-bus until SIGTERM or Ctrl-C; lines on standard input are edits."""
     spec = resolve(spec)
     stop = StopSignal()
-    with open_bus(spec, BusName.VEHICLE) as bus:
+    with contextlib.ExitStack() as stack:
+        with stop.at_once():
+            bus = stack.enter_context(open_bus(spec, BusName.VEHICLE))
         lines = Lines(sys.stdin.fileno()) if sys.stdin is not None else None
         loop = _loop(realtime, say)
-        heard: set[str] = set()
+        others = set[str]()
         say(f"on {spec}; a line MESSAGE.SIGNAL=VALUE, MESSAGE=off or MESSAGE=on edits it")
         for tick in loop.ticks():
             for line in lines.read() if lines is not None else ():
@@ -70,10 +80,11 @@ def serve_restbus(restbus: RestBus, spec: str, realtime: bool, say: Say) -> None
                     say(restbus.edit(line))
                 except GatewayError as error:
                     say(str(error))
-            bus.send(restbus.step(tick.now_ns, _received(bus, say)))
-            for name in restbus.others.keys() - heard:
-                heard.add(name)
-                say(f"{name}: somebody else sends it, too")
+            received = _received(bus, say)
+            bus.send(restbus.step(tick.now_ns, received))
+            for name in _named(received, restbus.names) - others:
+                others.add(name)
+                say(_TOO.format(name))
             if stop.asked:
                 break
         say(f"{restbus.sent} frames sent on {spec}; {loop.overruns} ticks of {PERIOD_NS / 1e6:g} ms skipped")
@@ -84,6 +95,11 @@ def _loop(realtime: bool, say: Say) -> Loop:
         if realtime or not grant.granted:
             say(f"{grant.what}: {'granted' if grant.granted else 'NOT granted'}, {grant.detail}")
     return Loop(WallClock(), PERIOD_NS)
+
+
+def _named(received: list[Received], names: Mapping[tuple[int, bool], str]) -> set[str]:
+    """Messages of ours, by identifier and extended, that somebody else has sent."""
+    return {names[i.can_id, i.extended] for i in received if isinstance(i, Frame) and (i.can_id, i.extended) in names}
 
 
 def _received(bus: Bus, say: Say) -> list[Received]:

@@ -6,12 +6,14 @@ from the most significant bit of byte 0 on.
 
 import math
 import struct
+import sys
 from collections.abc import Mapping
 
 from dbc.database import Message, Signal
 
 Raw = int | float
 _FLOATS = {16: ">e", 32: ">f", 64: ">d"}
+_GREATEST = {16: 65504.0, 32: 3.4028234663852886e38, 64: sys.float_info.max}  # finite ones, IEEE 754
 
 
 def _shift(signal: Signal, length: int) -> int:
@@ -47,15 +49,16 @@ def raw_of(signal: Signal, value: float) -> Raw:
 
     Raises
     ------
-    ValueError : the value is not finite, or the signal's factor is 0.
+    ValueError : the value is no number, or the signal's factor is 0.
     """
-    if not math.isfinite(value) or signal.factor == 0:
+    if math.isnan(value) or signal.factor == 0:
         raise ValueError(f"{signal.name}: {value!r} has no raw value with factor {signal.factor:g}")
     exact = (value - signal.offset) / signal.factor
     if signal.is_float:
-        return exact
+        greatest = _GREATEST[signal.length]
+        return min(max(exact, -greatest), greatest)
     lowest, highest = raw_range(signal)
-    return min(max(round(exact), lowest), highest)
+    return round(min(max(exact, lowest), highest))
 
 
 def physical(signal: Signal, raw: Raw) -> float:

@@ -79,10 +79,15 @@ def test_a_restbus_is_edited_by_lines(start, channel, tmp_path):
     say("BRAKE_2.BRAKE_PRESSED=1")
     wait_until(lambda: last("SPEED")["SPEED"] == 30.5, "the edit")
     wait_until(lambda: last("BRAKE_2"), "the event")
+    other = start("restbus", str(example / "rav4_brake.dbc"), "--node", "CAR", *settings)
+    wait_until(lambda: last("SPEED")["SPEED"] == 50.0, "the other one's frames")
+    other.send_signal(signal.SIGINT)
+    other.communicate(timeout=RUN_LIMIT_S)
     restbus.send_signal(signal.SIGINT)
     words = restbus.communicate(timeout=RUN_LIMIT_S)[1]
     assert restbus.returncode == 0, words
     assert "'nonsense': expected MESSAGE.SIGNAL=VALUE" in words
+    assert "SPEED: somebody else sends it, too" in words
     assert "BRAKE_2 only when it is edited" in words
     recorder.send_signal(signal.SIGINT)
     recorder.communicate(timeout=RUN_LIMIT_S)

@@ -36,5 +36,7 @@ BA_ "GenMsgCycleTime" BO_ 100 10;
 BA_ "GenMsgCycleTime" BO_ 101 20;
 BA_ "GenMsgCycleTime" BO_ 102 25;
 BA_ "GenMsgCycleTime" BO_ 2147484000 100;
+SIG_VALTYPE_ 101 F_LITTLE : 1;
+SIG_VALTYPE_ 101 F_BIG : 1;
 VAL_ 102 STATE 0 "OFF" 5 "READY" ;
 """

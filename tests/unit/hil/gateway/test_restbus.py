@@ -8,7 +8,7 @@ from e2e import p01, p05
 
 from dbc.contract import database_text, spec_of
 from dbc.exchange import Receiver
-from dbc.frame import BusName, Frame
+from dbc.frame import BusName
 from dbc.messages import BatteryStatus
 from hil.gateway.database import load
 from hil.gateway.error import GatewayError
@@ -131,12 +131,6 @@ def test_edits_that_say_what_is_wrong(make, line, message):
     with pytest.raises(GatewayError, match=message):
         restbus.edit(line)
     assert [frame for _, frame in run(restbus, 100, 100)] == [frame for _, frame in before]
-
-
-def test_another_sender_is_heard(make):
-    restbus, _ = make("ABS")
-    restbus.step(0, [Frame(BusName.VEHICLE, 100, bytes(8)), Frame(BusName.VEHICLE, 100, bytes(8), 0, True)])
-    assert restbus.others == {"MIXED": 1}
 
 
 @pytest.mark.parametrize(

@@ -56,6 +56,9 @@ def test_values_beyond_the_bits_are_held_or_refused(database):
     assert raw_of(signal, -1e9) == 0
     with pytest.raises(GatewayError, match=r"here: BIG holds -67.67 to -26.72 km/h, got 0"):
         raw_value(signal, 0, "here")
-    for value in (float("nan"), float("inf")):
-        with pytest.raises(ValueError, match="no raw value"):
-            raw_of(signal, value)
+    assert raw_of(signal, float("inf")) == 4095
+    with pytest.raises(ValueError, match="no raw value"):
+        raw_of(signal, float("nan"))
+    single = next(s for s in database.messages["FLOATS"].signals if s.name == "F_BIG")
+    data = assemble(database.messages["FLOATS"], {"F_BIG": raw_of(single, -1e300)})
+    assert read(single, data) == pytest.approx(-3.4028e38, rel=1e-4)
