@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from dbc.bench_messages import EcuTiming, PlantTiming
+from dbc.contract import contract
 from dbc.exchange import Transmitter
-from dbc.frame import Node
+from dbc.frame import BusName, Node
 from hil.bench.port import OwnedNode, Port
 from hil.bus.channel import resolve
 from hil.faults.line import FaultyNode
@@ -61,7 +62,7 @@ def serve(
     ready_fd : where to say that the node is about to tick.
     realtime : ask for what makes ticks punctual (`hil.rt.realtime`), and say what was granted.
     say : takes messages for people.
-    senders : DBC nodes to play, all of the role's by default.
+    senders : DBC nodes to play, all of the role's by default; ticks are reported where their sender is one of them.
     """
     if ready_fd is not None:
         end_with_parent()
@@ -78,10 +79,12 @@ def serve(
                     say(f"{role.name}: {grant.what}: {GRANTED if grant.granted else NOT_GRANTED}, {grant.detail}")
             say_ready(ready_fd)
         health = Transmitter()
+        reports = any(spec.type is role.timing for spec in contract(BusName.BENCH).sent_by(*plays))
         loop = Loop(WallClock(), NODE_PERIOD_NS, role.phase_ns)
         for tick in run_node(node, port, loop):
-            timing = role.timing(tick.number & 0xFFFFFF, tick.lateness_ns * 1e-9, loop.overruns)
-            port.send(health.frames(tick.now_ns, [timing]))
+            if reports:
+                timing = role.timing(tick.number & 0xFFFFFF, tick.lateness_ns * 1e-9, loop.overruns)
+                port.send(health.frames(tick.now_ns, [timing]))
             if stop.asked:
                 return
 

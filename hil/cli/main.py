@@ -20,6 +20,8 @@ COMMANDS = (
     "scenarios",
     "ecu",
     "plant",
+    "gateway",
+    "restbus",
     "record",
     "inject",
     "diag",

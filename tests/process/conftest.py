@@ -68,10 +68,11 @@ def start(tmp_path):
     """Start a command and go on; whatever still runs at the end is killed."""
     started = []
 
-    def begin(*arguments, program=COMMAND, env=None):
+    def begin(*arguments, program=COMMAND, env=None, stdin=False):
         process = subprocess.Popen(
             [*program, *arguments],
             cwd=tmp_path,
+            stdin=subprocess.PIPE if stdin else None,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

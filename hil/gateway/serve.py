@@ -1,0 +1,136 @@
+"""Gateway and rest-bus as processes: real buses, a tick of a millisecond, until a signal stops them."""
+
+import contextlib
+import os
+import select
+import sys
+from collections.abc import Callable, Iterator, Mapping
+
+from dbc.frame import BusName, Frame, LinkEvent, Received
+from hil.bus.bus import Bus
+from hil.bus.channel import resolve
+from hil.bus.open import open_bus
+from hil.gateway.error import GatewayError
+from hil.gateway.gateway import OurSide, TheirSide
+from hil.gateway.map import GatewayMap
+from hil.gateway.restbus import RestBus
+from hil.rt.clock import WallClock
+from hil.rt.loop import Loop
+from hil.rt.process import StopSignal
+from hil.rt.realtime import request_realtime, request_timer_slack
+
+PERIOD_NS = 1_000_000
+"""Of the ticks: cycle times of a database are whole milliseconds."""
+_MOST_LINE = 4096  # letters of a line on standard input
+
+_TOO = "{}: somebody else sends it, too"
+
+Say = Callable[[str], None]
+
+
+def serve_gateway(gateway_map: GatewayMap, ours: str, theirs: str, realtime: bool, say: Say) -> None:
+    """Run a gateway between two buses until SIGTERM or Ctrl-C.
+
+    Raises
+    ------
+    GatewayError : both are one bus.
+    hil.bus.bus.BusError : one cannot be opened.
+    """
+    ours, theirs = resolve(ours), resolve(theirs)
+    if ours == theirs:
+        raise GatewayError(f"gateway: our bus and theirs are both {ours}; expected two")
+    stop = StopSignal()
+    with contextlib.ExitStack() as stack:
+        with stop.at_once():
+            our_bus = stack.enter_context(open_bus(ours, BusName.VEHICLE))
+            their_bus = stack.enter_context(open_bus(theirs, BusName.VEHICLE))
+        their_side, our_side = TheirSide(gateway_map, say), OurSide(gateway_map, say)
+        loop = _loop(realtime, say)
+        say(f"{gateway_map.path.name}: ours on {ours}, theirs on {theirs}")
+        others = set[str]()
+        for tick in loop.ticks():
+            from_ours, from_theirs = _received(our_bus, say), _received(their_bus, say)
+            their_bus.send(their_side.step(tick.now_ns, from_ours))
+            our_bus.send(our_side.step(tick.now_ns, from_theirs))
+            for name in (_named(from_ours, our_side.names) | _named(from_theirs, their_side.names)) - others:
+                others.add(name)
+                say(_TOO.format(name))
+            if stop.asked:
+                break
+        say(
+            f"{their_side.sent} frames sent on {theirs}, {our_side.sent} on {ours}; {our_side.rejected} of theirs "
+            f"rejected; {loop.overruns} ticks of {PERIOD_NS / 1e6:g} ms skipped"
+        )
+
+
+def serve_restbus(restbus: RestBus, spec: str, realtime: bool, say: Say) -> None:
+    """Run a rest-bus until SIGTERM or Ctrl-C; lines on standard input are edits."""
+    spec = resolve(spec)
+    stop = StopSignal()
+    with contextlib.ExitStack() as stack:
+        with stop.at_once():
+            bus = stack.enter_context(open_bus(spec, BusName.VEHICLE))
+        lines = Lines(sys.stdin.fileno()) if sys.stdin is not None else None
+        loop = _loop(realtime, say)
+        others = set[str]()
+        say(f"on {spec}; a line MESSAGE.SIGNAL=VALUE, MESSAGE=off or MESSAGE=on edits it")
+        for tick in loop.ticks():
+            for line in lines.read() if lines is not None else ():
+                try:
+                    say(restbus.edit(line))
+                except GatewayError as error:
+                    say(str(error))
+            received = _received(bus, say)
+            bus.send(restbus.step(tick.now_ns, received))
+            for name in _named(received, restbus.names) - others:
+                others.add(name)
+                say(_TOO.format(name))
+            if stop.asked:
+                break
+        say(f"{restbus.sent} frames sent on {spec}; {loop.overruns} ticks of {PERIOD_NS / 1e6:g} ms skipped")
+
+
+def _loop(realtime: bool, say: Say) -> Loop:
+    for grant in request_realtime() if realtime else [request_timer_slack()]:
+        if realtime or not grant.granted:
+            say(f"{grant.what}: {'granted' if grant.granted else 'NOT granted'}, {grant.detail}")
+    return Loop(WallClock(), PERIOD_NS)
+
+
+def _named(received: list[Received], names: Mapping[tuple[int, bool], str]) -> set[str]:
+    """Messages of ours, by identifier and extended, that somebody else has sent."""
+    return {names[i.can_id, i.extended] for i in received if isinstance(i, Frame) and (i.can_id, i.extended) in names}
+
+
+def _received(bus: Bus, say: Say) -> list[Received]:
+    heard = bus.receive(0.0)
+    for item in heard:
+        if isinstance(item, LinkEvent):
+            say(f"{bus.name}: {item.state.value} ({item.number}) {item.detail}".rstrip())
+    return heard
+
+
+class Lines:
+    """Lines of a file descriptor as they come, without waiting; not from a terminal in whose background we are."""
+
+    def __init__(self, fileno: int) -> None:
+        self._fileno: int | None = fileno
+        self._rest = b""
+
+    def read(self) -> Iterator[str]:
+        """Whole lines that have come."""
+        if self._fileno is None or not select.select([self._fileno], [], [], 0.0)[0]:
+            return
+        if os.isatty(self._fileno) and os.tcgetpgrp(self._fileno) != os.getpgrp():
+            return
+        came = os.read(self._fileno, _MOST_LINE)
+        if not came:
+            self._fileno = None
+        *lines, self._rest = (self._rest + came).split(b"\n")
+        self._rest = self._rest[:_MOST_LINE]
+        if not came and self._rest:
+            lines, self._rest = [*lines, self._rest], b""
+        for line in lines:
+            text = line.decode(errors="replace").strip()
+            if text:
+                yield text
