@@ -32,17 +32,20 @@ class Receiver:
     ----------
     types : the typed messages the node reads; all other frames are passed over.
     own : messages of the vehicle bus that the node sends; nobody else may.
+    others : identifiers of the vehicle bus whose frames are handed on as they came.
 
     Attributes
     ----------
     receptions : state of each message.
     values : last usable values of all fields, SI units, message after message in the order of ``types``; NaN where not
         available or not yet received.
-    link_events : those of the last tick.  own_heard : frames of the last tick with an identifier of ``own``.
+    link_events, others : those of the last tick.  own_heard : frames of the last tick with an identifier of ``own``.
     lost, corrupt : frames missing by their counters, and with wrong check value or length, over all messages.
     """
 
-    def __init__(self, types: Iterable[type[Message]], own: Iterable[type[Message]] = ()) -> None:
+    def __init__(
+        self, types: Iterable[type[Message]], own: Iterable[type[Message]] = (), others: Iterable[int] = ()
+    ) -> None:
         kinds = tuple(types)
         self._intake = Intake([spec_of(kind) for kind in kinds])
         self.receptions = {kind: Reception(self._intake, index) for index, kind in enumerate(kinds)}
@@ -53,16 +56,20 @@ class Receiver:
             for bus in (BusName.VEHICLE, BusName.BENCH)
         )
         self._own = frozenset(spec_of(kind).can_id for kind in own)
-        self._of_interest = {*self._vehicle, *self._bench, *self._own, *LinkState}  # the second element of what comes
+        self._others = frozenset(others)
+        # the second element of what comes
+        self._of_interest = {*self._vehicle, *self._bench, *self._own, *self._others, *LinkState}
         self._plans: dict[tuple[Any, ...], _Plan] = {}
         self.values: Vector = self._intake.values
         self.link_events: list[LinkEvent] = []
+        self.others: list[Frame] = []
         self.own_heard = 0
         self.lost = self.corrupt = 0
 
     def accept(self, now_ns: int, inbox: Sequence[Received]) -> None:
         """Take the inbox of the tick ``now_ns``; ``link_events`` then holds the tick's link events."""
         self.link_events = []
+        self.others = []
         self.own_heard = 0
         ids = tuple([item[1] for item in inbox])
         plan = self._plans.get(ids)
@@ -90,6 +97,8 @@ class Receiver:
                 payloads.append(data)
             elif bus is _VEHICLE and can_id in self._own and not extended:
                 self.own_heard += 1
+            elif bus is _VEHICLE and can_id in self._others and not extended:
+                self.others.append(item)
         self._take(now_ns, indices, payloads)
         where = [k for k, can_id in enumerate(ids) if can_id in of_interest]
         if 0 < len(where) == len(indices):

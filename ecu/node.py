@@ -5,6 +5,7 @@ from typing import Any
 
 from dbc.batch import Batch
 from dbc.bench_messages import EcuReception, StimulusEcu
+from dbc.diagnostic_ids import REQUESTS
 from dbc.exchange import Receiver
 from dbc.frame import BusName, Frame, LinkState, Received
 from dbc.intake import BAD_IN_ROW, FRESH, LAST_VALID_NS, RECEIVED
@@ -32,9 +33,11 @@ from dbc.messages import (
     WheelSpeedRear,
 )
 from dbc.reception import Reception
-from ecu.law.step import initial_memory, step
-from ecu.law.trouble_codes import Trouble
-from ecu.law.types import OTHERS_WELL, WELL, Brake, Health, Inputs, Outputs
+from ecu.diagnostics.exchange import Orders, View, instead
+from ecu.diagnostics.server import DiagnosticServer
+from ecu.law.step import asked_instead, initial_memory, step
+from ecu.law.trouble_codes import Trouble, forget
+from ecu.law.types import OTHERS_WELL, WELL, ZERO, Brake, Four, Health, Inputs, Outputs
 from ecu.parameters.ecu import EcuParameters
 
 SOURCES: tuple[type[tuple[Any, ...]], ...] = (  # in the order of law.types.Source
@@ -88,14 +91,17 @@ class EcuNode:
     Attributes
     ----------
     memory, outputs : state of the control law, and what it gave in the last step (None before the first).
+    diagnostics : answers testers; it sees the law's step and gives orders, which the node carries out.
     """
 
     def __init__(self, parameters: EcuParameters, period_ns: int = 10_000_000) -> None:
-        self.parameters = parameters
+        self.parameters = self._set = parameters
         self.period_ns = period_ns
+        self.diagnostics = DiagnosticServer(period_ns)
+        self._pressure_zero_pa = ZERO
         self.memory = initial_memory(parameters)
         self.outputs: Outputs | None = None
-        self._receiver = Receiver((*SOURCES, StimulusEcu), own=SENT)
+        self._receiver = Receiver((*SOURCES, StimulusEcu), own=SENT, others=REQUESTS)
         self._receptions = [self._receiver.receptions[t] for t in SOURCES]
         self._batch = Batch((*SENT, EcuReception))
         self._last_ns: int | None = None
@@ -120,8 +126,40 @@ class EcuNode:
                 self._link_down = _LINK_DOWN.get(event.state, self._link_down)
         elapsed_ns = self.period_ns if self._last_ns is None else now_ns - self._last_ns
         self._last_ns = now_ns
-        self.memory, self.outputs = step(self.memory, self._inputs(now_ns), self.parameters, elapsed_ns * 1e-9)
+        inputs = self._inputs(now_ns)
+        self.memory, self.outputs = step(self.memory, inputs, self.parameters, elapsed_ns * 1e-9)
+        diagnostics = self.diagnostics
+        if self._receiver.others or diagnostics.awake or self.memory.troubles is not diagnostics.troubles:
+            return self._diagnose(now_ns, inputs, self.outputs)
         return self._tell(now_ns, self.outputs)
+
+    def _diagnose(self, now_ns: int, inputs: Inputs, outputs: Outputs) -> list[Frame]:
+        """End a tick in which diagnostics take part: frames to send, theirs last."""
+        m = self.memory
+        view = View(m.time_s, inputs, outputs, m.estimates, m.friction, m.troubles, self.parameters)
+        answers, orders = self.diagnostics.step(now_ns, self._receiver.others, view)
+        if orders.pressure_pa is not None or orders.motor_nm is not None:
+            pressure = instead(outputs.pressure_demand_pa, orders.pressure_pa)
+            motor = instead(outputs.motor_demand_nm, orders.motor_nm)
+            self.memory, self.outputs = asked_instead(m, outputs, pressure, motor)
+        frames = self._tell(now_ns, self.outputs or outputs)
+        if orders.silent:
+            frames = [frame for frame in frames if frame.bus is not BusName.VEHICLE]
+        self._obey(orders)
+        return [*frames, *answers]
+
+    def _obey(self, orders: Orders) -> None:
+        """Carry out what changes the node from the next tick on."""
+        if orders.forget:
+            self.memory = self.memory._replace(troubles=forget(self.memory.troubles, orders.forget))
+        if orders.parameters is not None:
+            self.parameters = orders.parameters
+        if orders.pressure_zero_pa is not None:
+            self._pressure_zero_pa = orders.pressure_zero_pa
+        if orders.hard:
+            self.parameters, self._pressure_zero_pa = self._set, ZERO
+        if orders.restart:
+            self.memory = initial_memory(self.parameters)
 
     def _inputs(self, now_ns: int) -> Inputs:
         """What the receiver holds, as the law takes it."""
@@ -132,6 +170,10 @@ class EcuNode:
             current_rl, able_rl, state_rl, current_rr, able_rr, state_rr,
             steering, _, charge_power, blending_factor,
         ) = self._receiver.values.tolist()  # fmt: skip
+        pressure: Four = (pressure_fl, pressure_fr, pressure_rl, pressure_rr)
+        if self._pressure_zero_pa is not ZERO:
+            zero = self._pressure_zero_pa
+            pressure = (pressure_fl - zero[0], pressure_fr - zero[1], pressure_rl - zero[2], pressure_rr - zero[3])
         well = self._receiver.well
         if 0 not in well[:_OTHERS]:  # mostly
             health = (*OTHERS_WELL, WELL if well[_OTHERS] else _health(self._receptions[_OTHERS], now_ns))
@@ -147,7 +189,7 @@ class EcuNode:
                 acceleration_x,
                 acceleration_y,
                 yaw_rate,
-                (pressure_fl, pressure_fr, pressure_rl, pressure_rr),
+                pressure,
                 (_BRAKE.get(brake_front, _OWN_MAP), _BRAKE.get(brake_rear, _OWN_MAP)),
                 (current_fl, current_fr, current_rl, current_rr),
                 (able_fl, able_fr, able_rl, able_rr),

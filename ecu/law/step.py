@@ -178,6 +178,14 @@ def step(memory: Memory, inputs: Inputs, parameters: EcuParameters, dt_s: float)
     return _new(Memory, state), _new(Outputs, outputs)
 
 
+def asked_instead(
+    memory: Memory, outputs: Outputs, pressure_demand_pa: Four, motor_demand_nm: Four
+) -> tuple[Memory, Outputs]:
+    """State and outputs after a step whose demands another one has replaced: what comes is held against these."""
+    memory = memory._replace(asked_pa=pressure_demand_pa, asked_nm=motor_demand_nm)
+    return memory, outputs._replace(pressure_demand_pa=pressure_demand_pa, motor_demand_nm=motor_demand_nm)
+
+
 def _freeze_frame(memory: Memory, inputs: Inputs) -> trouble_codes.FreezeFrame:
     """The car as it is now, with mode, speed and demand of the tick before."""
     return trouble_codes.FreezeFrame(

@@ -233,3 +233,12 @@ def remember(memory: TroubleMemory, active: int, time_s: float, freeze_frame: Fr
         troubles.append(trouble)
     troubles += [Trouble(code, True, 1, time_s, time_s, freeze_frame) for code in codes_of(changed & active)]
     return TroubleMemory(active, tuple(troubles))
+
+
+def forget(memory: TroubleMemory, codes: tuple[TroubleCode, ...]) -> TroubleMemory:
+    """The memory without some codes; what is still active is found anew."""
+    numbers = {code.number for code in codes}
+    active = memory.active
+    for code in codes:
+        active &= ~BIT[code.name]
+    return TroubleMemory(active, tuple([t for t in memory.troubles if t.code.number not in numbers]))

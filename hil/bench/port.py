@@ -5,6 +5,7 @@ from types import TracebackType
 from typing import Self
 
 from dbc.contract import contract
+from dbc.diagnostic_ids import ANSWERS, FRAME_BYTES
 from dbc.frame import BusName, Frame, Node, Received
 from hil.bus.bus import Bus
 from hil.bus.channel import bench_channel
@@ -14,8 +15,12 @@ Owned = dict[tuple[BusName, int], int]
 
 
 def owned_by(senders: Iterable[str]) -> Owned:
-    """Lengths of the frames that DBC nodes may send, by bus and identifier."""
-    return {(bus, spec.can_id): spec.length for bus in BusName for spec in contract(bus).sent_by(*senders)}
+    """Lengths of the frames that DBC nodes may send, by bus and identifier; the controller answers testers, too."""
+    plays = tuple(senders)
+    owned = {(bus, spec.can_id): spec.length for bus in BusName for spec in contract(bus).sent_by(*plays)}
+    if "ECU" in plays:
+        owned |= {(BusName.VEHICLE, can_id): FRAME_BYTES for can_id in ANSWERS}
+    return owned
 
 
 def check_owned(frames: Sequence[Frame], owned: Owned) -> None:

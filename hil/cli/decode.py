@@ -33,6 +33,8 @@ from hil.log.source import ReadOptions
 from hil.log.summary.contents import Contents
 from hil.log.summary.values import Summary
 
+_NOT_WITH = ("out", "messages", "signals", "resample", "names", "bitrate", "dbc", "e2e_legacy")  # --uds
+
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
@@ -63,19 +65,25 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     )
     parser.add_argument("--limit-mb", metavar="N", type=float, help="read at most so much of each log (unpacked)")
     parser.add_argument("--e2e-legacy", action="store_true", help="check by the check value of older recordings")
+    _add_uds(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Summarise, write the signals, say what is missing."""
-    databases_, files = databases(args.dbc)
+    _check_uds(args)
     choice = _choice(args)
+    if args.uds:
+        from hil.cli.decode_uds import run_uds  # the names of our ECU take as long to load as a small log
+
+        return run_uds(args, choice, _limit_bytes(args))
+    databases_, files = databases(args.dbc)
     wanted = choice.wanted(databases_)
     rates = bit_rates(args.bitrate)
     contents = Contents(databases_, wanted, rates, args.e2e_legacy)
     _check_out(args)
-    limit = None if args.limit_mb is None else int(args.limit_mb * 1_000_000)
+    limit = _limit_bytes(args)
     warnings = (*databases_.warnings, *(w for one in databases_.all() for w in one.warnings))
     with (
         Logs(paths(args.log), ReadOptions(timezone=args.timezone), limit) as logs,
@@ -108,14 +116,45 @@ def run(args: argparse.Namespace) -> int:
     return _exit_code(logs, contents, summary)
 
 
+def _add_uds(parser: argparse.ArgumentParser) -> None:
+    """``--uds`` and its identifiers."""
+    parser.add_argument("--uds", action="store_true", help="print diagnostic requests and answers (UDS over ISO-TP)")
+    parser.add_argument(
+        "--uds-ids",
+        metavar="REQUEST:ANSWER,...",
+        action="append",
+        default=[],
+        help="identifiers of diagnostics, hexadecimal (714:77E, 18DA01F1:18DAF101, or one alone for requests to all); "
+        "otherwise they are found: the standard ones, ours, and pairs on which requests are answered",
+    )
+
+
+def _check_uds(args: argparse.Namespace) -> None:
+    """Refuse options that have no meaning with or without ``--uds``."""
+    if not args.uds:
+        if args.uds_ids:
+            raise BrakebenchError("--uds-ids says where diagnostics are; give --uds as well")
+        return
+    for name in _NOT_WITH:
+        if getattr(args, name):
+            option = f"--{name.replace('_', '-')}"
+            raise BrakebenchError(f"{option}: --uds prints messages of diagnostics, not signals; leave {option} out")
+
+
 def _choice(args: argparse.Namespace) -> Choice:
     begin, end = (None if text is None else Moment.parse(text, args.timezone) for text in (args.begin, args.end))
     return Choice(tuple(args.channel), begin, end, words_of(args.messages), words_of(args.signals))
 
 
-def _check_out(args: argparse.Namespace) -> None:
-    if args.limit_mb is not None and not 0 < args.limit_mb < 1e9:
+def _limit_bytes(args: argparse.Namespace) -> int | None:
+    if args.limit_mb is None:
+        return None
+    if not 0 < args.limit_mb < 1e9:
         raise BrakebenchError(f"--limit-mb {args.limit_mb:g}: expected a number of megabytes above 0")
+    return int(args.limit_mb * 1_000_000)
+
+
+def _check_out(args: argparse.Namespace) -> None:
     if args.out is not None:
         from hil.log.export.messages import check_target
 

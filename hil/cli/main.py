@@ -24,6 +24,7 @@ COMMANDS = (
     "restbus",
     "record",
     "inject",
+    "diag",
     "replay",
     "decode",
     "convert",

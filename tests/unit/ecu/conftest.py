@@ -68,6 +68,7 @@ class Car:
         self.wheel_speed = 65.0
         self.failed_wheels: set[int] = set()
         self.ehb_state = EhbState.DEMAND
+        self.pressure_fl_pa = 0.0
         self.blending: float | None = None
         self.charge_power_w: float | None = 200e3
         self.available_nm = 700.0
@@ -92,7 +93,7 @@ class Car:
             WheelSpeedFront(w, w),
             WheelSpeedRear(w, w),
             BodyMotion(-0.2, 0.0, 0.0),
-            EhbPressureFront(0.0, 0.0, self.ehb_state),
+            EhbPressureFront(self.pressure_fl_pa, 0.0, self.ehb_state),
             EhbPressureRear(0.0, 0.0, self.ehb_state),
             MotorStatusFront(i[0], self.available_nm, state[0], i[1], self.available_nm, state[1]),
             MotorStatusRear(i[2], self.available_nm, state[2], i[3], self.available_nm, state[3]),
