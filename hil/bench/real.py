@@ -4,34 +4,28 @@ import contextlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from dbc.contract import contract
 from dbc.frame import BusName, Frame, Received
 from hil.bench.bench_run import BenchError, BenchRun, BenchState, RecordingError, Say, silent
 from hil.bench.node_process import ECU, NODE_PERIOD_NS, PLANT, grants_in
-from hil.bench.port import owned_by
+from hil.bench.port import names_of, owned_by
 from hil.bench.stimulus import BENCH_PHASE_NS
 from hil.bus.bus import Bus
 from hil.bus.channel import bench_channel, claim_channel
+from hil.bus.listen import refuse_others
 from hil.bus.open import open_bus
-from hil.errors import BrakebenchError
+from hil.bus.transmit import check_transmit
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop, Tick
 from hil.rt.process import Child, StopSignal, interrupts_held, wait_for_end
 from hil.scenario.scenario import Scenario
 
 READY_TIMEOUT_NS = 120_000_000_000  # a first start compiles the plant
-LISTEN_NS = 300_000_000  # before the start, for other senders: three cycles of the slowest message
 _LOOK_NS = 50_000_000  # how often a stop is looked at meanwhile
-_MOST_NAMED = 6
 _TRACEBACK = "Traceback (most recent call last)"
 RECORDER = "recorder"
 OTHERS_TIMEOUT_NS = 120_000_000_000  # how long we wait for a node that somebody else starts
 SETTLE_NS = 500_000_000  # how long a bench keeps recording after a process died, so that the reaction is on record
 NODES = ("plant", "ecu")
-
-
-class OtherSenderError(BrakebenchError):
-    """Somebody sends what the run would send; said before anything is started."""
 
 
 class RealBench(BenchRun):
@@ -43,6 +37,7 @@ class RealBench(BenchRun):
     bus : vehicle bus, or ``auto``.
     realtime : as of the commands ``plant`` and ``ecu``.
     without : nodes that somebody else puts on the bus: ``plant``, ``ecu``.
+    transmit : whether a bus with hardware may be sent to; it is refused else.
 
     Attributes
     ----------
@@ -63,14 +58,17 @@ class RealBench(BenchRun):
         say: Say = silent,
         stop: StopSignal | None = None,
         without: Sequence[str] = (),
+        transmit: bool = False,
     ) -> None:
+        check_transmit(bus, transmit, "a run sends")
         with contextlib.ExitStack() as stack:
             claim = stack.enter_context(claim_channel(bus))
             super().__init__(scenario, out, seed, say, stop)
             self._stack = stack.pop_all()
         self.spec, self.note = claim.spec, claim.note
         self.state = BenchState.CLAIMED
-        self._node_options = ["--realtime"] if realtime else []
+        self._realtime = realtime
+        self._node_options = ["--transmit", *(["--realtime"] if realtime else [])]
         self._without = frozenset(without)
         self.punctuality = ""
         self._children: list[Child] = []
@@ -113,30 +111,17 @@ class RealBench(BenchRun):
     def _listen(self) -> None:
         """Refuse a bus on which somebody sends what is ours to send."""
         senders = [sender for role in (PLANT, ECU) if role.name not in self._without for sender in role.senders]
-        ours = owned_by([*senders, "BENCH"])
-        heard: set[tuple[BusName, int]] = set()
-        clock = WallClock()
-        end_ns = clock.now_ns() + LISTEN_NS
-        while clock.now_ns() < end_ns and not self._asked_to_stop:
-            clock.sleep_until(clock.now_ns() + _LOOK_NS)
-            for bus in self._buses.values():
-                heard.update(
-                    (item.bus, item.can_id)
-                    for item in bus.receive(0.0)
-                    if isinstance(item, Frame) and not item.extended and (item.bus, item.can_id) in ours
-                )
-        if heard:
-            specs = [contract(bus).by_id[can_id] for bus in BusName for on, can_id in sorted(heard) if on is bus]
-            listed = ", ".join(f"0x{spec.can_id:X} {spec.name}" for spec in specs[:_MOST_NAMED])
-            more = f" and {len(specs) - _MOST_NAMED} more" if len(specs) > _MOST_NAMED else ""
-            raise OtherSenderError(
-                f"bus {self.spec}: somebody already sends {listed}{more}, which this run would send; "
-                "stop that one, take another channel, or leave its place free with --without"
-            )
+        refuse_others(
+            [self._buses[BusName.VEHICLE], self._buses[BusName.BENCH]],
+            names_of(owned_by([*senders, "BENCH"])),
+            lambda: self._asked_to_stop,
+            "this run",
+            "leave its place free with --without",
+        )
 
     def _granted(self) -> str:
         """What the nodes run with, for people."""
-        if not self._node_options:
+        if not self._realtime:
             return "scheduled as any program: --realtime asks for more, `brakebench doctor` says what it would get"
         return f"real time: {grants_in(child.error_path.read_text() for child in self._children[1:])}"
 

@@ -86,6 +86,7 @@ def run_scenario(
     say: Callable[[str], None],
     virtual: bool = False,
     without: Sequence[str] = (),
+    transmit: bool = False,
 ) -> Outcome:
     """Run one scenario in real or in virtual time and measure it.
 
@@ -106,7 +107,7 @@ def run_scenario(
             line = open_line(bus, bit_rate, seed) if is_timed(bus) else None
             bench_run = VirtualBench(scenario, folder, seed, say, stop, line=line)
         else:
-            bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without)
+            bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without, transmit)
         with bench_run:
             say(f"bus {bench_run.spec}" + (f" ({bench_run.note})" if bench_run.note else ""))
             bench_run.run()

@@ -10,6 +10,17 @@ if TYPE_CHECKING:
     import can
 
 DEFAULT_BITRATE = 500_000
+LISTEN_ONLY: dict[str, tuple[str, Any]] = {
+    "cantact": ("monitor", True),
+    "kvaser": ("driver_mode", False),
+    "nixnet": ("listen_only", True),
+    "pcan": ("state", "PASSIVE"),
+    "seeedstudio": ("operation_mode", "silent"),
+    "slcan": ("listen_only", True),
+    "systec": ("state", "PASSIVE"),
+    "vector": ("listen_only", True),
+}
+"""By interface: the option, and its value, that keeps the controller from acknowledging and sending."""
 _GONE = {errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.EIO, errno.EBADF, errno.EPIPE, errno.ENETUNREACH}
 
 
@@ -68,15 +79,10 @@ def _options(spec: BusSpec) -> dict[str, Any]:
     listen_only = options.pop("listen_only", False)
     options.setdefault("bitrate", DEFAULT_BITRATE)
     if listen_only:
-        modes: dict[str, dict[str, Any]] = {
-            "kvaser": {"driver_mode": False},
-            "pcan": {"state": can.BusState.PASSIVE},
-            "slcan": {"listen_only": True},
-            "vector": {"listen_only": True},
-        }
-        if spec.kind not in modes:
-            raise BusError(f"bus {spec.name}: listen_only is known of {', '.join(modes)}, not of {spec.kind}")
-        options |= modes[spec.kind]
+        if spec.kind not in LISTEN_ONLY:
+            raise BusError(f"bus {spec.name}: listen_only is known of {', '.join(LISTEN_ONLY)}, not of {spec.kind}")
+        name, value = LISTEN_ONLY[spec.kind]
+        options[name] = can.BusState[value] if name == "state" else value
     return options
 
 
