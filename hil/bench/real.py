@@ -8,9 +8,10 @@ from dbc.frame import BusName, Frame, Received
 from hil.bench.bench_run import BenchError, BenchRun, BenchState, RecordingError, Say, silent
 from hil.bench.node_process import ECU, NODE_PERIOD_NS, PLANT, grants_in
 from hil.bench.port import names_of, owned_by
+from hil.bench.share import ALONE
 from hil.bench.stimulus import BENCH_PHASE_NS
-from hil.bus.bus import Bus
-from hil.bus.channel import bench_channel, claim_channel
+from hil.bus.bus import Bus, BusError, parse_spec
+from hil.bus.channel import bench_channel, claim_channel, shared_channel
 from hil.bus.listen import refuse_others
 from hil.bus.open import open_bus
 from hil.bus.transmit import check_transmit
@@ -66,6 +67,8 @@ class RealBench(BenchRun):
             super().__init__(scenario, out, seed, say, stop)
             self._stack = stack.pop_all()
         self.spec, self.note = claim.spec, claim.note
+        self._joined = self.spec  # what recorder and nodes join
+        self._sharer: list[Child] = []  # none, or the one that has the adapter
         self.state = BenchState.CLAIMED
         self._realtime = realtime
         self._node_options = ["--transmit", *(["--realtime"] if realtime else [])]
@@ -81,14 +84,23 @@ class RealBench(BenchRun):
 
     @property
     def processes(self) -> tuple[Child, ...]:
-        """The processes started so far: recorder, plant, ECU."""
-        return tuple(self._children)
+        """The processes started so far: recorder, plant, ECU, and who has the adapter."""
+        return (*self._children, *self._sharer)
 
     def _begin(self) -> None:
-        self._join(BusName.BENCH, bench_channel(self.spec))
-        self._join(BusName.VEHICLE, self.spec)
-        self._listen()
-        self._spawn(RECORDER, ["record", str(self.log)])
+        try:
+            if parse_spec(self.spec).kind not in ALONE and not self._share():
+                return
+            self._join(BusName.BENCH, bench_channel(self.spec))
+            self._join(BusName.VEHICLE, self._joined)
+            self._listen()
+        except BusError:  # wrong use: nothing was begun, nothing is left
+            for child in self._sharer:
+                child.stop()
+                child.error_path.unlink(missing_ok=True)
+            self._sharer.clear()
+            raise
+        self._spawn(RECORDER, ["record", str(self.log)], self._children, self._joined)
         if not self._await_ready(self._children):
             return
         self._children[0].release()
@@ -99,7 +111,8 @@ class RealBench(BenchRun):
             if name in self._without:
                 self._say(f"waiting for somebody's {name} on {self.spec}")
                 continue
-            self._spawn(name, [name, self.scenario.source, "--seed", str(self._seed), *self._node_options])
+            words = [name, self.scenario.source, "--seed", str(self._seed), *self._node_options]
+            self._spawn(name, words, self._children, self._joined)
             self._waiting.append((round(order[name] * 1e9), self._children[-1]))
         if not self._await_ready(self._children[1:]):
             return
@@ -107,6 +120,21 @@ class RealBench(BenchRun):
         self._say(self.punctuality)
         self._release(0)
         self._ticks = Loop(WallClock(), NODE_PERIOD_NS, BENCH_PHASE_NS).ticks()
+
+    def _share(self) -> bool:
+        """Have a process of its own open the adapter; False where somebody asks to stop before."""
+        self._spawn("adapter", ["share", *self._node_options], self._sharer, self.spec)
+        child = self._sharer[0]
+        deadline_ns = WallClock().now_ns() + READY_TIMEOUT_NS
+        while not child.wait_ready(_LOOK_NS * 1e-9):
+            if self._asked_to_stop:
+                return False
+            if child.ended or WallClock().now_ns() > deadline_ns:
+                raise BusError(child.last_words() or child.why())
+        child.release()
+        self._joined = shared_channel(self.spec)
+        self._say(f"one process has the adapter; it is shared on {self._joined}")
+        return True
 
     def _listen(self) -> None:
         """Refuse a bus on which somebody sends what is ours to send."""
@@ -128,11 +156,11 @@ class RealBench(BenchRun):
     def _join(self, name: BusName, spec: str) -> None:
         self._buses[name] = self._stack.enter_context(open_bus(spec, name))
 
-    def _spawn(self, name: str, arguments: list[str]) -> None:
+    def _spawn(self, name: str, arguments: list[str], into: list[Child], spec: str) -> None:
         words = self.out / f"{name}.txt"
         try:
             with interrupts_held():  # else a process could be started that nobody ends
-                self._children.append(Child(name, [*arguments, "--bus", self.spec], words))
+                into.append(Child(name, [*arguments, "--bus", spec], words))
         except OSError as error:
             raise BenchError(f"{name} cannot be started: {error}") from error
 
@@ -165,7 +193,7 @@ class RealBench(BenchRun):
 
     def _pass_period(self) -> int:
         now_ns = self._direct()
-        dead = [child for child in self._children if child.ended]
+        dead = [child for child in self.processes if child.ended]
         if dead:
             while self._direct() < now_ns + SETTLE_NS:
                 pass
@@ -193,13 +221,13 @@ class RealBench(BenchRun):
         waiting, self._waiting = self._waiting, []
         for _, child in waiting:  # who waits for its release does not hear us
             child.release()
-        for group in (nodes, recorder):
+        for group in (nodes, recorder, self._sharer):
             for child in group:
                 child.ask_to_stop()
             wait_for_end(group)
             for child in group:
                 child.stop()
-        for child in self._children:
+        for child in self.processes:
             if child.failed:
                 self._break(self._fallen(child))
         self._stack.close()

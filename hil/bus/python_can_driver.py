@@ -5,6 +5,7 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from hil.bus.bus import OWN_KINDS, BusError, BusSpec
+from hil.bus.open_errors import reason
 
 if TYPE_CHECKING:
     import can
@@ -61,15 +62,16 @@ def open_driver(spec: BusSpec) -> tuple["can.BusABC", "can.Message | None"]:
     if spec.kind not in can.VALID_INTERFACES:
         kinds = ", ".join(sorted(set(OWN_KINDS) | can.VALID_INTERFACES))
         raise BusError(f"bus {spec.name}: there is no kind {spec.kind!r}, only {kinds}")
+    options = _options(spec)
     try:
-        driver = can.Bus(channel=channel, interface=spec.kind, ignore_config=True, **_options(spec))
+        driver = can.Bus(channel=channel, interface=spec.kind, ignore_config=True, **options)
     except Exception as error:  # drivers raise ImportError, OSError, NameError, ...
-        raise BusError(f"bus {spec.name}: {_reason(spec, error)}") from error
+        raise BusError(f"bus {spec.name}: {reason(spec, error)}") from error
     try:
         return driver, driver.recv(0.0)
     except Exception as error:
         shut(driver)
-        raise BusError(f"bus {spec.name}: {_reason(spec, error)}") from error
+        raise BusError(f"bus {spec.name}: {reason(spec, error)}") from error
 
 
 def _options(spec: BusSpec) -> dict[str, Any]:
@@ -84,8 +86,3 @@ def _options(spec: BusSpec) -> dict[str, Any]:
         name, value = LISTEN_ONLY[spec.kind]
         options[name] = can.BusState[value] if name == "state" else value
     return options
-
-
-def _reason(spec: BusSpec, error: Exception) -> str:
-    text = str(error) or type(error).__name__
-    return f"{text} (is the driver of {spec.kind} installed, the adapter attached?)"

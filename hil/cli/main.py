@@ -22,6 +22,7 @@ COMMANDS = (
     "plant",
     "gateway",
     "restbus",
+    "share",
     "record",
     "inject",
     "diag",
