@@ -27,6 +27,7 @@ COMMANDS = (
     "inject",
     "diag",
     "replay",
+    "latency",
     "decode",
     "convert",
     "diff",
