@@ -18,6 +18,7 @@ from hil.bus.transmit import check_transmit
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop, Tick
 from hil.rt.process import Child, StopSignal, interrupts_held, wait_for_end
+from hil.rt.realtime import may_be_realtime
 from hil.scenario.scenario import Scenario
 
 READY_TIMEOUT_NS = 120_000_000_000  # a first start compiles the plant
@@ -150,6 +151,8 @@ class RealBench(BenchRun):
     def _granted(self) -> str:
         """What the nodes run with, for people."""
         if not self._realtime:
+            if may_be_realtime():
+                return "scheduled as any program: --realtime is recommended, this process may have SCHED_FIFO"
             return "scheduled as any program: --realtime asks for more, `brakebench doctor` says what it would get"
         return f"real time: {grants_in(child.error_path.read_text() for child in self._children[1:])}"
 
