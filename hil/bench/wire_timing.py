@@ -74,7 +74,8 @@ class Response(NamedTuple):
     Attributes
     ----------
     stimulus, response : messages, or signals.
-    age : time from the newest frame of the stimulus to each frame of the response: what the answer can be based on.
+    age : time from the newest frame of the stimulus to each frame of the response, up to the last stimulus: what the
+        answer can be based on.
     reaction : time from the frame with which a signal that stood for half a second begins to move (by 2 % of its
         range, by 20 % within 0.2 s) to the frame with which the other one has moved by 2 % of its own; None where no
         signals were named.
@@ -157,6 +158,7 @@ def response_of(frames: FrameTable, databases: Databases, stimulus: str, respons
     named = {name for name in (stimulus, response) if "." in name}
     log = databases.decoder(named or {stimulus, response}).add(frames)
     came, answered = (_times(frames, log, name.partition(".")[0]) for name in (stimulus, response))
+    answered = answered[answered <= came[-1]]  # behind the last stimulus nothing is an answer any more
     before = np.searchsorted(came, answered, side="right") - 1
     age: Floats = np.asarray((answered - came[np.maximum(before, 0)])[before >= 0] * 1e-6, np.float64)
     if not named:
