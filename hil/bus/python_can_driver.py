@@ -4,6 +4,7 @@ import errno
 import logging
 from typing import TYPE_CHECKING, Any
 
+from hil.bus.buffered_port import BufferedPort
 from hil.bus.bus import OWN_KINDS, BusError, BusSpec
 from hil.bus.open_errors import reason
 
@@ -43,6 +44,12 @@ def descriptor(driver: "can.BusABC") -> int:
         return -1
 
 
+def has_buffered(driver: "can.BusABC") -> bool:
+    """Whether something that was read of the driver's descriptor is still to be taken."""
+    port = getattr(driver, "serialPortOrig", None)
+    return isinstance(port, BufferedPort) and port.buffered > 0
+
+
 def shut(driver: "can.BusABC") -> None:
     """Close a driver, whatever state its device is in."""
     try:
@@ -67,6 +74,8 @@ def open_driver(spec: BusSpec) -> tuple["can.BusABC", "can.Message | None"]:
         driver = can.Bus(channel=channel, interface=spec.kind, ignore_config=True, **options)
     except Exception as error:  # drivers raise ImportError, OSError, NameError, ...
         raise BusError(f"bus {spec.name}: {reason(spec, error)}") from error
+    if spec.kind == "slcan":
+        driver.serialPortOrig = BufferedPort(driver.serialPortOrig)  # type: ignore[attr-defined]
     try:
         return driver, driver.recv(0.0)
     except Exception as error:
