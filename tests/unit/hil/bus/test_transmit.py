@@ -10,6 +10,7 @@ from can.interfaces.seeedstudio import SeeedBus
 from can.interfaces.slcan import slcanBus
 
 from dbc.frame import BusName, Frame
+from hil.bus.adapters import buses
 from hil.bus.bus import BusError
 from hil.bus.listen import OtherSenderError, refuse_others
 from hil.bus.open import open_bus
@@ -75,3 +76,14 @@ def test_who_already_sends_is_named(channel):
             refuse_others([bus], ours, lambda: False, "this test", "use --force")
         other.send([Frame(VEHICLE, 0x124, b"", 0, True)])
         refuse_others([bus], ours, lambda: False, "this test", "use --force")
+
+
+def test_adapters_found_are_named_as_buses():
+    found = [
+        ("serial", "/dev/ttyS0"),
+        ("serial", "/dev/ttyACM0"),
+        ("kvaser", "0"),
+        ("virtual", "a"),
+        ("socketcan", "can0"),
+    ]
+    assert buses(found) == ["slcan:/dev/ttyACM0", "kvaser:0"]
