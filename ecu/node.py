@@ -5,6 +5,7 @@ from typing import Any
 
 from dbc.batch import Batch
 from dbc.bench_messages import EcuReception, StimulusEcu
+from dbc.contract import spec_of
 from dbc.diagnostic_ids import REQUESTS
 from dbc.exchange import Receiver
 from dbc.frame import BusName, Frame, LinkState, Received
@@ -37,7 +38,7 @@ from ecu.diagnostics.exchange import Orders, View, instead
 from ecu.diagnostics.server import DiagnosticServer
 from ecu.law.step import asked_instead, initial_memory, step
 from ecu.law.trouble_codes import Trouble, forget
-from ecu.law.types import OTHERS_WELL, WELL, ZERO, Brake, Four, Health, Inputs, Outputs
+from ecu.law.types import OTHERS_WELL, UNKNOWN, WELL, ZERO, Brake, Four, Health, Inputs, Outputs
 from ecu.parameters.ecu import EcuParameters
 
 SOURCES: tuple[type[tuple[Any, ...]], ...] = (  # in the order of law.types.Source
@@ -56,6 +57,7 @@ SENT: tuple[type[tuple[Any, ...]], ...] = (
     EhbDemandFront, EhbDemandRear, MotorDemandFront, MotorDemandRear, BrakeStatus, BrakeEstimateFront,
     BrakeEstimateRear, BrakeTroubleCode,
 )  # fmt: skip
+_DEMANDS = frozenset(spec_of(kind).can_id for kind in SENT[:4])
 _NOTHING_ODD = (0, 0, 0)
 _OTHERS = len(SOURCES) - 1  # all but the battery, the last
 _new = tuple.__new__  # without the Python-made one of a NamedTuple
@@ -105,7 +107,7 @@ class EcuNode:
         self._receptions = [self._receiver.receptions[t] for t in SOURCES]
         self._batch = Batch((*SENT, EcuReception))
         self._last_ns: int | None = None
-        self._link_down = False
+        self._link_down = self._silenced = False
         self._next_code = 0
 
     @property
@@ -133,6 +135,16 @@ class EcuNode:
             return self._diagnose(now_ns, inputs, self.outputs)
         return self._tell(now_ns, self.outputs)
 
+    def farewell(self, now_ns: int) -> list[Frame]:
+        """Return the demands of the safe state, to be sent last: no motor torque, the brake by its own pedal map.
+
+        Nothing on the vehicle bus where a tester has silenced the node, or where it has sent nothing yet.
+        """
+        if self.outputs is None or self._silenced:
+            return []
+        outputs = self.outputs._replace(pressure_demand_pa=UNKNOWN, motor_demand_nm=ZERO)
+        return [frame for frame in self._tell(now_ns, outputs) if frame.can_id in _DEMANDS]
+
     def _diagnose(self, now_ns: int, inputs: Inputs, outputs: Outputs) -> list[Frame]:
         """End a tick in which diagnostics take part: frames to send, theirs last."""
         m = self.memory
@@ -143,6 +155,7 @@ class EcuNode:
             motor = instead(outputs.motor_demand_nm, orders.motor_nm)
             self.memory, self.outputs = asked_instead(m, outputs, pressure, motor)
         frames = self._tell(now_ns, self.outputs or outputs)
+        self._silenced = orders.silent
         if orders.silent:
             frames = [frame for frame in frames if frame.bus is not BusName.VEHICLE]
         self._obey(orders)

@@ -125,6 +125,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "ask for real-time scheduling; the summary says what was granted",
     )
     group.addoption(
+        "--brakebench-transmit",
+        action="store_true",
+        help="send on a bus with hardware, where it reaches a real ECU or a real brake; refused there without",
+    )
+    group.addoption(
         "--brakebench-no-ecu",
         action="store_true",
         help="start no ECU: a real one, or somebody else's, is on the bus",
@@ -174,7 +179,11 @@ def bench(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     bus, no_ecu = options.brakebench_bus, options.brakebench_no_ecu
     real = bool(bus or options.brakebench_realtime or no_ecu)
     others = ("ecu",) if no_ecu else ()
-    make = real_run(bus or "auto", others, options.brakebench_realtime) if real else virtual_run
+    make = (
+        real_run(bus or "auto", others, options.brakebench_realtime, options.brakebench_transmit)
+        if real
+        else virtual_run
+    )
     session = Session(make, _folder(request, tmp_path_factory), f"Test {request.node.nodeid}", options.brakebench_limit)
     request.node.stash[_SESSION] = session
     running = request.config.stash[_OPEN]

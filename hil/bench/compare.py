@@ -18,6 +18,7 @@ from hil.bench.bench_run import RECORDING, prepare_folder
 from hil.bench.result import Floats, Signals
 from hil.bench.run import Outcome, judge, new_folder, run_scenario, write_files
 from hil.bench.watch import Finding
+from hil.bus.transmit import check_transmit
 from hil.errors import Verdict
 from hil.report.figure import write_figure
 from hil.report.html import write_html
@@ -89,9 +90,18 @@ class Comparison:
 
 
 def compare_scenario(
-    name: str, bus: str, *, out: str | None, seed: int, realtime: bool, command_line: str, say: Callable[[str], None]
+    name: str,
+    bus: str,
+    *,
+    out: str | None,
+    seed: int,
+    realtime: bool,
+    command_line: str,
+    say: Callable[[str], None],
+    transmit: bool = False,
 ) -> Comparison:
     """Run a scenario twice, in virtual and in real time, and report the difference."""
+    check_transmit(bus, transmit, "a run sends")
     scenario = load_scenario(name)
     folder = Path(out) if out else new_folder(f"{scenario.name}-compare")
     prepare_folder(folder)
@@ -99,7 +109,7 @@ def compare_scenario(
     virtual = one("auto", out=str(folder / "virtual"), realtime=False, virtual=True)
     if _ended_early(virtual):
         return _without_difference(virtual)
-    real = one(bus, out=str(folder / "real"), realtime=realtime)
+    real = one(bus, out=str(folder / "real"), realtime=realtime, transmit=transmit)
     if _ended_early(real):
         return _without_difference(real)
     logs = {"virtual": folder / "virtual" / RECORDING, "real": folder / "real" / RECORDING}

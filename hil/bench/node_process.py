@@ -4,12 +4,13 @@ import contextlib
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 from dbc.bench_messages import EcuTiming, PlantTiming
 from dbc.contract import contract
 from dbc.exchange import Transmitter
-from dbc.frame import BusName, Node
-from hil.bench.port import OwnedNode, Port
+from dbc.frame import BusName, Frame, Node
+from hil.bench.port import Owned, OwnedNode, Port, owned_by
 from hil.bus.channel import resolve
 from hil.faults.line import FaultyNode
 from hil.rt.clock import WallClock
@@ -19,6 +20,15 @@ from hil.rt.realtime import request_realtime, request_timer_slack
 
 NODE_PERIOD_NS = 10_000_000
 GRANTED, NOT_GRANTED = "granted", "NOT granted"
+
+
+@runtime_checkable
+class Leaving(Protocol):
+    """A node that has something to say before it goes."""
+
+    def farewell(self, now_ns: int) -> list[Frame]:
+        """Return the frames of the safe state, as the last ones of the node."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +62,9 @@ def serve(
     realtime: bool = False,
     say: Callable[[str], None] = lambda _: None,
     senders: Iterable[str] | None = None,
+    sends: Owned | None = None,
+    transmit: bool = False,
+    force: bool = False,
 ) -> None:
     """Run a node on a bus until SIGTERM or Ctrl-C.
 
@@ -63,6 +76,16 @@ def serve(
     realtime : ask for what makes ticks punctual (`hil.rt.realtime`), and say what was granted.
     say : takes messages for people.
     senders : DBC nodes to play, all of the role's by default; ticks are reported where their sender is one of them.
+    sends : what it sends, where that is less than all of ``senders``.
+    transmit : send on a bus with hardware; else that is only listened to.
+    force : send although somebody already sends the same messages.
+
+    A node that somebody starts by hand listens before it sends. One with a method ``farewell`` has the last word, a
+    period after its last tick, however it ends; only a kill leaves the other side to its own time-outs.
+
+    Raises
+    ------
+    hil.bus.bus.BusError : the bus cannot be opened, or somebody already plays the role.
     """
     if ready_fd is not None:
         end_with_parent()
@@ -71,8 +94,15 @@ def serve(
     plays = tuple(role.senders if senders is None else senders)
     with contextlib.ExitStack() as stack:
         with stop.at_once():
-            node = FaultyNode(OwnedNode(make_node(), plays), plays, real=True)
-            port = stack.enter_context(Port.open(bus))
+            made = make_node()
+            node = FaultyNode(OwnedNode(made, plays), plays, real=True)
+            port = stack.enter_context(Port.open(bus, transmit))
+            silent = port.listening
+            if silent is not None:
+                say(f"{role.name}: {silent.words}")
+            elif ready_fd is None and not force:  # a bench has listened for all whom it starts
+                owned = owned_by(plays) if sends is None else sends
+                port.refuse_others(owned, lambda: stop.asked, f"this {role.name}", "send nevertheless with --force")
             say(f"{role.name}: on {bus}, every {NODE_PERIOD_NS / 1e6:g} ms")
             for grant in request_realtime() if realtime else [request_timer_slack()]:
                 if realtime or not grant.granted:
@@ -81,12 +111,22 @@ def serve(
         health = Transmitter()
         reports = any(spec.type is role.timing for spec in contract(BusName.BENCH).sent_by(*plays))
         loop = Loop(WallClock(), NODE_PERIOD_NS, role.phase_ns)
-        for tick in run_node(node, port, loop):
-            if reports:
-                timing = role.timing(tick.number & 0xFFFFFF, tick.lateness_ns * 1e-9, loop.overruns)
-                port.send(health.frames(tick.now_ns, [timing]))
-            if stop.asked:
-                return
+        now_ns = 0
+        try:
+            for tick in run_node(node, port, loop):
+                now_ns = tick.now_ns
+                if reports:
+                    timing = role.timing(tick.number & 0xFFFFFF, tick.lateness_ns * 1e-9, loop.overruns)
+                    port.send(health.frames(now_ns, [timing]))
+                if stop.asked:
+                    break
+        finally:
+            if isinstance(made, Leaving):
+                clock = WallClock()
+                clock.sleep_until(clock.now_ns() + NODE_PERIOD_NS)  # not sooner than its cycle allows
+                port.send(made.farewell(now_ns + NODE_PERIOD_NS))
+        if silent is not None:
+            say(f"{role.name}: nothing was sent on {bus}; {silent.withheld} frames would have been")
 
 
 def grants_in(words: Iterable[str]) -> str:

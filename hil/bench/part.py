@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from dbc.contract import contract
 from dbc.frame import BusName, Frame, Node, Received
+from hil.bench.port import Owned, owned_by
 from hil.errors import BrakebenchError
 from plant.external_nodes import FRAMES_OF
 from plant.node import SENDERS
@@ -64,6 +65,11 @@ class Part:
     def whole(self) -> bool:
         """Whether all of the car is played."""
         return self.nodes == SENDERS and not self.left
+
+    def owned(self) -> Owned:
+        """Lengths of the frames that this part sends, by bus and identifier."""
+        left = {(BusName.VEHICLE, can_id) for can_id in self._left_ids}
+        return {key: length for key, length in owned_by(self.senders).items() if key not in left}
 
     def sent(self, frames: Sequence[Frame]) -> list[Frame]:
         """The frames that are this part's to send."""

@@ -1,6 +1,6 @@
 """Between a node and its buses."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from types import TracebackType
 from typing import Self
 
@@ -9,7 +9,9 @@ from dbc.diagnostic_ids import ANSWERS, FRAME_BYTES
 from dbc.frame import BusName, Frame, Node, Received
 from hil.bus.bus import Bus
 from hil.bus.channel import bench_channel
+from hil.bus.listen import Key, refuse_others
 from hil.bus.open import open_bus
+from hil.bus.transmit import ListeningBus, open_for_role
 
 Owned = dict[tuple[BusName, int], int]
 
@@ -31,6 +33,16 @@ def check_owned(frames: Sequence[Frame], owned: Owned) -> None:
                 f"{frame.bus} bus: frame 0x{frame.can_id:X} with {len(frame.data)} bytes is not this role's to send; "
                 "its identifiers and lengths are those of its senders in the DBC"
             )
+
+
+def names_of(owned: Owned) -> dict[Key, str]:
+    """Identifiers with message and sender for people, as `hil.bus.listen.refuse_others` takes them."""
+    return {(bus, can_id, False): f"0x{can_id:X} {_name(bus, can_id)}" for bus, can_id in owned}
+
+
+def _name(bus: BusName, can_id: int) -> str:
+    spec = contract(bus).by_id.get(can_id)
+    return "of a controller's diagnostics" if spec is None else f"{spec.name} of {spec.sender}"
 
 
 class OwnedNode:
@@ -55,19 +67,29 @@ class Port:
     vehicle, bench : the two buses, open; the port closes them.
     """
 
-    def __init__(self, vehicle: Bus, bench: Bus) -> None:
-        self._buses = {BusName.VEHICLE: vehicle, BusName.BENCH: bench}
+    def __init__(self, vehicle: "Bus | ListeningBus", bench: Bus) -> None:
+        self._buses: dict[BusName, Bus | ListeningBus] = {BusName.VEHICLE: vehicle, BusName.BENCH: bench}
 
     @classmethod
-    def open(cls, vehicle_spec: str) -> Self:
-        """Join a vehicle bus and the bench bus that belongs to it."""
-        vehicle = open_bus(vehicle_spec, BusName.VEHICLE)
+    def open(cls, vehicle_spec: str, transmit: bool = False) -> Self:
+        """Join a vehicle bus and the bench bus that belongs to it; hardware is sent to with ``transmit`` only."""
+        vehicle = open_for_role(vehicle_spec, BusName.VEHICLE, transmit)
         try:
             bench = open_bus(bench_channel(vehicle_spec), BusName.BENCH)
         except BaseException:
             vehicle.close()
             raise
         return cls(vehicle, bench)
+
+    @property
+    def listening(self) -> ListeningBus | None:
+        """The vehicle bus where nothing is sent to it."""
+        vehicle = self._buses[BusName.VEHICLE]
+        return vehicle if isinstance(vehicle, ListeningBus) else None
+
+    def refuse_others(self, owned: Owned, stopped: Callable[[], bool], who: str, instead: str) -> None:
+        """Listen before the first frame, as `hil.bus.listen.refuse_others`, for who sends what is ours."""
+        refuse_others(tuple(self._buses.values()), names_of(owned), stopped, who, instead)
 
     def receive(self) -> list[Received]:
         """Everything that arrived since the last call: the vehicle bus first, each bus in its order."""

@@ -4,34 +4,30 @@ import contextlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from dbc.contract import contract
 from dbc.frame import BusName, Frame, Received
 from hil.bench.bench_run import BenchError, BenchRun, BenchState, RecordingError, Say, silent
 from hil.bench.node_process import ECU, NODE_PERIOD_NS, PLANT, grants_in
-from hil.bench.port import owned_by
+from hil.bench.port import names_of, owned_by
+from hil.bench.share import ALONE
 from hil.bench.stimulus import BENCH_PHASE_NS
-from hil.bus.bus import Bus
-from hil.bus.channel import bench_channel, claim_channel
+from hil.bus.bus import Bus, BusError, parse_spec
+from hil.bus.channel import bench_channel, claim_channel, shared_channel
+from hil.bus.listen import refuse_others
 from hil.bus.open import open_bus
-from hil.errors import BrakebenchError
+from hil.bus.transmit import check_transmit
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop, Tick
 from hil.rt.process import Child, StopSignal, interrupts_held, wait_for_end
+from hil.rt.realtime import may_be_realtime
 from hil.scenario.scenario import Scenario
 
 READY_TIMEOUT_NS = 120_000_000_000  # a first start compiles the plant
-LISTEN_NS = 300_000_000  # before the start, for other senders: three cycles of the slowest message
 _LOOK_NS = 50_000_000  # how often a stop is looked at meanwhile
-_MOST_NAMED = 6
 _TRACEBACK = "Traceback (most recent call last)"
 RECORDER = "recorder"
 OTHERS_TIMEOUT_NS = 120_000_000_000  # how long we wait for a node that somebody else starts
 SETTLE_NS = 500_000_000  # how long a bench keeps recording after a process died, so that the reaction is on record
 NODES = ("plant", "ecu")
-
-
-class OtherSenderError(BrakebenchError):
-    """Somebody sends what the run would send; said before anything is started."""
 
 
 class RealBench(BenchRun):
@@ -43,6 +39,7 @@ class RealBench(BenchRun):
     bus : vehicle bus, or ``auto``.
     realtime : as of the commands ``plant`` and ``ecu``.
     without : nodes that somebody else puts on the bus: ``plant``, ``ecu``.
+    transmit : whether a bus with hardware may be sent to; it is refused else.
 
     Attributes
     ----------
@@ -63,14 +60,19 @@ class RealBench(BenchRun):
         say: Say = silent,
         stop: StopSignal | None = None,
         without: Sequence[str] = (),
+        transmit: bool = False,
     ) -> None:
+        check_transmit(bus, transmit, "a run sends")
         with contextlib.ExitStack() as stack:
             claim = stack.enter_context(claim_channel(bus))
             super().__init__(scenario, out, seed, say, stop)
             self._stack = stack.pop_all()
         self.spec, self.note = claim.spec, claim.note
+        self._joined = self.spec  # what recorder and nodes join
+        self._sharer: list[Child] = []  # none, or the one that has the adapter
         self.state = BenchState.CLAIMED
-        self._node_options = ["--realtime"] if realtime else []
+        self._realtime = realtime
+        self._node_options = ["--transmit", *(["--realtime"] if realtime else [])]
         self._without = frozenset(without)
         self.punctuality = ""
         self._children: list[Child] = []
@@ -83,14 +85,23 @@ class RealBench(BenchRun):
 
     @property
     def processes(self) -> tuple[Child, ...]:
-        """The processes started so far: recorder, plant, ECU."""
-        return tuple(self._children)
+        """The processes started so far: recorder, plant, ECU, and who has the adapter."""
+        return (*self._children, *self._sharer)
 
     def _begin(self) -> None:
-        self._join(BusName.BENCH, bench_channel(self.spec))
-        self._join(BusName.VEHICLE, self.spec)
-        self._listen()
-        self._spawn(RECORDER, ["record", str(self.log)])
+        try:
+            if parse_spec(self.spec).kind not in ALONE and not self._share():
+                return
+            self._join(BusName.BENCH, bench_channel(self.spec))
+            self._join(BusName.VEHICLE, self._joined)
+            self._listen()
+        except BusError:  # wrong use: nothing was begun, nothing is left
+            for child in self._sharer:
+                child.stop()
+                child.error_path.unlink(missing_ok=True)
+            self._sharer.clear()
+            raise
+        self._spawn(RECORDER, ["record", str(self.log)], self._children, self._joined)
         if not self._await_ready(self._children):
             return
         self._children[0].release()
@@ -101,7 +112,8 @@ class RealBench(BenchRun):
             if name in self._without:
                 self._say(f"waiting for somebody's {name} on {self.spec}")
                 continue
-            self._spawn(name, [name, self.scenario.source, "--seed", str(self._seed), *self._node_options])
+            words = [name, self.scenario.source, "--seed", str(self._seed), *self._node_options]
+            self._spawn(name, words, self._children, self._joined)
             self._waiting.append((round(order[name] * 1e9), self._children[-1]))
         if not self._await_ready(self._children[1:]):
             return
@@ -110,44 +122,48 @@ class RealBench(BenchRun):
         self._release(0)
         self._ticks = Loop(WallClock(), NODE_PERIOD_NS, BENCH_PHASE_NS).ticks()
 
+    def _share(self) -> bool:
+        """Have a process of its own open the adapter; False where somebody asks to stop before."""
+        self._spawn("adapter", ["share", *self._node_options], self._sharer, self.spec)
+        child = self._sharer[0]
+        deadline_ns = WallClock().now_ns() + READY_TIMEOUT_NS
+        while not child.wait_ready(_LOOK_NS * 1e-9):
+            if self._asked_to_stop:
+                return False
+            if child.ended or WallClock().now_ns() > deadline_ns:
+                raise BusError(child.last_words() or child.why())
+        child.release()
+        self._joined = shared_channel(self.spec)
+        self._say(f"one process has the adapter; it is shared on {self._joined}")
+        return True
+
     def _listen(self) -> None:
         """Refuse a bus on which somebody sends what is ours to send."""
         senders = [sender for role in (PLANT, ECU) if role.name not in self._without for sender in role.senders]
-        ours = owned_by([*senders, "BENCH"])
-        heard: set[tuple[BusName, int]] = set()
-        clock = WallClock()
-        end_ns = clock.now_ns() + LISTEN_NS
-        while clock.now_ns() < end_ns and not self._asked_to_stop:
-            clock.sleep_until(clock.now_ns() + _LOOK_NS)
-            for bus in self._buses.values():
-                heard.update(
-                    (item.bus, item.can_id)
-                    for item in bus.receive(0.0)
-                    if isinstance(item, Frame) and not item.extended and (item.bus, item.can_id) in ours
-                )
-        if heard:
-            specs = [contract(bus).by_id[can_id] for bus in BusName for on, can_id in sorted(heard) if on is bus]
-            listed = ", ".join(f"0x{spec.can_id:X} {spec.name}" for spec in specs[:_MOST_NAMED])
-            more = f" and {len(specs) - _MOST_NAMED} more" if len(specs) > _MOST_NAMED else ""
-            raise OtherSenderError(
-                f"bus {self.spec}: somebody already sends {listed}{more}, which this run would send; "
-                "stop that one, take another channel, or leave its place free with --without"
-            )
+        refuse_others(
+            [self._buses[BusName.VEHICLE], self._buses[BusName.BENCH]],
+            names_of(owned_by([*senders, "BENCH"])),
+            lambda: self._asked_to_stop,
+            "this run",
+            "leave its place free with --without",
+        )
 
     def _granted(self) -> str:
         """What the nodes run with, for people."""
-        if not self._node_options:
+        if not self._realtime:
+            if may_be_realtime():
+                return "scheduled as any program: --realtime is recommended, this process may have SCHED_FIFO"
             return "scheduled as any program: --realtime asks for more, `brakebench doctor` says what it would get"
         return f"real time: {grants_in(child.error_path.read_text() for child in self._children[1:])}"
 
     def _join(self, name: BusName, spec: str) -> None:
         self._buses[name] = self._stack.enter_context(open_bus(spec, name))
 
-    def _spawn(self, name: str, arguments: list[str]) -> None:
+    def _spawn(self, name: str, arguments: list[str], into: list[Child], spec: str) -> None:
         words = self.out / f"{name}.txt"
         try:
             with interrupts_held():  # else a process could be started that nobody ends
-                self._children.append(Child(name, [*arguments, "--bus", self.spec], words))
+                into.append(Child(name, [*arguments, "--bus", spec], words))
         except OSError as error:
             raise BenchError(f"{name} cannot be started: {error}") from error
 
@@ -180,7 +196,7 @@ class RealBench(BenchRun):
 
     def _pass_period(self) -> int:
         now_ns = self._direct()
-        dead = [child for child in self._children if child.ended]
+        dead = [child for child in self.processes if child.ended]
         if dead:
             while self._direct() < now_ns + SETTLE_NS:
                 pass
@@ -208,13 +224,13 @@ class RealBench(BenchRun):
         waiting, self._waiting = self._waiting, []
         for _, child in waiting:  # who waits for its release does not hear us
             child.release()
-        for group in (nodes, recorder):
+        for group in (nodes, recorder, self._sharer):
             for child in group:
                 child.ask_to_stop()
             wait_for_end(group)
             for child in group:
                 child.stop()
-        for child in self._children:
+        for child in self.processes:
             if child.failed:
                 self._break(self._fallen(child))
         self._stack.close()

@@ -1,57 +1,20 @@
 """The recorder: a process of its own that appends every frame of both buses to one candump file."""
 
 import os
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
 from dbc.frame import BusName, LinkEvent, LinkState, Received
-from hil.bus.error_frame import link_events
+from hil.bus.error_frame import error_frame
 from hil.errors import BrakebenchError, Verdict
 from hil.rt.clock import clocks_ns
 
 FLUSH_PERIOD_NS = 20_000_000
 
-# link state -> class, data[1], data[4] of the CAN error frame that says it (linux/can/error.h)
-_ERROR_FRAMES: dict[LinkState, tuple[int, int, int]] = {
-    LinkState.RX_OVERFLOW: (0x004, 0x01, 0),
-    LinkState.TX_OVERFLOW: (0x004, 0x02, 0),
-    LinkState.ERROR_WARNING: (0x004, 0x0C, 0),
-    LinkState.ERROR_PASSIVE: (0x004, 0x30, 0),
-    LinkState.ERROR_ACTIVE: (0x004, 0x40, 0),
-    LinkState.DISCONNECTED: (0x010, 0, 0x44),  # transceiver: no wire on either line
-    LinkState.NO_ACK: (0x020, 0, 0),
-    LinkState.BUS_OFF: (0x040, 0, 0),
-    LinkState.BUS_ERROR: (0x080, 0, 0),
-    LinkState.RESTARTED: (0x100, 0, 0),
-}
-_RECEIVING, _SENDING = 0x14, 0x28  # bits of data[1]: which side's errors led to warning or passive
-_COUNTERS, _COUNTED = 0x200, re.compile(r"counters tx (\d+) rx (\d+)")
 _LOST_FRAMES = {LinkState.RX_OVERFLOW, LinkState.TX_OVERFLOW}  # their number counts frames, not events
 _DOWN = {LinkState.BUS_OFF: "went bus-off", LinkState.DISCONNECTED: "was disconnected"}
 _UP = {LinkState.ERROR_ACTIVE, LinkState.RESTARTED}
-
-
-def error_frame(event: LinkEvent) -> tuple[int, bytes]:
-    """Class and data of the error frame that says what a link event says; several occurrences are as many frames."""
-    error_class, controller, transceiver = _ERROR_FRAMES[event.state]
-    if event.state in (LinkState.ERROR_WARNING, LinkState.ERROR_PASSIVE):
-        sides = _RECEIVING * ("receive" in event.detail) | _SENDING * ("transmit" in event.detail)
-        controller &= sides or controller
-    sent = received = 0
-    if counted := _COUNTED.search(event.detail):
-        error_class |= _COUNTERS
-        sent, received = (min(int(count), 255) for count in counted.groups())
-    return error_class, bytes((0, controller, 0, 0, transceiver, 0, sent, received))
-
-
-def recorded_events(error_class: int, data: bytes, bus: BusName, time_ns: int) -> list[LinkEvent]:
-    """Link events of an error frame in a recording: those of the kernel, and the one it has no frame of."""
-    disconnected, _, no_wire = _ERROR_FRAMES[LinkState.DISCONNECTED]
-    if error_class == disconnected and data[4] == no_wire:
-        return [LinkEvent(bus, LinkState.DISCONNECTED, time_ns)]
-    return link_events(error_class, data, bus, time_ns)
 
 
 class RecorderError(BrakebenchError):

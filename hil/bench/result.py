@@ -14,8 +14,8 @@ from dbc.bench_messages import ManoeuvreState
 from dbc.codec import COUNTER_SIGNAL, CRC_SIGNAL
 from dbc.contract import MessageSpec, contract
 from dbc.frame import BusName, LinkEvent
-from hil.bench.recorder import recorded_events
 from hil.braking import LOWER, UPPER, crossings, mean_fully_developed_deceleration
+from hil.bus.error_frame import events_of
 from hil.errors import BrakebenchError
 from hil.log.frames import FrameFlag, Recording
 from hil.log.read import read_log
@@ -277,5 +277,5 @@ def link_events(signals: Signals) -> list[LinkEvent]:
     for row in np.flatnonzero((frames.flags & FrameFlag.ERROR) != 0):
         bus = BusName(frames.channels[frames.channel[row]])
         time_ns = round((float(signals.decoded.time_s[row]) - signals.start_s) * 1e9)
-        events += recorded_events(int(frames.can_id[row]), frames.data[row].tobytes(), bus, time_ns)
+        events += events_of(int(frames.can_id[row]), frames.data[row].tobytes(), bus, time_ns)
     return events

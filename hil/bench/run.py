@@ -21,7 +21,7 @@ from hil.bench.real import RealBench
 from hil.bench.result import RunResult, Signals, measure
 from hil.bench.run_report import build_report
 from hil.bench.virtual import VirtualBench
-from hil.bench.watch import Finding
+from hil.bench.watch import MOST_MISSED, Finding
 from hil.bus.timed.line import is_timed, open_line
 from hil.errors import INTERRUPTED_EXIT_CODE, BrakebenchError, Verdict
 from hil.log.export.tables import export
@@ -68,6 +68,8 @@ class Outcome:
         """What a terminal can show, then where the files are and what is missing."""
         print_text(self.report, stream, brief=True)
         stream.write("\n")
+        if self.facts["real_time"] is not None:
+            stream.write(f"on time  {self.facts['real_time']}\n")
         for name in _FILES:
             if self.facts[name] is not None:
                 stream.write(f"{name:8} {self.facts[name]}\n")
@@ -86,6 +88,7 @@ def run_scenario(
     say: Callable[[str], None],
     virtual: bool = False,
     without: Sequence[str] = (),
+    transmit: bool = False,
 ) -> Outcome:
     """Run one scenario in real or in virtual time and measure it.
 
@@ -106,7 +109,7 @@ def run_scenario(
             line = open_line(bus, bit_rate, seed) if is_timed(bus) else None
             bench_run = VirtualBench(scenario, folder, seed, say, stop, line=line)
         else:
-            bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without)
+            bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without, transmit)
         with bench_run:
             say(f"bus {bench_run.spec}" + (f" ({bench_run.note})" if bench_run.note else ""))
             bench_run.run()
@@ -169,6 +172,7 @@ def finish(bench_run: BenchRun, seed: int, provenance: Mapping[str, object], fai
         "unused_frames": signals.unused,
         "bus": bench_run.spec,
         "ended_early": bench_run.state in (BenchState.BROKEN, BenchState.UNRECORDED, BenchState.INTERRUPTED),
+        "real_time": _real_time(bench_run, result),
         "processes": bench_run.alive_at_end,
         "share_of_core": _shares(bench_run),
         "seed": seed,
@@ -273,6 +277,19 @@ def _provenance(scenario: Scenario, bench_run: BenchRun, seed: int) -> dict[str,
         "host": {"kernel": platform.release(), "machine": platform.machine(), "processors": os.cpu_count()},
         "executable": Path(sys.executable).name,
     }
+
+
+def _real_time(bench_run: BenchRun, result: RunResult) -> str | None:
+    """How punctual a run in real time was, for people; None in virtual time and where no node was started."""
+    if not isinstance(bench_run, RealBench) or not bench_run.punctuality:
+        return None
+    skipped, ticks = bench_run.watch.skipped
+    share = f"{skipped / ticks:.2%}" if ticks else "none heard"
+    return (
+        f"99 % of the ticks woke within {result.lateness_ms.p99:g} ms, the last within {result.lateness_ms.max:g} ms; "
+        f"{skipped} of {ticks} skipped ({share}; beyond {MOST_MISSED:.0%} a run is inconclusive); "
+        f"{bench_run.punctuality}"
+    )
 
 
 def _words_of(child: Child) -> str:

@@ -35,13 +35,13 @@ def virtual_run(scenario: Scenario, folder: Path, seed: int, nodes: Mapping[str,
     return VirtualBench(scenario, folder, seed, plant=nodes.get("plant"), ecu=nodes.get("ecu"))
 
 
-def real_run(bus: str, without: Sequence[str] = (), realtime: bool = False) -> MakeBenchRun:
-    """Rigs in real time on a bus; the nodes in ``without`` are somebody else's; ``realtime`` as of `RealBench`."""
+def real_run(bus: str, without: Sequence[str] = (), realtime: bool = False, transmit: bool = False) -> MakeBenchRun:
+    """Rigs in real time on a bus; the nodes in ``without`` are somebody else's; the rest as of `RealBench`."""
 
     def make(scenario: Scenario, folder: Path, seed: int, nodes: Mapping[str, Node]) -> BenchRun:
         if nodes:
             raise SessionError("use: a node as an object runs in virtual time only; put a process on the bus instead")
-        return RealBench(scenario, bus, folder, seed, realtime, without=without)
+        return RealBench(scenario, bus, folder, seed, realtime, without=without, transmit=transmit)
 
     return make
 

@@ -145,6 +145,12 @@ class Watch:
         """Messages that somebody else sends too, as far as their cycle times tell."""
         return [_named(track.spec) for track in self._others]
 
+    @property
+    def skipped(self) -> tuple[int, int]:
+        """Ticks that the nodes skipped and all their ticks since the manoeuvre began, by their own word."""
+        skipped, ticks = zip(*(one.skipped for one in self._ticks.values()), strict=True)
+        return sum(skipped), sum(ticks)
+
     def findings(self) -> list[Finding]:
         """What was found since the manoeuvre began, the worst first; nothing where it did not begin."""
         if self._start_ns is None or self._all_excused:

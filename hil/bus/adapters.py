@@ -5,7 +5,9 @@
 
 import json
 import logging
+from collections.abc import Iterable
 
+_USB_PORTS = ("/dev/ttyACM", "/dev/ttyUSB")
 _NO_HARDWARE = {"virtual", "udp_multicast", "brakebench", "socketcan"}  # the kernel's interfaces are looked at directly
 
 
@@ -14,8 +16,18 @@ def attached_adapters() -> list[str]:
     import can
 
     logging.getLogger("can").setLevel(logging.CRITICAL)
-    found = can.detect_available_configs()
-    return [f"{one['interface']}:{one['channel']}" for one in found if one["interface"] not in _NO_HARDWARE]
+    return buses((str(one["interface"]), str(one["channel"])) for one in can.detect_available_configs())
+
+
+def buses(found: Iterable[tuple[str, str]]) -> list[str]:
+    """Return buses of interfaces and channels; a USB serial port most likely speaks slcan, a built-in one nothing."""
+    named = []
+    for interface, channel in found:
+        if interface == "serial":
+            named += [f"slcan:{channel}"] if channel.startswith(_USB_PORTS) else []
+        elif interface not in _NO_HARDWARE:
+            named.append(f"{interface}:{channel}")
+    return named
 
 
 if __name__ == "__main__":

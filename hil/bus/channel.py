@@ -5,6 +5,7 @@ that ends, and, unlike a lock file in a user's directory, seen by every user of 
 """
 
 import hashlib
+import os
 import re
 import socket
 import struct
@@ -12,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from hil.bus.bus import BusError, parse_spec
+from hil.bus.bus import BusError, BusSpec, parse_spec
 from hil.bus.rendezvous import base_directory
 
 AUTO = "auto"
@@ -44,12 +45,17 @@ def resolve(spec: str) -> str:
 
 def bench_channel(vehicle_spec: str) -> str:
     """Return the bench bus that belongs to a vehicle bus: always a loopback, the same for all who ask."""
+    return f"{shared_channel(vehicle_spec)}-bench"
+
+
+def shared_channel(vehicle_spec: str) -> str:
+    """Return the loopback on which an adapter is shared; its bench bus is the adapter's."""
     spec = parse_spec(resolve(vehicle_spec))
     name = spec.channel if spec.kind == "loopback" else f"{spec.kind}-{spec.channel}"
     name = re.sub(r"[^A-Za-z0-9._-]", "-", name)
     if len(name) > 42:
         name = f"{name[:33]}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
-    return f"loopback:{name}-bench"
+    return f"loopback:{name}"
 
 
 class ChannelClaim:
@@ -110,11 +116,33 @@ def claim_channel(spec: str) -> ChannelClaim:
     raise BusError(f"bus auto: {_MOST_BENCHES} benches have all of {_LOOPBACK} to {_LOOPBACK}-{_MOST_BENCHES}")
 
 
+def claim_adapter(spec: BusSpec) -> socket.socket:
+    """Take an adapter for this process, until closed: two readers of one port would take each other's bytes.
+
+    Raises
+    ------
+    BusError : another process has it; it says which, and how to share it.
+    """
+    place = os.path.realpath(spec.channel) if spec.channel.startswith("/") else spec.channel
+    held = _bind(f"adapter\n{spec.kind}:{place}")
+    if isinstance(held, str):
+        share = shared_channel(spec.name)
+        raise BusError(
+            f"bus {spec.name}: busy, {held} has it, and an adapter has one owner; stop that one, or share it: "
+            f"brakebench share --bus {spec.name}, and --bus {share} for all others"
+        )
+    return held
+
+
 def _hold(spec: str) -> socket.socket | str:
     """Bind the channel's claim, or return who has it."""
     parsed = parse_spec(spec)
     scope = str(base_directory()) if parsed.kind == "loopback" else "machine"
-    address = b"\0brakebench/" + hashlib.sha256(f"{scope}\n{parsed.name}".encode()).hexdigest().encode()
+    return _bind(f"{scope}\n{parsed.name}")
+
+
+def _bind(what: str) -> socket.socket | str:
+    address = b"\0brakebench/" + hashlib.sha256(what.encode()).hexdigest().encode()
     claim = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     try:
         claim.bind(address)

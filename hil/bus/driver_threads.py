@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from dbc.frame import LinkState
 from hil.bus.bus import BusError, BusSpec
-from hil.bus.python_can_driver import descriptor, is_gone, open_driver, shut
+from hil.bus.python_can_driver import descriptor, has_buffered, is_gone, open_driver, shut
 from hil.rt.clock import monotonic_ns
 
 if TYPE_CHECKING:
@@ -171,11 +171,13 @@ class DriverThreads:
             self._took(message, waited_ns > _WAITED_NS)
             if message is not None:
                 failed = False
-            elif waited_ns < _PAUSE_S * 1e9:  # it does not wait
+            elif waited_ns < _PAUSE_S * 1e9 and not has_buffered(driver):  # it does not wait
                 self._closing.wait(_PAUSE_S)
 
     def _await(self, driver: "can.BusABC") -> float:
         """Wait on the driver's descriptor where it has one; return what is left to wait for ``recv``."""
+        if has_buffered(driver):
+            return 0.0
         file = descriptor(driver)
         if file == -1:
             return _TURN_S

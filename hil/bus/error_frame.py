@@ -1,5 +1,7 @@
 """What Linux reports as error frames, as link events. Field names and values: linux/can/error.h."""
 
+import re
+
 from dbc.frame import BusName, LinkEvent, LinkState, Received
 
 CAN_ERR_TX_TIMEOUT = 0x001
@@ -66,6 +68,44 @@ def link_events(error_class: int, data: bytes, bus: BusName, time_ns: int) -> li
     if error_class & CAN_ERR_RESTARTED:
         found[LinkState.RESTARTED] = ["controller restarted"]
     return [LinkEvent(bus, state, time_ns, 1, ", ".join(texts) + counters) for state, texts in found.items()]
+
+
+# link state -> class, data[1], data[4] of the error frame that says it
+_ERROR_FRAMES: dict[LinkState, tuple[int, int, int]] = {
+    LinkState.RX_OVERFLOW: (CAN_ERR_CRTL, 0x01, 0),
+    LinkState.TX_OVERFLOW: (CAN_ERR_CRTL, 0x02, 0),
+    LinkState.ERROR_WARNING: (CAN_ERR_CRTL, 0x0C, 0),
+    LinkState.ERROR_PASSIVE: (CAN_ERR_CRTL, 0x30, 0),
+    LinkState.ERROR_ACTIVE: (CAN_ERR_CRTL, 0x40, 0),
+    LinkState.DISCONNECTED: (CAN_ERR_TRX, 0, 0x44),  # transceiver: no wire on either line
+    LinkState.NO_ACK: (CAN_ERR_ACK, 0, 0),
+    LinkState.BUS_OFF: (CAN_ERR_BUSOFF, 0, 0),
+    LinkState.BUS_ERROR: (CAN_ERR_BUSERROR, 0, 0),
+    LinkState.RESTARTED: (CAN_ERR_RESTARTED, 0, 0),
+}
+_RECEIVING, _SENDING = 0x14, 0x28  # bits of data[1]: which side's errors led to warning or passive
+_COUNTED = re.compile(r"counters tx (\d+) rx (\d+)")
+
+
+def error_frame(event: LinkEvent) -> tuple[int, bytes]:
+    """Class and data of the error frame that says what a link event says; several occurrences are as many frames."""
+    error_class, controller, transceiver = _ERROR_FRAMES[event.state]
+    if event.state in (LinkState.ERROR_WARNING, LinkState.ERROR_PASSIVE):
+        sides = _RECEIVING * ("receive" in event.detail) | _SENDING * ("transmit" in event.detail)
+        controller &= sides or controller
+    sent = received = 0
+    if counted := _COUNTED.search(event.detail):
+        error_class |= CAN_ERR_CNT
+        sent, received = (min(int(count), 255) for count in counted.groups())
+    return error_class, bytes((0, controller, 0, 0, transceiver, 0, sent, received))
+
+
+def events_of(error_class: int, data: bytes, bus: BusName, time_ns: int) -> list[LinkEvent]:
+    """Link events of an error frame of ours: those of the kernel, and the one it has no frame of."""
+    disconnected, _, no_wire = _ERROR_FRAMES[LinkState.DISCONNECTED]
+    if error_class == disconnected and data[4] == no_wire:
+        return [LinkEvent(bus, LinkState.DISCONNECTED, time_ns)]
+    return link_events(error_class, data, bus, time_ns)
 
 
 def append_event(event: LinkEvent, received: list[Received]) -> None:

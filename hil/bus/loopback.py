@@ -16,7 +16,7 @@ from typing import Self
 
 from dbc.frame import BusName, Frame, LinkEvent, LinkState, Received
 from hil.bus.can_frame import pack_frame
-from hil.bus.loopback_wire import MAX_FRAMES, MAX_PACKET, pack_header, unpack
+from hil.bus.loopback_wire import MAX_FRAMES, MAX_PACKET, pack_event, pack_header, unpack
 from hil.bus.rendezvous import Rendezvous
 from hil.rt.clock import monotonic_ns
 
@@ -89,7 +89,17 @@ class LoopbackBus:
         if self._joiners.poll(0):
             self._accept()
         records = [pack_frame(frame, self.bus) for frame in frames]  # all of them, before the first is sent
-        time_ns = monotonic_ns()
+        self._send_records(records, monotonic_ns())
+
+    def relay(self, heard: Sequence[Received]) -> None:
+        """Pass on what was heard on another bus, frames and link events, each with its own time."""
+        if self._joiners.poll(0):
+            self._accept()
+        for item in heard:
+            record = pack_frame(item, self.bus) if isinstance(item, Frame) else pack_event(item)
+            self._send_records([record], max(0, item.time_ns))
+
+    def _send_records(self, records: list[bytes], time_ns: int) -> None:
         for start in range(0, len(records), MAX_FRAMES):
             chunk = records[start : start + MAX_FRAMES]
             packed = b"".join(chunk)

@@ -3,6 +3,7 @@
 python-can is imported on first use (it takes 0.4 s) and kept quiet: what it would log becomes a link event or an error.
 """
 
+import contextlib
 import os
 import select
 import threading
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Self
 from dbc.frame import BusName, Frame, LinkEvent, LinkState, Received
 from hil.bus.bus import BusSpec
 from hil.bus.can_frame import pack_frame
+from hil.bus.channel import claim_adapter
 from hil.bus.driver_threads import MOST_AGE_NS, DriverThreads
 from hil.bus.error_frame import append_event, link_events
 from hil.bus.wall_stamps import WallStamps
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     import can
 
 _MOST_RECEIVED = 1 << 16  # frames and events that wait to be received; beyond it they are lost and counted
+_SHARED = {"virtual", "udp_multicast", "brakebench", "socketcan", "socketcand"}  # any number of processes joins
 # with a timeout of 0 these write half a line, or fail although they sent; None waits
 _SEND_TIMEOUTS_S: dict[str, float | None] = {"slcan": MOST_AGE_NS * 1e-9, "canalystii": None}
 
@@ -50,11 +53,16 @@ class PythonCanBus:
         self._refused: dict[str, int] = {}
         self._overrun = 0
         self._closed = False
+        claim = contextlib.ExitStack()
+        if spec.kind not in _SHARED:
+            claim.enter_context(claim_adapter(spec))
+        self._claim = claim
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         try:
             self._driver = DriverThreads(spec, self._take, self._tell, _SEND_TIMEOUTS_S.get(spec.kind, 0.0))
         except BaseException:
             os.close(self._wake)
+            claim.close()
             raise
 
     def send(self, frames: Sequence[Frame]) -> None:
@@ -92,6 +100,7 @@ class PythonCanBus:
             self._closed = True
             if self._driver.close():
                 os.close(self._wake)
+            self._claim.close()
 
     def __enter__(self) -> Self:
         return self

@@ -4,12 +4,25 @@ import errno
 import logging
 from typing import TYPE_CHECKING, Any
 
+from hil.bus.buffered_port import BufferedPort
 from hil.bus.bus import OWN_KINDS, BusError, BusSpec
+from hil.bus.open_errors import reason
 
 if TYPE_CHECKING:
     import can
 
 DEFAULT_BITRATE = 500_000
+LISTEN_ONLY: dict[str, tuple[str, Any]] = {
+    "cantact": ("monitor", True),
+    "kvaser": ("driver_mode", False),
+    "nixnet": ("listen_only", True),
+    "pcan": ("state", "PASSIVE"),
+    "seeedstudio": ("operation_mode", "silent"),
+    "slcan": ("listen_only", True),
+    "systec": ("state", "PASSIVE"),
+    "vector": ("listen_only", True),
+}
+"""By interface: the option, and its value, that keeps the controller from acknowledging and sending."""
 _GONE = {errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.EIO, errno.EBADF, errno.EPIPE, errno.ENETUNREACH}
 
 
@@ -31,6 +44,12 @@ def descriptor(driver: "can.BusABC") -> int:
         return -1
 
 
+def has_buffered(driver: "can.BusABC") -> bool:
+    """Whether something that was read of the driver's descriptor is still to be taken."""
+    port = getattr(driver, "serialPortOrig", None)
+    return isinstance(port, BufferedPort) and port.buffered > 0
+
+
 def shut(driver: "can.BusABC") -> None:
     """Close a driver, whatever state its device is in."""
     try:
@@ -50,15 +69,18 @@ def open_driver(spec: BusSpec) -> tuple["can.BusABC", "can.Message | None"]:
     if spec.kind not in can.VALID_INTERFACES:
         kinds = ", ".join(sorted(set(OWN_KINDS) | can.VALID_INTERFACES))
         raise BusError(f"bus {spec.name}: there is no kind {spec.kind!r}, only {kinds}")
+    options = _options(spec)
     try:
-        driver = can.Bus(channel=channel, interface=spec.kind, ignore_config=True, **_options(spec))
+        driver = can.Bus(channel=channel, interface=spec.kind, ignore_config=True, **options)
     except Exception as error:  # drivers raise ImportError, OSError, NameError, ...
-        raise BusError(f"bus {spec.name}: {_reason(spec, error)}") from error
+        raise BusError(f"bus {spec.name}: {reason(spec, error)}") from error
+    if spec.kind == "slcan":
+        driver.serialPortOrig = BufferedPort(driver.serialPortOrig)  # type: ignore[attr-defined]
     try:
         return driver, driver.recv(0.0)
     except Exception as error:
         shut(driver)
-        raise BusError(f"bus {spec.name}: {_reason(spec, error)}") from error
+        raise BusError(f"bus {spec.name}: {reason(spec, error)}") from error
 
 
 def _options(spec: BusSpec) -> dict[str, Any]:
@@ -68,18 +90,8 @@ def _options(spec: BusSpec) -> dict[str, Any]:
     listen_only = options.pop("listen_only", False)
     options.setdefault("bitrate", DEFAULT_BITRATE)
     if listen_only:
-        modes: dict[str, dict[str, Any]] = {
-            "kvaser": {"driver_mode": False},
-            "pcan": {"state": can.BusState.PASSIVE},
-            "slcan": {"listen_only": True},
-            "vector": {"listen_only": True},
-        }
-        if spec.kind not in modes:
-            raise BusError(f"bus {spec.name}: listen_only is known of {', '.join(modes)}, not of {spec.kind}")
-        options |= modes[spec.kind]
+        if spec.kind not in LISTEN_ONLY:
+            raise BusError(f"bus {spec.name}: listen_only is known of {', '.join(LISTEN_ONLY)}, not of {spec.kind}")
+        name, value = LISTEN_ONLY[spec.kind]
+        options[name] = can.BusState[value] if name == "state" else value
     return options
-
-
-def _reason(spec: BusSpec, error: Exception) -> str:
-    text = str(error) or type(error).__name__
-    return f"{text} (is the driver of {spec.kind} installed, the adapter attached?)"

@@ -4,7 +4,7 @@ import argparse
 import sys
 from dataclasses import replace
 
-from hil.cli.options import add_bus, add_json, add_realtime, add_scenario, add_seed
+from hil.cli.options import add_bus, add_json, add_realtime, add_scenario, add_seed, add_transmit
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -19,6 +19,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--out", metavar="DIR", help="folder for both runs, figure and report (default: runs/...)")
     add_seed(parser)
     add_realtime(parser)
+    add_transmit(parser)
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -34,6 +35,7 @@ def run(args: argparse.Namespace) -> int:
         out=args.out,
         seed=args.seed,
         realtime=args.realtime,
+        transmit=args.transmit,
         command_line=" ".join(sys.argv[1:]),
         say=lambda line: print(line, file=sys.stderr, flush=True),
     )

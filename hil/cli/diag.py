@@ -7,15 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from hil.cli.columns import say
 from hil.cli.diag_actions import ACTIONS, session_number
-from hil.cli.options import add_bus, add_json
+from hil.cli.options import add_bus, add_json, add_transmit
 from hil.errors import BrakebenchError, Verdict
 from hil.log.account import printable
 
 if TYPE_CHECKING:
     from hil.uds.tester import Exchange, Tester
-
-_NO_CAR = ("loopback", "virtual", "udp_multicast", "brakebench")  # kinds of bus that have no hardware
-_VIRTUAL_LINKS = ("vcan", "vxcan")
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -50,7 +47,7 @@ def _add_connection(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--timeout", metavar="S", type=float, default=1.0, help="until an answer begins (default: 1)")
     group.add_argument("--session", metavar="NAME", help="change to this session first: extended, or a number")
     group.add_argument("--unlock", action="store_true", help="security access first, by our ECU's seed and key")
-    group.add_argument("--transmit", action="store_true", help="needed on a bus with hardware: it sends there")
+    add_transmit(parser)
     group.add_argument("--trace", action="store_true", help="tell every request and answer on standard error")
     add_json(parser)
 
@@ -67,10 +64,11 @@ def run(args: argparse.Namespace) -> int:
     from dbc.frame import BusName
     from hil.bus.channel import resolve
     from hil.bus.open import open_bus
+    from hil.bus.transmit import check_transmit
     from hil.uds.own import PERIODIC, REQUEST, names_of
 
     spec = resolve(args.bus)
-    check_transmit(spec, args.transmit)
+    check_transmit(spec, args.transmit, "diag sends requests")
     if not 0.0 < args.timeout <= 60.0:
         raise BrakebenchError(f"--timeout {args.timeout:g}: expected seconds above 0, at most 60")
     request, answer, functional = _identifiers(args)
@@ -108,24 +106,6 @@ def run(args: argparse.Namespace) -> int:
     else:
         say(map(printable, lines))
     return code
-
-
-def check_transmit(spec: str, transmit: bool) -> None:
-    """Refuse a bus with hardware unless told to send.
-
-    Raises
-    ------
-    BrakebenchError : it says what to add.
-    """
-    from hil.bus.bus import parse_spec
-
-    parsed = parse_spec(spec)
-    virtual = parsed.kind == "socketcan" and parsed.channel.startswith(_VIRTUAL_LINKS)
-    if not (transmit or virtual or parsed.kind in _NO_CAR):
-        raise BrakebenchError(
-            f"bus {parsed.name}: diag sends requests, and on real hardware they reach a real ECU; add --transmit where "
-            "that is meant"
-        )
 
 
 def _identifiers(args: argparse.Namespace) -> Any:

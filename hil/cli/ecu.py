@@ -35,5 +35,14 @@ def run(args: argparse.Namespace) -> int:
     words = notice(scenario, "ecu", resolve(args.bus)) if args.ready_fd is None else ""
     if words:
         say(f"ecu: {words}")
-    serve(ECU, make, args.bus, ready_fd=args.ready_fd, realtime=args.realtime, say=say)
+    serve(
+        ECU,
+        make,
+        args.bus,
+        ready_fd=args.ready_fd,
+        realtime=args.realtime,
+        say=say,
+        transmit=args.transmit,
+        force=args.force,
+    )
     return 0

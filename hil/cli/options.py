@@ -14,6 +14,23 @@ def add_bus(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_transmit(parser: argparse.ArgumentParser) -> None:
+    """``--transmit``: whether a bus with hardware is sent to."""
+    parser.add_argument(
+        "--transmit",
+        action="store_true",
+        help="send on a bus with hardware, where it reaches a real ECU or a real brake; without it such a bus is only "
+        "listened to (a loopback, vcan and vxcan need none)",
+    )
+
+
+def add_force(parser: argparse.ArgumentParser) -> None:
+    """``--force``: beside a live sender."""
+    parser.add_argument(
+        "--force", action="store_true", help="send although somebody on the bus already sends the same messages"
+    )
+
+
 def add_ready_fd(parser: argparse.ArgumentParser) -> None:
     """How a bench waits for the process it started; of no use on the command line."""
     parser.add_argument("--ready-fd", type=int, help=argparse.SUPPRESS)
@@ -53,5 +70,7 @@ def add_node_options(parser: argparse.ArgumentParser) -> None:
     """What the commands ``ecu`` and ``plant`` share."""
     add_scenario(parser)
     add_bus(parser)
+    add_transmit(parser)
+    add_force(parser)
     add_realtime(parser)
     add_ready_fd(parser)

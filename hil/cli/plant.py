@@ -60,7 +60,10 @@ def run(args: argparse.Namespace) -> int:
     words = notice(scenario, "plant", resolve(args.bus)) if args.ready_fd is None else ""
     if words:
         say(f"plant: {words}")
-    serve(PLANT, make, args.bus, ready_fd=args.ready_fd, realtime=args.realtime, say=say, senders=part.senders)
+    serve(
+        PLANT, make, args.bus, ready_fd=args.ready_fd, realtime=args.realtime, say=say, senders=part.senders,
+        sends=part.owned(), transmit=args.transmit, force=args.force,
+    )  # fmt: skip
     return 0
 
 

@@ -9,6 +9,7 @@ from dbc.frame import BusName
 from hil.bench.recorder import FLUSH_PERIOD_NS, Recorder, RecorderError
 from hil.bus.channel import bench_channel
 from hil.bus.open import open_bus
+from hil.bus.transmit import open_for_role
 from hil.cli.options import add_bus, add_ready_fd
 from hil.errors import BrakebenchError
 from hil.faults.line import FaultyListener
@@ -35,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
     stop = StopSignal()
     with contextlib.ExitStack() as stack:
         with stop.at_once():
-            vehicle = stack.enter_context(open_bus(args.bus, BusName.VEHICLE))
+            vehicle = stack.enter_context(open_for_role(args.bus, BusName.VEHICLE, transmit=False))
             bench = stack.enter_context(open_bus(bench_channel(args.bus), BusName.BENCH))
         try:
             recorder = Recorder(args.out, [vehicle, FaultyListener(bench, ("RECORDER",))])

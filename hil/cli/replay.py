@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hil.bench.playback import LATE_NS, ROLES, Replay, Selection, select
-from hil.cli.options import add_bus, add_json
+from hil.cli.options import add_bus, add_json, add_transmit
 from hil.errors import INTERRUPTED_EXIT_CODE, Verdict
 
 MOST_SUPERSEDED = 0.01
@@ -38,6 +38,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="send only what the plant (so that a live ECU is driven) or the ECU sends by our DBC (default: all)",
     )
     parser.add_argument("--channel", metavar="NAME", help="the log's channel that goes to the vehicle bus")
+    add_transmit(parser)
     parser.add_argument("--speed", type=_speed, default=1.0, metavar="X", help="2 is twice as fast (default: 1)")
     add_json(parser)
     parser.set_defaults(run=run)
@@ -58,17 +59,19 @@ def run(args: argparse.Namespace) -> int:
     from dbc.frame import BusName
     from hil.bus.channel import bench_channel, resolve
     from hil.bus.open import open_bus
+    from hil.bus.transmit import check_transmit
     from hil.log.read import read_log
     from hil.rt.clock import WallClock
     from hil.rt.process import StopSignal
     from hil.rt.realtime import request_timer_slack
 
+    spec = resolve(args.bus)
+    check_transmit(spec, args.transmit, "a replay sends")
     stop = StopSignal()
     recording = read_log(args.log)
     for problem in recording_problems(recording.rejected, recording.truncated_at):
         _say(f"{args.log}: {problem}")
     selection = select(recording, args.role, args.channel)
-    spec = resolve(args.bus)
     used = {identity.bus for identity in selection.identities}
     request_timer_slack()
     with ExitStack() as stack:

@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from hil.cli.options import add_bus, add_realtime
+from hil.cli.options import add_bus, add_force, add_realtime, add_transmit
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -16,6 +16,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--settings", type=Path, metavar="FILE.toml", help="cycle times, counters, check values, start values"
     )
     add_bus(parser)
+    add_transmit(parser)
+    add_force(parser)
     add_realtime(parser)
     parser.set_defaults(run=run)
 
@@ -38,5 +40,5 @@ def run(args: argparse.Namespace) -> int:
         say(f"{name} keeps its start value; is it a counter or check value, state it in --settings")
     if database.left_out:
         say(f"left out, as they are no frames of classical CAN: {', '.join(database.left_out)}")
-    serve_restbus(RestBus(chosen), args.bus, args.realtime, say)
+    serve_restbus(RestBus(chosen), args.bus, args.realtime, say, args.transmit, args.force)
     return 0

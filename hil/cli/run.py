@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from hil.cli.options import add_bus, add_json, add_realtime, add_scenario, add_seed
+from hil.cli.options import add_bus, add_json, add_realtime, add_scenario, add_seed, add_transmit
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -27,6 +27,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     )
     parser.add_argument("--extend", type=Path, metavar="FILE", help="extension that `explain` wrote: the car it taught")
     parser.add_argument("--out", metavar="DIR", help="folder for log, signals, figure and report (default: runs/...)")
+    add_transmit(parser)
     add_seed(parser)
     add_realtime(parser)
     add_json(parser)
@@ -64,6 +65,7 @@ def run(args: argparse.Namespace) -> int:
         out=out,
         seed=args.seed,
         realtime=args.realtime,
+        transmit=args.transmit,
         virtual=args.virtual,
         without=args.without,
         command_line=" ".join(sys.argv[1:]),

@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dbc.frame import BusName, Frame, LinkEvent, Received
 from hil.bus.bus import Bus
 from hil.bus.channel import resolve
-from hil.bus.open import open_bus
+from hil.bus.listen import refuse_others
+from hil.bus.transmit import ListeningBus, open_for_role
 from hil.gateway.error import GatewayError
 from hil.gateway.gateway import OurSide, TheirSide
 from hil.gateway.map import GatewayMap
@@ -28,13 +29,26 @@ _TOO = "{}: somebody else sends it, too"
 Say = Callable[[str], None]
 
 
-def serve_gateway(gateway_map: GatewayMap, ours: str, theirs: str, realtime: bool, say: Say) -> None:
+def serve_gateway(
+    gateway_map: GatewayMap,
+    ours: str,
+    theirs: str,
+    realtime: bool,
+    say: Say,
+    transmit: bool = False,
+    force: bool = False,
+) -> None:
     """Run a gateway between two buses until SIGTERM or Ctrl-C.
+
+    Parameters
+    ----------
+    transmit : send on buses with hardware; else these are only listened to.
+    force : send although somebody already sends the same messages.
 
     Raises
     ------
     GatewayError : both are one bus.
-    hil.bus.bus.BusError : one cannot be opened.
+    hil.bus.bus.BusError : one cannot be opened, or somebody already sends what the gateway would send.
     """
     ours, theirs = resolve(ours), resolve(theirs)
     if ours == theirs:
@@ -42,9 +56,13 @@ def serve_gateway(gateway_map: GatewayMap, ours: str, theirs: str, realtime: boo
     stop = StopSignal()
     with contextlib.ExitStack() as stack:
         with stop.at_once():
-            our_bus = stack.enter_context(open_bus(ours, BusName.VEHICLE))
-            their_bus = stack.enter_context(open_bus(theirs, BusName.VEHICLE))
+            our_bus = stack.enter_context(_open(ours, transmit, say))
+            their_bus = stack.enter_context(_open(theirs, transmit, say))
         their_side, our_side = TheirSide(gateway_map, say), OurSide(gateway_map, say)
+        if not force:
+            _refuse_others(our_bus, our_side.names, stop, "this gateway")
+            _refuse_others(their_bus, their_side.names, stop, "this gateway")
+            our_bus.receive(0.0)  # it has aged meanwhile
         loop = _loop(realtime, say)
         say(f"{gateway_map.path.name}: ours on {ours}, theirs on {theirs}")
         others = set[str]()
@@ -58,18 +76,23 @@ def serve_gateway(gateway_map: GatewayMap, ours: str, theirs: str, realtime: boo
             if stop.asked:
                 break
         say(
-            f"{their_side.sent} frames sent on {theirs}, {our_side.sent} on {ours}; {our_side.rejected} of theirs "
+            f"{_sent(their_side.sent, their_bus)} on {theirs}, {_sent(our_side.sent, our_bus)} on {ours}; "
+            f"{our_side.rejected} of theirs "
             f"rejected; {loop.overruns} ticks of {PERIOD_NS / 1e6:g} ms skipped"
         )
 
 
-def serve_restbus(restbus: RestBus, spec: str, realtime: bool, say: Say) -> None:
-    """Run a rest-bus until SIGTERM or Ctrl-C; lines on standard input are edits."""
+def serve_restbus(
+    restbus: RestBus, spec: str, realtime: bool, say: Say, transmit: bool = False, force: bool = False
+) -> None:
+    """Run a rest-bus until SIGTERM or Ctrl-C; lines on standard input are edits. The rest as of `serve_gateway`."""
     spec = resolve(spec)
     stop = StopSignal()
     with contextlib.ExitStack() as stack:
         with stop.at_once():
-            bus = stack.enter_context(open_bus(spec, BusName.VEHICLE))
+            bus = stack.enter_context(_open(spec, transmit, say))
+        if not force:
+            _refuse_others(bus, restbus.names, stop, "this rest-bus")
         lines = Lines(sys.stdin.fileno()) if sys.stdin is not None else None
         loop = _loop(realtime, say)
         others = set[str]()
@@ -87,7 +110,26 @@ def serve_restbus(restbus: RestBus, spec: str, realtime: bool, say: Say) -> None
                 say(_TOO.format(name))
             if stop.asked:
                 break
-        say(f"{restbus.sent} frames sent on {spec}; {loop.overruns} ticks of {PERIOD_NS / 1e6:g} ms skipped")
+        say(f"{_sent(restbus.sent, bus)} on {spec}; {loop.overruns} ticks of {PERIOD_NS / 1e6:g} ms skipped")
+
+
+def _open(spec: str, transmit: bool, say: Say) -> Bus | ListeningBus:
+    bus = open_for_role(spec, BusName.VEHICLE, transmit)
+    if isinstance(bus, ListeningBus):
+        say(bus.words)
+    return bus
+
+
+def _sent(count: int, bus: Bus | ListeningBus) -> str:
+    return f"{count} frames sent" if not isinstance(bus, ListeningBus) else f"0 frames sent, {count} held back"
+
+
+def _refuse_others(bus: Bus | ListeningBus, names: Mapping[tuple[int, bool], str], stop: StopSignal, who: str) -> None:
+    if not isinstance(bus, ListeningBus):
+        ours = {
+            (BusName.VEHICLE, can_id, extended): f"0x{can_id:X} {name}" for (can_id, extended), name in names.items()
+        }
+        refuse_others([bus], ours, lambda: stop.asked, who, "send nevertheless with --force")
 
 
 def _loop(realtime: bool, say: Say) -> Loop:
@@ -102,7 +144,7 @@ def _named(received: list[Received], names: Mapping[tuple[int, bool], str]) -> s
     return {names[i.can_id, i.extended] for i in received if isinstance(i, Frame) and (i.can_id, i.extended) in names}
 
 
-def _received(bus: Bus, say: Say) -> list[Received]:
+def _received(bus: Bus | ListeningBus, say: Say) -> list[Received]:
     heard = bus.receive(0.0)
     for item in heard:
         if isinstance(item, LinkEvent):

@@ -198,6 +198,11 @@ class Child:
         words = self.error_path.read_text(errors="replace").strip().splitlines()
         return f"{self.name} (process {self.pid}) {how}" + (f": {words[-1]}" if words else "")
 
+    def last_words(self) -> str:
+        """Return the last line of what it printed, without the name of the program; may be empty."""
+        words = self.error_path.read_text(errors="replace").strip().splitlines()
+        return words[-1].removeprefix("brakebench: ") if words else ""
+
     def ask_to_stop(self) -> None:
         """Send SIGTERM, once: a process that is shutting down would die of a second one."""
         if not self.ended and not self._terminated:

@@ -46,6 +46,17 @@ def request_realtime() -> list[Grant]:
     return [step() for step in steps]
 
 
+def may_be_realtime() -> bool:
+    """Whether this process would be granted SCHED_FIFO; it is tried, and given back at once."""
+    policy, parameter = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
+    except OSError:
+        return False
+    os.sched_setscheduler(0, policy, parameter)
+    return True
+
+
 def _scheduling() -> Grant:
     """For every thread there is: a driver's threads hold what the node's own waits for."""
     policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK

@@ -79,7 +79,10 @@ def test_a_restbus_is_edited_by_lines(start, channel, tmp_path):
     say("BRAKE_2.BRAKE_PRESSED=1")
     wait_until(lambda: last("SPEED")["SPEED"] == 30.5, "the edit")
     wait_until(lambda: last("BRAKE_2"), "the event")
-    other = start("restbus", str(example / "rav4_brake.dbc"), "--node", "CAR", *settings)
+    refused = start("restbus", str(example / "rav4_brake.dbc"), "--node", "CAR", *settings)
+    assert "SPEED, which this rest-bus would send" in refused.communicate(timeout=RUN_LIMIT_S)[1]
+    assert refused.returncode == 2
+    other = start("restbus", str(example / "rav4_brake.dbc"), "--node", "CAR", *settings, "--force")
     wait_until(lambda: last("SPEED")["SPEED"] == 50.0, "the other one's frames")
     other.send_signal(signal.SIGINT)
     other.communicate(timeout=RUN_LIMIT_S)

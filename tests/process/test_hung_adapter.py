@@ -78,7 +78,7 @@ def health(spec):
 @pytest.mark.slow
 @pytest.mark.parametrize("stop", [signal.SIGTERM, signal.SIGINT])
 def test_a_node_goes_on_beside_an_adapter_that_hangs_and_ends_when_told(start, device, spec, health, stop):
-    ecu = start("ecu", "--bus", spec)
+    ecu = start("ecu", "--bus", spec, "--transmit")
     health.more(50)
     assert device.receive().can_id in {message.can_id for message in contract(VEHICLE).sent_by("ECU")}
     with device.stalled():

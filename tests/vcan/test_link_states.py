@@ -240,7 +240,7 @@ def test_a_run_tells_the_states_of_its_link_and_that_bus_off_spoilt_it(
     slcan.set("txqueuelen", "1000")  # the default of 10 is shorter than what the car says in one tick
     witness = candump(slcan.name)
     spec = f"socketcan:{slcan.name}"
-    bench = begin("run", "blended.toml", "--json", "--bus", spec, "--out", "link")
+    bench = begin("run", "blended.toml", "--json", "--bus", spec, "--transmit", "--out", "link")
     log = folder / "link" / "recording.log"
 
     def blending() -> bool:

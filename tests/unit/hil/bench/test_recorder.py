@@ -7,7 +7,8 @@ import pytest
 from dbc.contract import encode, spec_of
 from dbc.frame import BusName, Frame, LinkEvent, LinkState
 from dbc.messages import BrakePedal
-from hil.bench.recorder import FLUSH_PERIOD_NS, Recorder, RecorderError, error_frame, recorded_events
+from hil.bench.recorder import FLUSH_PERIOD_NS, Recorder, RecorderError
+from hil.bus.error_frame import error_frame, events_of
 from hil.log.read import read_log
 from hil.log.signals.decode import decode_log
 
@@ -84,7 +85,7 @@ def test_a_full_disk_is_said(tmp_path):
 @pytest.mark.parametrize("state", list(LinkState))
 def test_link_events_read_back_as_what_they_were(state):
     event = LinkEvent(BusName.VEHICLE, state, 7)
-    assert [e.state for e in recorded_events(*error_frame(event), BusName.VEHICLE, 7)] == [state]
+    assert [e.state for e in events_of(*error_frame(event), BusName.VEHICLE, 7)] == [state]
 
 
 def test_a_lost_link_makes_the_recording_incomplete(tmp_path):

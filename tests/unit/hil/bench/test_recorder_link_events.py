@@ -3,10 +3,10 @@ import json
 import pytest
 
 from dbc.frame import BusName, Frame, LinkEvent, LinkState
-from hil.bench.recorder import Recorder, RecorderError, error_frame, recorded_events
+from hil.bench.recorder import Recorder, RecorderError
 from hil.bench.result import Signals, measure
 from hil.bench.result import link_events as link_events_of
-from hil.bus.error_frame import link_events
+from hil.bus.error_frame import error_frame, events_of, link_events
 from hil.rt.clock import monotonic_ns
 
 VEHICLE = BusName.VEHICLE
@@ -79,7 +79,7 @@ def test_a_change_of_state_is_written_as_the_kernel_said_it(recorder, bus, error
 @pytest.mark.parametrize("state", LinkState)
 def test_every_link_event_can_be_read_back(state):
     error_class, data = error_frame(LinkEvent(VEHICLE, state, 7, 1, "whatever a driver says"))
-    assert [(e.state, e.time_ns) for e in recorded_events(error_class, data, VEHICLE, 7)] == [(state, 7)]
+    assert [(e.state, e.time_ns) for e in events_of(error_class, data, VEHICLE, 7)] == [(state, 7)]
 
 
 def test_events_are_counted_one_by_one_and_lost_frames_once(recorder, bus):

@@ -2,9 +2,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dbc.frame import BusName, Frame
+from dbc.frame import BusName, Frame, LinkEvent, LinkState
 from hil.bus.can_frame import pack_frame
-from hil.bus.loopback_wire import MAX_FRAMES, MAX_PACKET, pack_header, unpack
+from hil.bus.loopback_wire import MAX_FRAMES, MAX_PACKET, pack_event, pack_header, unpack
 
 VEHICLE = BusName.VEHICLE
 
@@ -63,3 +63,14 @@ def test_the_boundaries_of_a_frame():
     for frame in (Frame(VEHICLE, 0x800, b""), Frame(VEHICLE, 0x20000000, b"", 0, True), Frame(VEHICLE, 0, bytes(9))):
         with pytest.raises(ValueError, match="cannot send"):
             pack_frame(frame, VEHICLE)
+
+
+@pytest.mark.parametrize("state", LinkState)
+@pytest.mark.parametrize("number", [1, 371])
+def test_link_events_pass_among_frames(state, number):
+    frame = Frame(VEHICLE, 0x123, b"\x01", 5)
+    records = [pack_frame(frame, VEHICLE), pack_event(LinkEvent(VEHICLE, state, 5, number, "of any kind"))]
+    packet = pack_header(2, 9, 5) + b"".join(records)
+    sequence, (first, event) = unpack(packet, VEHICLE)
+    assert (sequence, first) == (9, frame)
+    assert (event.state, event.number, event.time_ns, event.bus) == (state, number, 5, VEHICLE)

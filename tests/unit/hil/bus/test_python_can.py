@@ -181,7 +181,7 @@ def test_python_can_is_kept_quiet(caplog):
 
 @pytest.mark.parametrize("kind", ["virtual", "gs_usb"])
 def test_listen_only_is_refused_where_the_driver_cannot(kind):
-    with pytest.raises(BusError, match="listen_only is known of kvaser, pcan, slcan, vector"):
+    with pytest.raises(BusError, match=r"0: listen_only is known of .*kvaser, .*slcan, .*, not of"):
         open_bus(f"{kind}:0,listen_only=true", VEHICLE)
 
 

@@ -52,6 +52,12 @@ def test_what_was_refused_is_said_with_a_remedy(monkeypatch):
     assert "limited to 8192 bytes" in grants["locked memory"].detail
 
 
+def test_whether_it_would_be_granted_changes_nothing():
+    before = os.sched_getscheduler(0)
+    assert realtime.may_be_realtime() in (True, False)
+    assert os.sched_getscheduler(0) == before
+
+
 def test_memory_is_not_locked_under_a_limit(monkeypatch):
     # it would succeed, and a later allocation would fail
     assert not ask(monkeypatch, limit=1 << 20)["locked memory"].granted

@@ -1,0 +1,141 @@
+"""``brakebench latency``: timing on the wire, of a live bus or of a log."""
+
+import argparse
+import json
+import sys
+from typing import TYPE_CHECKING, Any
+
+from hil.cli.log_options import LOGS, add_databases
+from hil.cli.options import add_json
+from hil.errors import BrakebenchError
+
+if TYPE_CHECKING:
+    from hil.bench.wire_timing import Cyclic, Response, Spread
+    from hil.log.frames import FrameTable
+
+
+def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "latency",
+        help="timing on the wire: stimulus to response, and jitter of every cyclic message",
+        description="Measure stimulus to response and the jitter of every cyclic message against its cycle time, on a "
+        "live bus, to which nothing is sent, or in a log.",
+        epilog="Age: from the newest frame of the stimulus to each frame of the response. Reaction: from the frame "
+        "with which a signal begins to move to the frame with which the other one does. More: docs/adapters.md.",
+    )
+    parser.add_argument("log", nargs="?", metavar="LOG", help=LOGS)
+    parser.add_argument("--bus", metavar="BUS", help="listen to this bus instead")
+    parser.add_argument("--for", dest="for_s", type=float, default=10.0, metavar="S", help="how long (default: 10)")
+    parser.add_argument("--from", dest="stimulus", metavar="MESSAGE[.SIGNAL]", help="the stimulus (default: our own)")
+    parser.add_argument("--to", dest="response", metavar="MESSAGE[.SIGNAL]", help="the response")
+    add_databases(parser)
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and print."""
+    from hil.bench.wire_timing import OWN_PAIRS, TimingError, cyclic_messages, response_of
+    from hil.cli.columns import say
+    from hil.cli.log_options import databases
+
+    if (args.log is None) == (args.bus is None):
+        raise BrakebenchError("latency: expected a log or --bus BUS, one of them")
+    if (args.stimulus is None) != (args.response is None):
+        raise BrakebenchError("latency: --from and --to go together")
+    known, _ = databases(args.dbc)
+    frames = _listen(args.bus, args.for_s) if args.log is None else _read(args.log)
+    if not len(frames):
+        raise TimingError(f"latency: {args.log or args.bus}: not one frame")
+    responses = []
+    if args.stimulus is not None:
+        responses.append(response_of(frames, known, args.stimulus, args.response))
+    else:
+        for stimulus, response in OWN_PAIRS:
+            try:
+                responses.append(response_of(frames, known, stimulus, response))
+            except TimingError:  # not of this bus
+                continue
+    cyclic = cyclic_messages(frames, known)
+    if args.json:
+        print(json.dumps(_values(args, frames, responses, cyclic), indent=2))
+    else:
+        say(_lines(responses, cyclic))
+    return 0
+
+
+def _read(log: str) -> "FrameTable":
+    from pathlib import Path
+
+    from hil.log.read import read_log
+
+    return read_log(Path(log)).frames
+
+
+def _listen(spec: str, for_s: float) -> "FrameTable":
+    from dbc.frame import BusName, Frame
+    from hil.bench.wire_timing import table_of
+    from hil.bus.transmit import open_for_role
+    from hil.rt.clock import WallClock
+    from hil.rt.process import StopSignal
+
+    if not 0.0 < for_s <= 3600.0:
+        raise BrakebenchError(f"--for {for_s:g}: expected seconds above 0, at most 3600")
+    stop, clock = StopSignal(), WallClock()
+    heard: list[Frame] = []
+    with stop.at_once():
+        bus = open_for_role(spec, BusName.VEHICLE, transmit=False)
+    with bus:
+        print(f"listening to {bus.name} for {for_s:g} s", file=sys.stderr, flush=True)
+        end_ns = clock.now_ns() + round(for_s * 1e9)
+        while not stop.asked and clock.now_ns() < end_ns:
+            heard += [item for item in bus.receive(0.1) if isinstance(item, Frame)]
+    return table_of(heard)
+
+
+def _values(
+    args: argparse.Namespace, frames: "FrameTable", responses: "list[Response]", cyclic: "list[Cyclic]"
+) -> dict[str, Any]:
+    def plain(one: "Response | Cyclic") -> dict[str, Any]:
+        return {k: v._asdict() if hasattr(v, "_asdict") else v for k, v in one._asdict().items()}
+
+    return {
+        "log": args.log,
+        "bus": args.bus,
+        "frames": len(frames),
+        "responses": [plain(one) for one in responses],
+        "cyclic": [plain(one) for one in cyclic],
+    }
+
+
+def _lines(responses: "list[Response]", cyclic: "list[Cyclic]") -> list[str]:
+    from hil.cli.columns import columns, terminal_width
+
+    width = terminal_width()
+    lines = []
+    if responses:
+        rows = []
+        for one in responses:
+            pair = f"{one.stimulus} to {one.response}"
+            rows.append([pair, "age", *_cells(one.age)])
+            if one.reaction is not None:
+                lost = f" ({one.unanswered} unanswered)" if one.unanswered else ""
+                rows.append([pair, f"reaction{lost}", *_cells(one.reaction)])
+        lines += columns(["stimulus to response", "what", "n", "p50 ms", "p99 ms", "max ms"], rows, width, (0, 1))
+        lines.append("")
+    rows = [
+        [
+            *(c.name, c.channel, str(c.frames), f"{c.cycle_ms:g}{'' if c.stated else ' (median)'}"),
+            *_cells(c.jitter)[1:],
+            *(f"{c.shortest_ms:.3f}", f"{c.longest_ms:.3f}", str(c.missed)),
+        ]
+        for c in cyclic
+    ]
+    heads = ["cyclic message", "channel", "frames", "cycle ms", "jitter p50", "p99", "max ms", "shortest", "longest"]
+    return lines + columns([*heads, "missed"], rows, width, (0, 1))
+
+
+def _cells(spread: "Spread") -> list[str]:
+    numbers = (spread.p50_ms, spread.p99_ms, spread.max_ms)
+    return [str(spread.n), *("-" if number is None else f"{number:.3f}" for number in numbers)]
