@@ -38,6 +38,7 @@ TORQUE_TICKS = 5  # motor demand zero 50 ms after the last frame
 LINK_DOWN = 0x3041  # docs/trouble-codes.md
 LOST = {0x1001, 0x1011, 0x1021, 0x1031}  # pedal, wheel speeds and body motion do not come
 QUEUE, READY = 3, 1  # txqueuelen; one that the kernel holds ready for the card, whose own frame QEMU sends at once
+DEFAULT_QUEUE = "10"
 PRESSURE, MOTORS = spec_of(EhbPressureFront), spec_of(MotorStatusFront)
 
 BLENDED = """title = "the motors brake too, for long: it goes downhill"
@@ -170,8 +171,6 @@ class Rig:
 def rig(cards: Cards, tmp_path: Path) -> Iterator[Rig]:
     scenario = tmp_path / "blended.toml"
     scenario.write_text(BLENDED)
-    for card in cards:
-        card.set("txqueuelen", "100")  # the default of 10 is shorter than what the car says in one tick
     with open_bus(cards[0].spec, BusName.VEHICLE) as car, open_bus(cards[1].spec, BusName.VEHICLE) as ecu:
         rig = Rig(car, ecu, scenario)
         rig.until(lambda: rig.mode is BrakeMode.NORMAL and rig.torque_nm < BRAKING_NM, 300)
@@ -198,7 +197,6 @@ def test_the_controllers_adapter_is_lost_and_comes_back(rig: Rig, cards: Cards, 
 
     if loss == "driver unbound":
         card.bind()
-    card.set("txqueuelen", "100")
     card.up()
     rig.until(lambda: LinkState.RESTARTED in rig.ecu.states, 100, cut=True)
     told = [state for state in rig.ecu.states if state is not LinkState.TX_OVERFLOW]  # of frames sent meanwhile
@@ -251,7 +249,7 @@ def test_nobody_acknowledges_the_controller_and_its_queue_is_full(rig: Rig, card
     refused = rig.ecu.refused
 
     card.interrupts(True)
-    card.set("txqueuelen", "100")
+    card.set("txqueuelen", DEFAULT_QUEUE)
     rig.car.listen(QUEUE + READY)
     rig.ecu.sent = []  # awaited already
     rig.tick()
