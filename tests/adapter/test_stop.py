@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     Cards = tuple[Adapter, Adapter]
 
+BESIDE = ("--without", "ecu", "--realtime", "--json")
 DOWN_S = 0.5
 LINK_DOWN = 0x3041  # docs/trouble-codes.md
 
@@ -71,7 +72,7 @@ def cars(frames: Counter[tuple[int, bytes]]) -> Counter[tuple[int, bytes]]:
 def ecu(adapters: Cards, folder: Path, begin: Callable[..., Started]) -> Iterator[Started]:
     """The controller on its own adapter, for all runs; Ctrl-C ends it at once and without a word of error."""
     (folder / "short.toml").write_text(SHORT)
-    ecu = begin("ecu", "short.toml", "--bus", adapters[1].spec)
+    ecu = begin("ecu", "short.toml", "--realtime", "--bus", adapters[1].spec)
     ecu.says("every 10 ms")
     yield ecu
     ecu.process.send_signal(signal.SIGINT)
@@ -88,7 +89,7 @@ def test_car_and_controller_stop_each_on_its_own_adapter(
     figure: Callable[[str], None],
 ) -> None:
     witnesses = [candump(adapter.name) for adapter in adapters]
-    bench = begin("run", "short.toml", "--without", "ecu", "--bus", adapters[0].spec, "--json", "--out", "stop")
+    bench = begin("run", "short.toml", *BESIDE, "--bus", adapters[0].spec, "--out", "stop")
     result = result_of(bench.process)
     there, here = (Counter((line.can_id, line.data) for line in witness.stop()) for witness in witnesses)
     ours = Counter(recorded(folder / "stop" / "recording.log"))
@@ -124,7 +125,7 @@ def test_the_controllers_interface_is_down_for_half_a_second_of_a_run(
 ) -> None:
     (folder / "rolling.toml").write_text(ROLLING)
     witness = candump(cards[0].name)
-    bench = begin("run", "rolling.toml", "--without", "ecu", "--bus", cards[0].spec, "--json", "--out", "down")
+    bench = begin("run", "rolling.toml", *BESIDE, "--bus", cards[0].spec, "--out", "down")
     log = folder / "down" / "recording.log"
 
     def braking() -> bool:

@@ -38,8 +38,9 @@ SOURCES = {
     "adapter": (
         "dbc", "ecu/node.py", "ecu/law/trouble_codes.py", "plant/demands.py", "hil/bus", "hil/rt",
         "hil/bench/node_process.py", "hil/bench/real.py", "hil/bench/bench_run.py", "hil/bench/hold.py",
-        "hil/bench/port.py", "hil/bench/recorder.py", "hil/cli/ecu.py", "hil/cli/plant.py", "hil/cli/run.py", "tests/adapter", "tests/support/candump.py",
-        "tests/support/processes.py", "tests/support/started.py", ".ci/adapter-lab", ".ci/adapter-lab-init",
+        "hil/bench/port.py", "hil/bench/recorder.py", "hil/cli/ecu.py", "hil/cli/plant.py", "hil/cli/run.py",
+        "tests/adapter", "tests/support/candump.py", "tests/support/processes.py", "tests/support/started.py",
+        ".ci/adapter-lab", ".ci/adapter-lab-init",
     ),
 }  # fmt: skip
 """What the outcome of each run depends on."""
