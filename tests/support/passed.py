@@ -6,6 +6,7 @@ Only a run that passes writes its file, and only with ``--write-passed``:
 
     pytest -n 2 -m drawn --write-passed tests/hidden/test_drawn.py
     .ci/vcan-lab python -m pytest tests/vcan tests/contract/test_bus.py tests/contract/test_clock.py --write-passed
+    .ci/adapter-lab python -m pytest tests/adapter --write-passed
 """
 
 import sys
@@ -16,7 +17,11 @@ from typing import Any
 from hil.validation.blind_trials.sources import digest
 
 ROOT = Path(__file__).parents[2]
-FILES = {"drawn": "tests/hidden/drawn.passed", "lab": "tests/vcan/lab.passed"}
+FILES = {
+    "drawn": "tests/hidden/drawn.passed",
+    "lab": "tests/vcan/lab.passed",
+    "adapter": "tests/adapter/adapter.passed",
+}
 SOURCES = {
     "drawn": (
         "dbc", "plant", "hil/diagnosis", "hil/validation/reference_car", "hil/validation/blind_trials/run.py",
@@ -30,13 +35,20 @@ SOURCES = {
         "tests/support/candump.py", "tests/support/processes.py", "tests/support/slcan_device.py",
         "tests/support/started.py", ".ci/vcan-lab", ".ci/vcan-lab-init",
     ),
+    "adapter": (
+        "dbc", "ecu/node.py", "ecu/law/trouble_codes.py", "plant/demands.py", "hil/bus", "hil/rt",
+        "hil/bench/node_process.py", "hil/bench/real.py", "hil/bench/bench_run.py", "hil/bench/hold.py",
+        "hil/bench/port.py", "hil/bench/recorder.py", "hil/cli/ecu.py", "hil/cli/plant.py", "hil/cli/run.py",
+        "tests/adapter", "tests/support/candump.py", "tests/support/processes.py", "tests/support/started.py",
+        ".ci/adapter-lab", ".ci/adapter-lab-init",
+    ),
 }  # fmt: skip
 """What the outcome of each run depends on."""
 
 
-def lab_tests() -> set[str]:
-    """Files whose tests run in the lab of a real SocketCAN."""
-    files = [ROOT / path for path in SOURCES["lab"] if path.startswith("tests/")]
+def lab_tests(name: str = "lab") -> set[str]:
+    """Files whose tests run in the lab of a real SocketCAN, or in that of emulated adapters."""
+    files = [ROOT / path for path in SOURCES[name] if path.startswith("tests/")]
     return {
         path.relative_to(ROOT).as_posix()
         for file in files
