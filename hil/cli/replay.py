@@ -240,7 +240,12 @@ def _print_text(facts: dict[str, Any]) -> None:
         Number(
             "Frames sent", facts["sent"], note=f"of {facts['selected']} selected, {facts['frames_in_log']} in the log"
         ),
-        Number("Duration", round(facts["duration_s"], 3), "s", note=f"{whole:.3f} s a round by the log and the speed"),
+        Number(
+            "Duration",
+            round(facts["duration_s"], 3),
+            "s",
+            note=f"{whole:.3f} s{' a round' if facts['rounds'] > 1 else ''} by the log and the speed",
+        ),
         Number("Lateness, median", lateness["p50"], "ms"),
         Number("Lateness, 99th percentile", lateness["p99"], "ms"),
         Number("Lateness, largest", lateness["max"], "ms"),
