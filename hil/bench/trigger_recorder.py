@@ -12,8 +12,8 @@ from hil.bench.recorder import FLUSH_PERIOD_NS, Source, append, create
 from hil.bench.trigger import Hit, Trigger
 
 RING_BYTES = 256 * 1024 * 1024
-"""Most text that is kept: of two full buses of 1 Mbit/s 330 s of frames of 8 bytes (2 x 9,000 a second, 45 bytes a line),
-230 s of empty ones (2 x 21,000, 27 bytes)."""
+"""Most text that is kept: two full buses of 1 Mbit/s for 330 s at 8 bytes a frame (2 x 9,000 a second, 45 a line),
+230 s of empty frames (2 x 21,000, 27 bytes)."""
 
 
 class _Piece(NamedTuple):
