@@ -3,30 +3,26 @@
     deadline(frame) = start + (stamp of the frame - stamp of the first one sent) / speed
 
 ``start`` is the next multiple of 100 ms of the clock plus the role's phase, so that a replayed plant keeps its place
-between the ticks of a live ECU. Frames leave in the order of their stamps. After a stall of the machine whatever is
-overdue is sent at once and counted as late; but of what is overdue by more than two cycles of the nodes (20 ms), only
-each identifier's newest frame, and every frame of a message without a cycle: a burst of old values helps nobody. The
+between the ticks of a live ECU; or 2 ms after the frame that was waited for. A round of a loop lasts up to the next
+multiple of 10 ms after its last frame: each round has the same place between those ticks.
+
+Frames leave in the order of their stamps. After a stall of the machine whatever is overdue is sent at once and counted
+as late; but of what is overdue by more than two cycles of the nodes (20 ms), only each identifier's newest frame, and
+every frame of a message without a cycle: a burst of old values helps nobody; nor do rounds that a stall ate whole. The
 rest is counted as superseded. The frames after a stall keep their own deadlines: no drift.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from dbc.contract import MessageSpec, contract
 from dbc.frame import BusName, Frame, LinkEvent, LinkState
-from hil.bench.node_process import ECU, NODE_PERIOD_NS, PLANT, Role
+from hil.bench.node_process import NODE_PERIOD_NS
+from hil.bench.replay_selection import Identity, ReplayError, Selection
 from hil.bus.bus import Bus
-from hil.errors import BrakebenchError
-from hil.log.frames import FrameFlag, FrameTable, Recording
 from hil.rt.clock import Clock
 from hil.rt.loop import GRID_NS
-
-ROLES: dict[str, Role | None] = {"all": None, "plant": PLANT, "ecu": ECU}
-"""What can be replayed, by name; None for everything."""
 
 LISTEN_NS = 250_000_000
 """How long the bus is listened to before the start: two cycles of the slowest message and more."""
@@ -36,136 +32,9 @@ STALL_NS = 2 * NODE_PERIOD_NS
 """Overdue by more than this, an older frame gives way to a newer one of the same identifier."""
 _LOOK_NS = 20_000_000  # how often the bus and the stop are looked at in a gap of the log
 _LEAD_NS = 1_000_000  # at least this between now and the first deadline
-_BUSES = tuple(BusName)
-
-
-class ReplayError(BrakebenchError):
-    """A log that cannot be replayed here."""
-
-
-class Identity(NamedTuple):
-    """One identifier on one bus, and what our DBC knows of it (empty strings where it knows nothing)."""
-
-    bus: BusName
-    can_id: int
-    extended: bool
-    message: str
-    sender: str
-    on_change: bool
-
-    def __str__(self) -> str:
-        of = f" ({self.message} of {self.sender})" if self.message else ""
-        return f"0x{self.can_id:X}{of} on the {self.bus} bus"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Selection:
-    """What of a log is to be sent.
-
-    Attributes
-    ----------
-    frames : the frames in order of their stamps.
-    time_ns : int64 (n,), their stamps counted from the first, ns.
-    identities : the identifiers that occur.
-    code : int32 (n,), which of ``identities`` each frame has.
-    phase_ns : where in the bench's cycle the first one leaves, ns.
-    left_out : frames of the log that are not sent, by reason.
-    """
-
-    frames: FrameTable
-    time_ns: npt.NDArray[np.int64]
-    identities: tuple[Identity, ...]
-    code: npt.NDArray[np.int32]
-    phase_ns: int
-    left_out: dict[str, int]
-
-
-def select(recording: Recording, role: str = "all", channel: str | None = None) -> Selection:
-    """Choose what of a log is to be sent.
-
-    Parameters
-    ----------
-    role : ``plant`` or ``ecu`` for what that side sends by our DBC, with the bench's stimulus for the *other* side,
-        which is the one that listens; ``all`` for every data frame.
-    channel : the log's channel that goes to the vehicle bus. By default the channels ``vehicle`` and ``bench`` of our
-        own recordings go to the buses of these names, and a log's only channel to the vehicle bus.
-
-    Raises
-    ------
-    ReplayError : no such channel, or nothing is left to be sent.
-    """
-    frames = recording.frames
-    bus_of = _buses(recording, channel)
-    bus = np.array([bus_of.get(name, -1) for name in frames.channels], np.int64)[frames.channel]
-    owner = ROLES[role]
-    left_out: dict[str, int] = {}
-    chosen = np.ones(len(frames), np.bool_)
-
-    def leave_out(reason: str, rows: npt.NDArray[np.bool_]) -> None:
-        count = int(np.count_nonzero(chosen & rows))
-        if count:
-            left_out[reason] = count
-            chosen[rows] = False
-
-    leave_out("of another channel", bus < 0)
-    leave_out("error or remote frames", frames.flags & int(FrameFlag.ERROR | FrameFlag.REMOTE) != 0)
-    leave_out("CAN FD frames", frames.flags & int(FrameFlag.FD) != 0)
-    key = bus << 30 | frames.extended.astype(np.int64) << 29 | frames.can_id
-    if owner is not None:
-        specs = {_BUSES.index(spec.bus) << 30 | spec.can_id: spec for spec in _replayed_by(owner)}
-        leave_out(f"not of the {role}", ~np.isin(key, list(specs)))
-        lengths = np.zeros(len(frames), np.int64)
-        for known, spec in specs.items():
-            lengths[key == known] = spec.length
-        leave_out("of a length that is not the DBC's", frames.length != lengths)
-    if not chosen.any():
-        why = ", ".join(f"{count} {reason}" for reason, count in left_out.items()) or "it is empty"
-        raise ReplayError(
-            f"{recording.path}: nothing to send as {role} ({why}); its channels: "
-            f"{', '.join(frames.channels) or 'none'}; choose with --channel and --role"
-        )
-    rows = np.flatnonzero(chosen)
-    rows = rows[np.argsort(frames.time_ns[rows], kind="stable")]
-    keys, code = np.unique(key[rows], return_inverse=True)
-    table = frames.take(rows)
-    time_ns = table.time_ns - table.time_ns[0]
-    identities = tuple(map(_identity, keys.tolist()))
-    phase_ns = owner.phase_ns if owner else 0
-    return Selection(table, time_ns, identities, code.astype(np.int32), phase_ns, left_out)
-
-
-def _buses(recording: Recording, channel: str | None) -> dict[str, int]:
-    """Index of the bus that each of the log's channels goes to."""
-    names = recording.frames.channels
-    if channel is not None:
-        if channel not in names:
-            known = ", ".join(names) or "none"
-            raise ReplayError(f"{recording.path}: has no channel {channel!r}; its channels: {known}")
-        return {channel: _BUSES.index(BusName.VEHICLE)}
-    ours = {str(bus): index for index, bus in enumerate(_BUSES) if str(bus) in names}
-    if ours or not names:
-        return ours
-    if len(names) > 1:
-        raise ReplayError(
-            f"{recording.path}: expected channels vehicle and bench, or one alone, got {', '.join(names)}; "
-            "say with --channel which one goes to the vehicle bus"
-        )
-    return {names[0]: _BUSES.index(BusName.VEHICLE)}
-
-
-def _replayed_by(role: Role) -> list[MessageSpec]:
-    """What a role sends, and the stimulus that the other role, being live, reads."""
-    listener = "ECU" if role is PLANT else "PLANT"
-    stimulus = [spec for spec in contract(BusName.BENCH).sent_by("BENCH") if listener in spec.receivers]
-    return [spec for bus in _BUSES for spec in contract(bus).sent_by(*role.senders)] + stimulus
-
-
-def _identity(key: int) -> Identity:
-    bus, extended, can_id = _BUSES[key >> 30], bool(key >> 29 & 1), key & 0x1FFFFFFF
-    spec = None if extended else contract(bus).by_id.get(can_id)
-    if spec is None:
-        return Identity(bus, can_id, extended, "", "", False)
-    return Identity(bus, can_id, extended, spec.name, spec.sender, spec.cycle_ns == 0)
+_WAIT_LOOK_NS = 1_000_000  # how often the bus is looked at for the frame that is waited for
+AFTER_CUE_NS = 2 * _WAIT_LOOK_NS
+"""From the frame that is waited for to the first one sent: one look at the bus, and the time to act on it."""
 
 
 class Replay:
@@ -174,10 +43,12 @@ class Replay:
     Parameters
     ----------
     selection : what to send.
-    buses : the buses that its identities name, open.
+    buses : the buses that its identities name, open; frames for any but ``bench`` go as those of the vehicle bus.
     clock : where time comes from.
     speed : 2 sends twice as fast.
     stopped : tells whether somebody asked to stop.
+    loop : begin again at the end, until told to stop.
+    wait_for : identifier of the frame, on any of the buses, with which the replay starts.
 
     Attributes
     ----------
@@ -186,19 +57,24 @@ class Replay:
     refused : frames not sent because their sender was found live, by identity.
     intruders : the identities by which live senders were found.
     link_events : what the buses reported of themselves: their state and how often.
-    lateness_ns : int64, of every sent frame in order.
+    dealt : frames sent, superseded or refused.
+    rounds : rounds of the selection that were ended.
+    lateness_ns : int64, of every sent frame, of a loop those of the last round; in order unless looped.
+    most_late_ns : greatest lateness of all.
     duration_ns : from sending the first frame to sending the last.
     """
 
     def __init__(
         self,
         selection: Selection,
-        buses: Mapping[BusName, Bus],
+        buses: Mapping[str, Bus],
         clock: Clock,
         speed: float = 1.0,
         stopped: Callable[[], bool] = lambda: False,
+        loop: bool = False,
+        wait_for: int | None = None,
     ) -> None:
-        self.sent = self.late = self.superseded = 0
+        self.sent = self.late = self.superseded = self.rounds = self.most_late_ns = 0
         self.refused: dict[Identity, int] = {}
         self.intruders: list[Identity] = []
         self.link_events: dict[LinkState, int] = {}
@@ -208,13 +84,24 @@ class Replay:
         self._clock = clock
         self._speed = speed
         self._stopped = stopped
+        self._loop = loop
+        self._cue = wait_for
+        self._cue_ns: int | None = None
         self._codes = {(i.bus, i.can_id, i.extended): code for code, i in enumerate(selection.identities)}
         self._blocked: set[int] = set()
         self._lateness_ns = np.zeros(len(selection.time_ns), np.int64)
+        cued = [i for i in selection.identities if i.can_id == wait_for]
+        if cued:
+            raise ReplayError(f"waits for {cued[0]}, which the replay itself would send; replay another role")
+
+    @property
+    def dealt(self) -> int:
+        """Frames sent, superseded or refused."""
+        return self.sent + self.superseded + sum(self.refused.values())
 
     @property
     def lateness_ns(self) -> npt.NDArray[np.int64]:
-        """Lateness of every frame sent, ns."""
+        """Lateness of the frames sent, ns; of a loop that of the last ones, as many as a round has."""
         return self._lateness_ns[: self.sent]
 
     def listen(self) -> None:
@@ -228,6 +115,9 @@ class Replay:
         while self._clock.now_ns() < end_ns and not self._stopped():
             self._clock.sleep_until(min(end_ns, self._clock.now_ns() + _LOOK_NS))
             self._heed()
+        self._refuse_to_start()
+
+    def _refuse_to_start(self) -> None:
         if self.intruders:
             first = self.intruders[0]
             raise ReplayError(
@@ -235,13 +125,37 @@ class Replay:
                 "stop that one, or replay another role"
             )
 
+    def wait(self) -> None:
+        """Wait for the frame that starts the replay, where one was named; or until told to stop.
+
+        Raises
+        ------
+        ReplayError : as of `listen`.
+        """
+        self._cue_ns = None
+        while self._cue is not None and self._cue_ns is None and not self._stopped():
+            self._clock.sleep_until(self._clock.now_ns() + _WAIT_LOOK_NS)
+            self._heed()
+            self._refuse_to_start()
+
     def run(self) -> None:
         """Send everything; ends early when told to stop, or when nothing is left that we may send."""
         clock = self._clock
         offset_ns = np.rint(self._selection.time_ns / self._speed).astype(np.int64)
+        round_ns = (int(offset_ns[-1]) // NODE_PERIOD_NS + 1) * NODE_PERIOD_NS
         start_ns = -(-(clock.now_ns() + _LEAD_NS) // GRID_NS) * GRID_NS + self._selection.phase_ns
+        if self._cue_ns is not None:
+            start_ns = max(self._cue_ns + AFTER_CUE_NS, clock.now_ns())
         row, first_ns = 0, -1
-        while row < len(offset_ns) and not self._stopped():
+        while not self._stopped():
+            if row == len(offset_ns):
+                self.rounds += 1
+                if not self._loop:
+                    break
+                row, start_ns = 0, start_ns + round_ns
+                missed = max(0, clock.now_ns() - start_ns) // round_ns  # whole rounds, in a stall
+                self.superseded += missed * len(offset_ns)
+                start_ns += missed * round_ns
             if len(self._blocked) == len(self._codes):
                 self._refuse_rest(row)
                 break
@@ -265,12 +179,14 @@ class Replay:
 
     def _heed(self) -> None:
         """Take what arrived: whoever sends an identifier of ours has that node's identifiers from now on."""
-        for bus in self._buses.values():
+        for name, bus in self._buses.items():
             for item in bus.receive(0.0):
                 if isinstance(item, LinkEvent):
                     self.link_events[item.state] = self.link_events.get(item.state, 0) + item.number
                     continue
-                code = self._codes.get((item.bus, item.can_id, item.extended))
+                if item.can_id == self._cue and self._cue_ns is None:
+                    self._cue_ns = item.time_ns or self._clock.now_ns()
+                code = self._codes.get((name, item.can_id, item.extended))
                 if code is None or code in self._blocked:
                     continue
                 found = self._selection.identities[code]
@@ -284,7 +200,7 @@ class Replay:
         identities = self._selection.identities
         codes = self._selection.code[start : start + len(overdue_ns)].tolist()
         keep = self._keep(codes, overdue_ns)
-        out: dict[BusName, list[Frame]] = {bus: [] for bus in self._buses}
+        out: dict[str, list[Frame]] = {bus: [] for bus in self._buses}
         for i, (code, lateness_ns) in enumerate(zip(codes, overdue_ns.tolist(), strict=True)):
             identity = identities[code]
             if code in self._blocked:
@@ -293,7 +209,8 @@ class Replay:
                 self.superseded += 1
             else:
                 out[identity.bus].append(self._frame(start + i, identity))
-                self._lateness_ns[self.sent] = lateness_ns
+                self._lateness_ns[self.sent % len(self._lateness_ns)] = lateness_ns
+                self.most_late_ns = max(self.most_late_ns, lateness_ns)
                 self.sent += 1
                 self.late += lateness_ns > LATE_NS
         for bus, frames in out.items():
@@ -315,4 +232,5 @@ class Replay:
     def _frame(self, row: int, identity: Identity) -> Frame:
         frames = self._selection.frames
         data = frames.data[row, : frames.length[row]].tobytes()
-        return Frame(identity.bus, identity.can_id, data, 0, identity.extended)
+        bus = BusName.BENCH if identity.bus == BusName.BENCH else BusName.VEHICLE
+        return Frame(bus, identity.can_id, data, 0, identity.extended)

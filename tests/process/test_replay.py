@@ -124,3 +124,24 @@ def test_ctrl_c_ends_it_with_a_result(start, channel, log):
     assert result["stopped"]
     assert 0 < result["sent"] < result["selected"]
     assert "Traceback" not in err
+
+
+def test_nodes_of_a_map_start_at_a_frame_and_go_round_until_ctrl_c(start, channel, log):
+    other = f"{channel}-other"
+    with open_bus(other, BusName.VEHICLE) as bus:
+        process = start(
+            *("replay", str(log), "--role", "DRIVER", "--map", f"vehicle={other}", "--bus", channel),
+            *("--from", "0.5", "--to", "0.6", "--loop", "--wait-for", "BRAKE_STATUS", "--json"),
+        )
+        wait_until(lambda: "waiting for 0x130" in process.stderr.readline(), "that it waits")
+        assert not bus.receive(0.1)
+        bus.send([Frame(BusName.VEHICLE, spec_of(BrakeStatus).can_id, bytes(8))])
+        seen = []
+        wait_until(lambda: seen.extend(bus.receive(0.1)) or len(seen) > 60, "three rounds")
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=RUN_LIMIT_S)
+    result = json.loads(out)
+    assert process.returncode in (0, 4), err
+    assert {frame.can_id for frame in seen} == {0xA0, 0xE0}
+    assert (result["bus"], result["stopped"], result["selected"]) == (other, False, 22)
+    assert result["rounds"] >= 2

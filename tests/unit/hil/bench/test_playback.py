@@ -8,10 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dbc.contract import contract
+from dbc.database import parse_database
 from dbc.frame import BusName, Frame, LinkEvent, LinkState
-from hil.bench.playback import LISTEN_NS, STALL_NS, Replay, ReplayError, select
+from hil.bench.playback import AFTER_CUE_NS, LISTEN_NS, STALL_NS, Replay
+from hil.bench.replay_selection import ReplayError, select
 from hil.log.builder import FrameBuilder
+from hil.log.choice import Choice, Moment
 from hil.log.frames import FrameFlag
+from hil.log.signals.databases import Databases
 from hil.rt.clock import VirtualClock
 from hil.rt.loop import GRID_NS
 
@@ -29,6 +33,9 @@ def log(*rows, channel="vehicle"):
         data = rest[1] if len(rest) > 1 else bytes(8)
         assert builder.add(T0 + time_ns, name, can_id, can_id > 0x7FF, data, FrameFlag(0), 0)
     return builder.recording(Path("some.log"), "candump")
+
+
+SELECT = {"channel_map", "databases", "choice", "max_gap_ns"}
 
 
 class FakeBus:
@@ -64,8 +71,9 @@ class StallingClock(VirtualClock):
 
 def replay(recording, role="all", speed=1.0, clock=None, incoming=(), **options):
     clock = clock or VirtualClock()
-    chosen = select(recording, role, options.pop("channel", None))
-    buses = {bus: FakeBus(clock, [p for p in incoming if p[1].bus is bus]) for bus in BusName}
+    chosen = select(recording, role, **{k: options.pop(k) for k in SELECT & set(options)})
+    named = {*BusName, *(i.bus for i in chosen.identities)}
+    buses = {bus: FakeBus(clock, [p for p in incoming if p[1].bus == bus]) for bus in named}
     return Replay(chosen, buses, clock, speed, **options), buses
 
 
@@ -135,11 +143,11 @@ def test_channels_of_foreign_logs():
         (BusName.VEHICLE, 0x18FEF100, bytes(8), True),
     ]
     two = log((0, 0x123, "can0"), (1, 0x124, "can1"))
-    with pytest.raises(ReplayError, match="can0, can1; say with --channel"):
+    with pytest.raises(ReplayError, match="can0, can1; say with --map which one goes where: --map can0=vehicle"):
         select(two)
-    assert [i.can_id for i in select(two, channel="can1").identities] == [0x124]
+    assert [i.can_id for i in select(two, channel_map={"can1": "vehicle"}).identities] == [0x124]
     with pytest.raises(ReplayError, match="no channel 'can2'; its channels: can0, can1"):
-        select(two, channel="can2")
+        select(two, channel_map={"can2": "vehicle"})
     with pytest.raises(ReplayError, match=r"nothing to send as plant \(1 .*not of the plant\); its channels: can0"):
         select(log((0, 0x123, "can0")), "plant")
     with pytest.raises(ReplayError, match="nothing to send as all"):
@@ -278,3 +286,112 @@ def test_stamps_that_run_backwards_are_put_in_order():
     assert chosen.time_ns.tolist() == [0, 10, 10]
     assert [chosen.identities[code].can_id for code in chosen.code] == [0x2, 0x1, 0x3]
     assert chosen.time_ns.dtype == np.int64
+
+
+FOREIGN = parse_database(
+    """BU_: ENGINE GEARBOX
+BO_ 256 RPM: 8 ENGINE
+ SG_ RPM : 0|16@1+ (1,0) [0|0] "" GEARBOX
+BO_ 512 GEAR: 2 GEARBOX
+ SG_ GEAR : 0|8@1+ (1,0) [0|0] "" ENGINE
+"""
+)
+
+
+@pytest.mark.parametrize(
+    ("role", "ids"), [("DRIVER", [PEDAL]), ("EHB,DRIVER", [PEDAL, 0xD0]), ("ECU", [DEMAND]), ("EHB", [0xD0])]
+)
+def test_nodes_of_our_database_are_roles(role, ids):
+    rows = [(i, can_id) for i, can_id in enumerate((PEDAL, DEMAND, 0xD0, 0x700))]
+    assert [i.can_id for i in select(log(*rows), role).identities] == sorted(ids)
+
+
+def test_nodes_of_a_foreign_database_are_roles():
+    recording = log((0, 0x100, "can0"), (1, 0x200, "can0", b"ab"), (2, 0x200, "can0", b"abc"), (3, 0x300, "can0"))
+    chosen = select(recording, "GEARBOX", databases=Databases(FOREIGN))
+    assert [str(i) for i in chosen.identities] == ["0x200 (GEAR of GEARBOX) on the vehicle bus"]
+    assert chosen.left_out == {"not of GEARBOX": 2, "of a length that is not the DBC's": 1}
+    assert not chosen.identities[0].on_change  # the database states no cycle time at all
+    with pytest.raises(ReplayError, match=r"no node NOBODY sends anything .*expected all, nodes of ENGINE, GEARBOX"):
+        select(recording, "GEARBOX,NOBODY", databases=Databases(FOREIGN))
+    with pytest.raises(ReplayError, match=r"no node NOBODY .* expected all, plant, ecu, or nodes of .*DRIVER"):
+        select(recording, "NOBODY")
+
+
+def test_channels_go_where_the_map_says_and_are_kept_apart():
+    recording = log((0, 0x100, "can0"), (1, 0x100, "can1"), (2, 0x100, "can2"), (10 * MS, 0x100, "can1"))
+    live = [(GRID_NS + 5 * MS, Frame("loopback:b", 0x100, bytes(8)))]  # on one of the two
+    run, buses = replay(recording, channel_map={"can0": "vehicle", "can1": "loopback:b"}, incoming=live)
+    run.run()
+    assert ids(buses) == [0x100]
+    assert ids(buses, "loopback:b") == [0x100]
+    assert [str(i) for i in run.intruders] == ["0x100 on loopback:b"]
+    assert [(i.bus, n) for i, n in run.refused.items()] == [("loopback:b", 1)]
+
+
+def test_a_span_of_the_log_begins_at_once():
+    recording = log(*((i * 10 * MS, PEDAL) for i in range(100)))
+    span = Choice(begin=Moment(200 * MS, True), end=Moment(250 * MS, True))
+    run, buses = replay(recording, choice=span)
+    run.run()
+    assert [t - GRID_NS for t, _ in buses[BusName.VEHICLE].sent] == [i * 10 * MS for i in range(6)]
+    assert select(recording, choice=span).left_out == {"outside --from and --to": 94}
+    with pytest.raises(ReplayError, match=r"nothing to send .*100 outside --from and --to"):
+        select(recording, choice=Choice(begin=Moment(5_000 * MS, True)))
+
+
+def test_long_pauses_are_shortened_and_short_ones_kept():
+    recording = log(*((t * MS, PEDAL) for t in (0, 10, 5_010, 5_020, 9_020)))
+    chosen = select(recording, max_gap_ns=100 * MS)
+    assert chosen.time_ns.tolist() == [t * MS for t in (0, 10, 110, 120, 220)]
+    assert (chosen.gaps, chosen.cut_ns) == (2, 8_800 * MS)
+
+
+def test_a_loop_goes_on_without_drift_at_its_place_between_the_ticks():
+    recording = log((0, PEDAL), (3 * MS, WHEEL), (20 * MS, PEDAL))
+    clock = VirtualClock()
+    run, buses = replay(recording, "plant", clock=clock, loop=True, stopped=lambda: clock.now_ns() > 2 * GRID_NS)
+    run.run()
+    times = [t - GRID_NS for t, _ in buses[BusName.VEHICLE].sent]
+    assert times == [k * 30 * MS + t for k in range(4) for t in (0, 3 * MS, 20 * MS)][: len(times)]
+    assert run.rounds == 3
+    assert len(run.lateness_ns) == 3  # bounded, however long it runs
+
+
+def test_rounds_that_a_stall_ate_are_not_caught_up():
+    clock = StallingClock(GRID_NS + 35 * MS, GRID_NS + 1_000 * MS)
+    run, buses = replay(log((0, PEDAL)), clock=clock, loop=True, stopped=lambda: clock.now_ns() >= GRID_NS + 1_030 * MS)
+    run.run()
+    times = [(t - GRID_NS) // MS for t, _ in buses[BusName.VEHICLE].sent]
+    assert times[:4] == [0, 10, 20, 30]
+    assert times[4:] in (
+        [1_000, 1_000, 1_010, 1_020, 1_030],
+        [1_000, 1_010, 1_020, 1_030],
+        [1_000, 1_000, 1_010, 1_020],
+    )
+    assert run.superseded >= 94
+
+
+@pytest.mark.parametrize("stamp_ns", [0, 700 * MS])
+def test_it_starts_at_the_frame_that_is_waited_for(stamp_ns):
+    clock = VirtualClock()
+    cues = [(at, Frame(BusName.BENCH, 0x55, b"", stamp_ns and at)) for at in (100 * MS, 700 * MS, 710 * MS)]
+    run, buses = replay(log((0, PEDAL), (0, TRUTH, "bench")), clock=clock, incoming=cues, wait_for=0x55)
+    run.listen()  # the one at 100 ms came before anybody waited
+    run.wait()
+    run.run()
+    assert [t for t, _ in buses[BusName.VEHICLE].sent] == [700 * MS + AFTER_CUE_NS]
+
+
+def test_what_the_replay_sends_is_not_waited_for():
+    with pytest.raises(ReplayError, match=r"waits for 0xA0 \(BRAKE_PEDAL of DRIVER\).*itself would send"):
+        replay(log((0, PEDAL)), wait_for=PEDAL)
+
+
+def test_somebody_who_comes_while_it_waits_keeps_it_from_starting():
+    live = [(500 * MS, Frame(BusName.VEHICLE, PEDAL, bytes(8)))]
+    run, buses = replay(log((0, PEDAL)), incoming=live, wait_for=0x55)
+    run.listen()
+    with pytest.raises(ReplayError, match="somebody already sends 0xA0"):
+        run.wait()
+    assert ids(buses) == []

@@ -56,7 +56,7 @@ def test_both_buses_in_order_of_time(tmp_path):
         ["(1.000005)", "vehicle", "0A0"],
         ["(1.000006)", "bench", "00012345"],
     ]
-    assert recorder.frames == 4
+    assert recorder.lines.frames == 4
 
 
 def test_nothing_is_overwritten(tmp_path):
@@ -107,5 +107,5 @@ def test_lost_frames_are_counted(tmp_path):
     recorder = Recorder(tmp_path / "a.log", [source], epoch_ns=0)
     source.items = [LinkEvent(BusName.BENCH, LinkState.RX_OVERFLOW, 5, 12)]
     recorder.flush()
-    assert recorder.lost == 12
+    assert recorder.lines.lost == 12
     recorder.close()

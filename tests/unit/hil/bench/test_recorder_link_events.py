@@ -91,7 +91,7 @@ def test_events_are_counted_one_by_one_and_lost_frames_once(recorder, bus):
         event(LinkState.RESTARTED),
     ]
     recorder.close()
-    assert recorder.lost == 500
+    assert recorder.lines.lost == 500
     signals = Signals(recorder.path)
     states = measure(signals).link_states
     assert states == {"no_ack": 40, "bus_error": 3, "rx_overflow": 1, "disconnected": 1, "restarted": 1}
