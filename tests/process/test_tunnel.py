@@ -1,0 +1,209 @@
+"""Two loopbacks as if on two machines: a tunnel over TCP on 127.0.0.1, both ends as processes."""
+
+import re
+import shlex
+import signal
+import socket
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from processes import result_of, wait_until
+from started import COMMAND, Started
+
+from dbc.frame import BusName, Frame, LinkEvent, LinkState
+from dbc.messages import EhbState
+from hil.bench.result import Signals
+from hil.bench.tunnel import TunnelError, serve_tunnel
+from hil.bench.tunnel_line import PlaceError, parse_place
+from hil.bus.channel import bench_channel
+from hil.bus.open import open_bus
+from hil.bus.tunnel_wire import HELLO
+
+VEHICLE, BENCH = BusName.VEHICLE, BusName.BENCH
+SAFE_FRAMES = 6  # of 10 ms: 50 ms, and one that may cross
+
+
+@pytest.fixture
+def tunnel(tmp_path):
+    """Start ends of a tunnel; they are killed at the end."""
+    import subprocess
+
+    started = []
+
+    def begin(bus, *place):
+        words = tmp_path / f"tunnel-{len(started)}.txt"
+        with words.open("wb") as out:
+            process = subprocess.Popen([*COMMAND, "tunnel", "--bus", bus, *place], stdout=out, stderr=out)
+        started.append(Started(process, words))
+        return started[-1]
+
+    yield begin
+    for one in started:
+        one.process.kill()
+        one.process.wait()
+
+
+@pytest.fixture
+def ends(tunnel, channel):
+    """Both ends, connected: listener, seeker, the two channels and the port."""
+    here, there = f"{channel}-a", f"{channel}-b"
+    listener = tunnel(here, "--listen", "0")
+    port = re.search(r"listens on 127\.0\.0\.1:(\d+)$", listener.says("listens on"))[1]
+    seeker = tunnel(there, "--connect", f"127.0.0.1:{port}")
+    listener.says("connected with 127.0.0.1:")
+    seeker.says(f"connected with 127.0.0.1:{port}")
+    return listener, seeker, here, there, port
+
+
+def heard(bus, wanted, what, told=None):
+    """Receive until ``wanted`` is true of an item; all items until then."""
+    found = [] if told is None else told
+
+    def one():
+        found.extend(bus.receive(0.05))
+        return any(wanted(item) for item in found)
+
+    wait_until(one, what, 60)
+    return found
+
+
+def is_event(state):
+    return lambda item: isinstance(item, LinkEvent) and item.state is state
+
+
+@pytest.mark.slow
+def test_both_buses_pass_old_frames_do_not_and_a_lost_end_is_told_and_found_again(ends, tunnel, brakebench):
+    listener, seeker, here, there, port = ends
+    with open_bus(here, VEHICLE) as a, open_bus(there, VEHICLE) as b, open_bus(bench_channel(there), BENCH) as b_bench:
+        with open_bus(bench_channel(here), BENCH) as a_bench:
+            a_bench.send([Frame(BENCH, 0x1ABCDEF0, b"\x01", extended=True)])
+            (frame,) = heard(b_bench, bool, "a bench frame")
+            assert frame[:3] == (BENCH, 0x1ABCDEF0, b"\x01")
+        b.send([Frame(VEHICLE, 0x123, b"\x02\x03")])
+        (frame,) = heard(a, bool, "a vehicle frame")
+        assert frame[:3] == (VEHICLE, 0x123, b"\x02\x03")
+
+        # one end stopped: what is sent meanwhile is old when it goes on
+        seeker.process.send_signal(signal.SIGSTOP)
+        for number in range(20):
+            a.send([Frame(VEHICLE, number, b"")])
+            b.send([Frame(VEHICLE, number, b"")])
+        time.sleep(0.3)
+        seeker.process.send_signal(signal.SIGCONT)
+        for bus in (b, a):
+            items = heard(bus, is_event(LinkState.RX_OVERFLOW), "that frames were lost")
+            assert sum(item.number for item in items if is_event(LinkState.RX_OVERFLOW)(item)) == 20
+            assert not [item for item in items if isinstance(item, Frame)]
+        seeker.says("20 before sending, 20 on arrival")
+        listener.says("40 at the other end")
+
+        # who else comes is turned away, and one loopback has one end
+        with socket.create_connection(("127.0.0.1", int(port))) as other:
+            assert other.recv(1) == b""
+        listener.says("turned away")
+        assert "has an end of a tunnel there" in brakebench("tunnel", "--bus", here, "--listen", "0", check=2).stderr
+
+        # one end killed: told at the other; somebody who garbles meanwhile: words; a new end: as before
+        seeker.process.kill()
+        heard(a, is_event(LinkState.DISCONNECTED), "the lost link")
+        for garbage, words in (
+            (b"GET / HTTP/1.1\r\n", "expected a tunnel"),
+            (HELLO + b"\xff" * 99, "expected a packet"),
+        ):
+            with socket.create_connection(("127.0.0.1", int(port))) as other:
+                other.sendall(garbage)
+                listener.says(words)
+        seeker = tunnel(there, "--connect", f"localhost:{port}")
+        seeker.says("connected with")
+        heard(a, is_event(LinkState.RESTARTED), "the link that is back")
+        a.send([Frame(VEHICLE, 0x42, b"")])
+        heard(b, lambda item: isinstance(item, Frame) and item.can_id == 0x42, "a frame after all that")
+
+        # the listening end ends well: the other is told, and seeks on
+        listener.process.send_signal(signal.SIGINT)
+        listener.process.wait(60)
+        assert listener.process.returncode == 0
+        heard(b, is_event(LinkState.DISCONNECTED), "the lost link")
+        seeker.says("Connection refused; tried again every 0.5 s")
+        assert "dropped for their age" in listener.words.read_text().splitlines()[-1]
+
+
+BLENDED = """title = "the motors brake too, for long: it goes downhill"
+[start]
+speed_mps = 20.0
+[driver]
+pedal = [[0.2, 0.0], [0.4, 0.6]]
+[[road]]
+start_m = -100.0
+grade = -0.25
+[end]
+duration_s = 12.0
+[ecu.blend]
+blending_factor = 0.7
+"""
+
+
+@pytest.mark.slow
+def test_with_the_ecu_beyond_a_stalled_tunnel_both_sides_are_safe_meanwhile_and_go_on_after(
+    ends, start, tmp_path, capsys
+):
+    _, seeker, here, there, _ = ends
+    (tmp_path / "blended.toml").write_text(BLENDED)
+    ecu = start("ecu", "blended.toml", "--bus", there)
+    wait_until(lambda: "every 10 ms" in ecu.stderr.readline(), "the ECU")
+    record = start("record", "there.log", "--bus", there)
+    bench = start("run", "blended.toml", "--without", "ecu", "--json", "--bus", here, "--out", "out")
+    log = tmp_path / "out" / "recording.log"
+
+    def braking():
+        assert bench.poll() is None, bench.communicate()
+        if not log.exists() or log.read_bytes().count(b" 020#") < 150:
+            return False
+        torque = Signals(log).get("MOTOR_DEMAND_FRONT.TORQUE_DEMAND_FL")[1]
+        return len(torque) > 20 and np.all(torque[-20:] < -100.0)
+
+    wait_until(braking, "the motors to brake")
+    seeker.process.send_signal(signal.SIGSTOP)
+    time.sleep(0.4)
+    seeker.process.send_signal(signal.SIGCONT)
+    result = result_of(bench, (0, 1, 4))
+    record.send_signal(signal.SIGINT)
+    record.communicate(timeout=60)
+    assert result["link_states"]["rx_overflow"] >= 1
+    assert set(result["link_states"]) <= {"rx_overflow", "tx_overflow"}
+
+    def silence(signals, spoken, watched):
+        said_s = np.sort(signals.decoded.series(f"{spoken}.ALIVE_COUNTER")[0]) - signals.start_s
+        t_s, values = signals.get(watched)
+        longest = int(np.argmax(np.diff(said_s)))
+        return values[np.searchsorted(t_s, said_s[longest]) : np.searchsorted(t_s, said_s[longest + 1])], values[-20:]
+
+    states, _ = silence(Signals(log), "EHB_DEMAND_FRONT", "EHB_PRESSURE_FRONT.EHB_STATE_FRONT")
+    assert len(states) > 20
+    assert np.all(states[SAFE_FRAMES:] == EhbState.OWN_PEDAL_MAP)
+    torque, _ = silence(Signals(tmp_path / "there.log"), "MOTOR_STATUS_FRONT", "MOTOR_DEMAND_FRONT.TORQUE_DEMAND_FL")
+    assert len(torque) > 20
+    assert np.all(torque[SAFE_FRAMES:] == 0.0)
+    with capsys.disabled():
+        print(
+            f"\ntunnel stalled: own map after {int(np.argmax(states == EhbState.OWN_PEDAL_MAP))} brake frames, "
+            f"torque 0 after {int(np.argmax(torque == 0.0))} demands; {seeker.words.read_text().splitlines()[-1]}"
+        )
+
+
+@pytest.mark.parametrize("place", ["7400", "host:", ":x", "host:70000", "host:²"])
+def test_what_is_no_place_is_said(place):
+    with pytest.raises(PlaceError, match="expected HOST:PORT, such as 127.0.0.1:7400"):
+        parse_place(place)
+
+
+def test_a_place_may_leave_out_the_own_host_only():
+    assert parse_place("7400", "127.0.0.1") == ("127.0.0.1", 7400)
+    assert parse_place("[::1]:7400") == ("::1", 7400)
+
+
+def test_a_tunnel_joins_loopbacks_only():
+    with pytest.raises(TunnelError, match="expected a loopback"):
+        serve_tunnel("socketcan:vcan0", ("127.0.0.1", 0), listen=True)
