@@ -50,6 +50,7 @@ class Tunnel:
         self._say = say
         self._connection: Connection | None = None
         self._told = False  # whether the buses know that there is a connection
+        self._ended = ""  # why the last connection did
         self._said = 0
         self._said_ns = 0
         self._round_trip_ns = 0
@@ -104,7 +105,10 @@ class Tunnel:
         connection, self._connection = self._connection, None
         assert connection is not None
         connection.socket.close()
-        self._say(f"tunnel: connection with {connection.who} ended: {why}")
+        # behind `ssh -L` every attempt connects, and ends at once as long as the other end is not there: said once
+        if self._told or why != self._ended:
+            self._say(f"tunnel: connection with {connection.who} ended: {why}")
+        self._ended = why
         if self._told:
             self._told = False
             self._events(LinkState.DISCONNECTED, "tunnel lost")

@@ -101,6 +101,18 @@ def test_both_buses_pass_old_frames_do_not_and_a_lost_end_is_told_and_found_agai
         seeker.says("20 before sending, 20 on arrival")
         listener.says("40 at the other end")
 
+        # stopped for longer: the other end gives up, what was on its way is old, and both find each other again
+        seeker.process.send_signal(signal.SIGSTOP)
+        a.send([Frame(VEHICLE, 0x55, b"")])
+        heard(a, is_event(LinkState.DISCONNECTED), "the end that gives up")
+        seeker.process.send_signal(signal.SIGCONT)
+        items = heard(b, is_event(LinkState.RESTARTED), "the link that is back")
+        assert [item.state for item in items if item.state is not LinkState.RX_OVERFLOW] == [
+            LinkState.DISCONNECTED,
+            LinkState.RESTARTED,
+        ]
+        heard(a, is_event(LinkState.RESTARTED), "the link that is back")
+
         # who else comes is turned away, and one loopback has one end
         with socket.create_connection(("127.0.0.1", int(port))) as other:
             assert other.recv(1) == b""
@@ -117,6 +129,8 @@ def test_both_buses_pass_old_frames_do_not_and_a_lost_end_is_told_and_found_agai
             with socket.create_connection(("127.0.0.1", int(port))) as other:
                 other.sendall(garbage)
                 listener.says(words)
+        with socket.create_connection(("127.0.0.1", int(port))):
+            listener.says("ended: nothing heard for 1 s")
         seeker = tunnel(there, "--connect", f"localhost:{port}")
         seeker.says("connected with")
         heard(a, is_event(LinkState.RESTARTED), "the link that is back")
