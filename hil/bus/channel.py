@@ -134,6 +134,22 @@ def claim_adapter(spec: BusSpec) -> socket.socket:
     return held
 
 
+def claim_tunnel(spec: BusSpec) -> socket.socket:
+    """Take a loopback for one end of a tunnel, until closed: with two, frames could go round for ever.
+
+    Raises
+    ------
+    BusError : another process has an end there; it says which.
+    """
+    held = _bind(f"tunnel\n{base_directory()}\n{spec.name}")
+    if isinstance(held, str):
+        raise BusError(
+            f"bus {spec.name}: {held} has an end of a tunnel there, and with two frames could go round for ever; "
+            "stop that one, or take another loopback"
+        )
+    return held
+
+
 def _hold(spec: str) -> socket.socket | str:
     """Bind the channel's claim, or return who has it."""
     parsed = parse_spec(spec)

@@ -23,6 +23,7 @@ COMMANDS = (
     "gateway",
     "restbus",
     "share",
+    "tunnel",
     "record",
     "inject",
     "diag",
