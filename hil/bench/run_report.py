@@ -6,8 +6,11 @@ from enum import IntEnum
 import numpy as np
 
 from dbc.bench_messages import ManoeuvreState
+from dbc.frame import BusName
 from dbc.messages import BrakeMode, EhbState, Fault, MotorState
 from hil.bench.result import Floats, RunResult, Signals, link_events
+from hil.bench.wire_timing import OWN_PAIRS, Spread, TimingError, cyclic_messages, response_of
+from hil.log.signals.databases import Databases
 from hil.report.report import Event, Lane, Number, Panel, Report, Section, Severity, Span, Style, Trace, Verdict
 from hil.report.units import BAR, DEG_C, KJ, KMH, PERCENT
 
@@ -27,7 +30,7 @@ def build_report(
 ) -> Report:
     """Put a run into a report: numbers, linked time series, timeline, and what was run."""
     section = Section("The stop", panels=_panels(signals), timeline=_timeline(signals))
-    return Report(title, verdict, reason, _numbers(result), (section,), provenance)
+    return Report(title, verdict, reason, (*_numbers(result), *_timing(signals)), (section,), provenance)
 
 
 def _numbers(result: RunResult) -> tuple[Number, ...]:
@@ -47,6 +50,28 @@ def _numbers(result: RunResult) -> tuple[Number, ...]:
         Number("Overruns", result.overruns, "", "ticks skipped by ECU and plant"),
         Number("Lateness p50 / p99 / max", f"{late.p50:.3f} / {late.p99:.3f} / {late.max:.3f}", "ms", "worse node"),
     )
+
+
+def _timing(signals: Signals) -> tuple[Number, ...]:
+    """What `brakebench latency` says of the recording: through the controller, and the least regular message."""
+    frames, databases = signals.decoded.recording.frames, Databases.own()
+    if not len(frames):
+        return ()
+    numbers = []
+    try:
+        age = response_of(frames, databases, *OWN_PAIRS[0]).age
+        numbers.append(Number("Wheel speed to demand p50 / p99 / max", _times(age), "ms", "age of the newest one"))
+    except TimingError:  # one of them never came
+        pass
+    cyclic = [one for one in cyclic_messages(frames, databases) if one.stated and one.channel == BusName.VEHICLE]
+    if cyclic:
+        worst = max(cyclic, key=lambda one: one.jitter.p99_ms or 0.0)
+        numbers.append(Number("Jitter p50 / p99 / max", _times(worst.jitter), "ms", f"of {worst.name}, the worst"))
+    return tuple(numbers)
+
+
+def _times(spread: Spread) -> str:
+    return " / ".join("none" if one is None else f"{one:.3f}" for one in (spread.p50_ms, spread.p99_ms, spread.max_ms))
 
 
 def _trace(

@@ -59,6 +59,24 @@ def reported(signals):
     return report, render_text(report) + render_html(report)
 
 
+def test_timing_on_the_wire_stands_in_the_report(run):
+    """A demand is based on wheel speeds of half a cycle before; one pedal frame is 3 ms late."""
+    frames, times, _ = run
+    late = [k for k, frame in enumerate(frames) if frame.can_id == spec_of(BrakePedal).can_id][50]
+    moved = [time_ns + (3 * MS if k == late else 0) for k, time_ns in enumerate(times)]
+    numbers = {}
+    for name, when in (("even", times), ("late", moved)):
+        order = sorted(range(len(frames)), key=when.__getitem__)
+        table = frame_table([frames[k] for k in order], [when[k] for k in order])
+        report, _ = reported(Signals(Recording(Path("a"), "test", table)))
+        numbers[name] = {one.label: one for one in report.numbers}
+    assert numbers["even"]["Wheel speed to demand p50 / p99 / max"].value == "5.000 / 5.000 / 5.000"
+    assert numbers["even"]["Jitter p50 / p99 / max"].value == "0.000 / 0.000 / 0.000"
+    jitter = numbers["late"]["Jitter p50 / p99 / max"]
+    assert jitter.value.endswith("/ 3.000")
+    assert "BRAKE_PEDAL" in jitter.note
+
+
 def test_a_reserved_value_with_a_wrong_check_value_is_counted_not_measured(run):
     odd = Frame(BusName.VEHICLE, 0x130, bytes.fromhex("0070000000000000"))
     signals = with_frames(run, (1005, odd))
