@@ -86,8 +86,6 @@ class Watch:
             ticks.begin()
         for intake in self._intakes.values():
             intake.begin()
-        for stalls in self._stalls.values():
-            stalls.clear()
         self._others.clear()
 
     def hear(self, now_ns: int, inbox: Sequence[Received]) -> None:
@@ -178,9 +176,9 @@ class Watch:
     def _gaps(self) -> Iterator[Finding]:
         """Silence that ended: of whole nodes, and of single messages while their node went on."""
         for node, stalls in self._stalls.items():
-            stalls = [stall for stall in stalls if not self._excuses(node)]
-            if stalls:
-                (a, b), more = stalls[0], f", {len(stalls)} times in all" if len(stalls) > 1 else ""
+            judged = [stall for stall in stalls if stall[1] > (self._start_ns or 0) and not self._excuses(node)]
+            if judged:
+                (a, b), more = judged[0], f", {len(judged)} times in all" if len(judged) > 1 else ""
                 yield Finding(Verdict.INCONCLUSIVE, f"the {node} was silent from {self._s(a)} to {self._s(b)}{more}")
         for track in self._judged():
             stalls = self._stalls[track.node]

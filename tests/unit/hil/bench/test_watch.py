@@ -73,6 +73,12 @@ def test_a_node_that_falls_silent_for_good_breaks_the_run_and_is_named_with_the_
     assert said == ["watch: the ECU is silent since 0.990 s"]
 
 
+@pytest.mark.parametrize("until_ms", [-10, -20, -40])
+def test_a_stall_that_ended_before_the_manoeuvre_blames_no_message_for_its_gap(heard, until_ms):
+    """A slow message is back only after the manoeuvre began: its gap is the node's, and over."""
+    assert findings(heard, lambda t, f: [] if of_ecu(f) and until_ms - 450 <= t <= until_ms else [f]) == []
+
+
 def test_one_message_that_stops_for_good_breaks_the_run(heard):
     (found, *others) = findings(heard, lambda t, f: [] if is_a(f, EhbDemandFront) and t >= 1000 else [f])
     assert found.verdict is Verdict.BROKEN
