@@ -15,7 +15,10 @@ def answered(car, seed, hidden, folder):
     return explain([folder], folder / "vehicle.toml").json
 
 
-@pytest.mark.parametrize("index", range(len(CARS)), ids=list(CARS))
+@pytest.mark.parametrize(
+    "index",
+    [pytest.param(k, id=name, marks=[pytest.mark.long] * (name == "hydraulic_saloon")) for k, name in enumerate(CARS)],
+)
 def test_nothing_hidden_is_no_cause(index, tmp_path):
     case = draw("strangers", index, SEED)
     answer = answered(case.car, case.seed, None, tmp_path / "logs")

@@ -20,7 +20,7 @@ def test_drives_with_nothing_hidden_are_spread_over_the_cars() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("index", range(len(CARS)))
+@pytest.mark.parametrize("index", [0, *(pytest.param(k, marks=pytest.mark.long) for k in range(1, len(CARS)))])
 def test_a_single_cause_shows_fifteen_times_the_noise(index) -> None:
     case = draw("strangers_single", index, 9)
     assert case.reached
