@@ -45,6 +45,8 @@ def until_normal(bus: can.BusABC) -> None:
 @contextmanager
 def plugged_in(bus: can.BusABC, **params):
     """udsoncan's client over can-isotp on a bus; a second reader takes the periodic frames."""
+    # nothing else: a slow machine's reader falls behind a whole bus, and the kernel drops what it does not take
+    bus.set_filters([{"can_id": one, "can_mask": 0x7FF} for one in (RESPONSE, PERIODIC)])
     address = isotp.Address(isotp.AddressingMode.Normal_11bits, txid=REQUEST, rxid=RESPONSE)
     notifier = can.Notifier(bus, [], timeout=0.05)
     stack = isotp.NotifierBasedCanStack(
