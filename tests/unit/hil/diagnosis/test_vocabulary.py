@@ -17,8 +17,10 @@ RETIRED = re.compile(
 )
 VERDICT = "cannot_tell_apart"
 """A value in the JSON, which stays."""
-EXCEPTIONS: dict[str, tuple[str, ...]] = {}
-"""File, relative to the room: phrases in which a word has another meaning."""
+EXCEPTIONS: dict[str, tuple[str, ...]] = {
+    "result/goodness_of_fit.py": ("error_as_told", "as told or as fitted", "told = squares", "square(told)"),
+}
+"""File, relative to the room: phrases in which a word has another meaning, or is a key of the JSON."""
 
 
 def _phrases(text: str) -> Iterator[tuple[int, str]]:

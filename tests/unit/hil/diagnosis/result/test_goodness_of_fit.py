@@ -57,17 +57,17 @@ def _rolls_on(diagnosis, model):
 
 
 def test_brakes_that_do_something_else_are_no_car_of_ours(diagnosis):
-    final, stated = (_rolls_on(diagnosis, one) for one in (diagnosis.final, diagnosis.nominal))
-    speed = {one.track: one for one in goodness_of_fit(replace(diagnosis, final=final, nominal=stated))}["wheel.mean"]
+    final, told = (_rolls_on(diagnosis, one) for one in (diagnosis.final, diagnosis.nominal))
+    speed = {one.track: one for one in goodness_of_fit(replace(diagnosis, final=final, nominal=told))}["wheel.mean"]
     assert not speed.described
     assert speed.worst_s[1] > 10.0
     assert speed.whiteness_p < 1e-3
 
 
 def test_a_fit_that_drifts_is_no_other_car(diagnosis):
-    """What the vehicle as stated describes, the model describes."""
+    """What the vehicle as told describes, the model describes."""
     final = _rolls_on(diagnosis, diagnosis.final)
     speed = {one.track: one for one in goodness_of_fit(replace(diagnosis, final=final))}["wheel.mean"]
     assert speed.unexplained > 0.1
-    assert speed.error_as_stated < 0.1 * speed.error
+    assert speed.error_as_told < 0.1 * speed.error
     assert speed.described
