@@ -33,6 +33,8 @@ duration_s = 3600.0
 def until_normal(bus: can.BusABC) -> None:
     """Wait until the controller on a bus is in NORMAL."""
     spec = spec_of(BrakeStatus)
+    # a slow machine's reader falls behind a whole bus, and the kernel drops what it does not take
+    bus.set_filters([{"can_id": spec.can_id, "can_mask": 0x7FF}])
 
     def normal() -> bool:
         message = bus.recv(1.0)
@@ -45,7 +47,6 @@ def until_normal(bus: can.BusABC) -> None:
 @contextmanager
 def plugged_in(bus: can.BusABC, **params):
     """udsoncan's client over can-isotp on a bus; a second reader takes the periodic frames."""
-    # nothing else: a slow machine's reader falls behind a whole bus, and the kernel drops what it does not take
     bus.set_filters([{"can_id": one, "can_mask": 0x7FF} for one in (RESPONSE, PERIODIC)])
     address = isotp.Address(isotp.AddressingMode.Normal_11bits, txid=REQUEST, rxid=RESPONSE)
     notifier = can.Notifier(bus, [], timeout=0.05)
