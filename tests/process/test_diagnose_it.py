@@ -30,6 +30,12 @@ def masked(text):
     return [" ".join(NUMBER.sub("#", line).split()) for line in text.strip().splitlines()]
 
 
+def listed(shown, printed):
+    """Whether the codes that the page shows are among those printed: a busy machine has more, of lost messages."""
+    (_, *codes), lines = masked(shown), masked(printed)
+    return set(codes) <= set(lines) if codes else lines == masked(shown)
+
+
 @pytest.mark.slow
 def test_the_page_does_what_it_says(start, brakebench, channel, tmp_path):
     (tmp_path / "standing.toml").write_text(next(text for kind, text in BLOCKS if kind == "toml"))
@@ -43,7 +49,7 @@ def test_the_page_does_what_it_says(start, brakebench, channel, tmp_path):
     assert len(session) == 13
     for words, shown in session:
         if words[0] == "diag" and words[3] == "read-dtc":  # the fault is injected for half a second
-            wait_until(lambda w=words, s=shown: masked(brakebench(*w).stdout) == masked(s), shown, 20.0)
+            wait_until(lambda w=words, s=shown: listed(s, brakebench(*w).stdout), shown, 20.0)
             continue
         done = brakebench(*words)
         if words[0] == "diag" and shown:
