@@ -37,14 +37,15 @@ finds exactly this.
 | answers | 0x{RESPONSE:03X} |
 | periodic data, without ISO-TP | 0x{PERIODIC:03X} |
 
-- **Times**: P2 {P2_NS // 10**6} ms, P2* {P2_STAR_NS // 10**9} s, S3 {S3_NS // 10**9} s. An answer *ends* within P2, by
-  block size and STmin of the tester's last flow control (before the first one: the slowest there are); otherwise 0x78
-  comes first. A tester that becomes slower from one answer to the next may see one that ends later.
-- **Lengths**: requests up to {MOST_REQUEST} bytes, answers up to {MOST_ANSWER} (0x14 beyond); at most {BURST}
-  diagnostic frames a tick, for short queues of adapters. While an answer is on its way, other requests are not heard,
-  but for tester present without an answer.
-- **Functional requests** are answered but for the negative answers {_SILENT}. **Suppressed** positive answers: bit 0x80
-  of the sub-function.
+- **Times**: P2 {P2_NS // 10**6} ms, P2* {P2_STAR_NS // 10**9} s, S3 {S3_NS // 10**9} s. A complete answer ends within
+  P2. If it would take longer, response pending (0x78) is sent first. The controller estimates the duration from block
+  size and STmin of the tester's last flow control. Before the first flow control it assumes the slowest values. If a
+  tester becomes slower between two answers, one answer may end late.
+- **Lengths**: requests up to {MOST_REQUEST} bytes, answers up to {MOST_ANSWER} (longer: 0x14). At most {BURST}
+  diagnostic frames are sent per tick, for adapters with short queues. While an answer is being sent, other requests are
+  ignored, except tester present with a suppressed answer.
+- **Functional requests** are answered, but the negative answers {_SILENT} are not sent. **Suppressed** positive
+  answers: bit 0x80 of the sub-function.
 - **Checks** come in the order of ISO 14229-1: 0x11 service, 0x7F session, 0x13 least length, 0x12 sub-function, 0x31
   identifier, 0x33 lock, 0x13 length, 0x31 value, 0x22 conditions.
 - **The session ends** {S3_NS // 10**9} s after the last request. Then, and at each change of session, the tester's
@@ -59,7 +60,7 @@ _CODES = f"""
 
 The three bytes of a code are its number in [trouble-codes.md](trouble-codes.md) and 0x00. The law debounces: a code
 that it finds active is failed, pending and confirmed in the same tick, and the warning indicator is asked for while it
-is active. Healing takes *test failed* and the indicator back. The snapshot (record 0x01) holds the car when the code
+is active. When the code heals, *test failed* and the indicator are cleared. The snapshot (record 0x01) holds the car when the code
 became confirmed; extended data are how often it became active (0x01), operation cycles without failure (0x02) and the
 fault detection counter (0x03). An operation cycle lasts from one ECUReset to the next; after {AGED_AFTER} of them
 without failure a code is forgotten. The memory lasts over resets, not over the end of the process.
