@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import platform
 import shutil
 import struct
 import subprocess
@@ -12,9 +11,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import passed
 import pytest
 from candump import Candump
+from lab import Lab
 from started import COMMAND, Started
 
 from hil.cli.main import build_parser
@@ -23,50 +22,15 @@ LAB = os.environ.get("ADAPTER_LAB")  # set by .ci/adapter-lab: "qemu"
 BIT_RATE = "500000"
 PCI_COMMAND, PCI_COMMAND_INTX_DISABLE = 0x04, 0x400  # linux/pci_regs.h
 
-FIGURES = pytest.StashKey[list[str]]()
-BEGAN = pytest.StashKey[str]()
-
-
-def pytest_report_header() -> str | None:
-    """Name the kernel and its CAN drivers where the tests on them are meant to run."""
-    if LAB is None:
-        return None
-    modules = [line.split()[0] for line in Path("/proc/modules").read_text().splitlines()]
-    found = ", ".join(sorted(name for name in modules if name.startswith(("can", "kvaser", "sja1000"))))
-    return f"adapters: Linux {platform.release()} ({LAB}), modules {found}"
-
-
-def pytest_sessionstart(session: pytest.Session) -> None:
-    """Note the state of the sources that are tested."""
-    if LAB is not None and session.config.getoption("--write-passed"):
-        session.config.stash[BEGAN] = passed.state("adapter")
-
-
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Note that the lab's tests pass, where that is asked for and all of them ran."""
-    if BEGAN not in session.config.stash:
-        return
-    stats = session.config.pluginmanager.get_plugin("terminalreporter").stats  # type: ignore[union-attr]
-    whole = not any(stats.get(kind) for kind in ("skipped", "deselected", "xfailed"))
-    ran = {report.nodeid.partition("::")[0] for report in stats.get("passed", [])}
-    if session.exitstatus == pytest.ExitCode.OK and whole and ran >= passed.lab_tests("adapter"):
-        facts = {"kernel": f'"{platform.release()} ({LAB})"', "tests": session.testscollected}
-        written = passed.write("adapter", session.config.stash[BEGAN], facts)
-        session.config.stash.setdefault(FIGURES, []).append(written)
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """Print what was measured, whether the tests passed or not."""
-    if figures := config.stash.get(FIGURES, []):
-        terminalreporter.section("measured on the emulated adapters")
-        for figure in figures:
-            terminalreporter.write_line(figure)
+_lab = Lab("adapter", LAB, "adapters", ("can", "kvaser", "sja1000"), "the emulated adapters")
+pytest_report_header, pytest_terminal_summary = _lab.report_header, _lab.terminal_summary
+pytest_sessionstart, pytest_sessionfinish = _lab.sessionstart, _lab.sessionfinish
 
 
 @pytest.fixture(scope="session")
-def figure(pytestconfig: pytest.Config) -> Callable[[str], None]:
+def figure() -> Callable[[str], None]:
     """Take a line for the end of the test run's output."""
-    return pytestconfig.stash.setdefault(FIGURES, []).append
+    return _lab.figures.append
 
 
 class Adapter:

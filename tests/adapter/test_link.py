@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 from processes import wait_until
-from started import BRAKING_NM
+from started import BRAKING_NM, blended
 
 from dbc.contract import spec_of
 from dbc.frame import BusName, Frame, LinkEvent, LinkState, Received
@@ -40,20 +40,6 @@ LOST = {0x1001, 0x1011, 0x1021, 0x1031}  # pedal, wheel speeds and body motion d
 QUEUE, READY = 3, 1  # txqueuelen; one that the kernel holds ready for the card, whose own frame QEMU sends at once
 DEFAULT_QUEUE = "10"
 PRESSURE, MOTORS = spec_of(EhbPressureFront), spec_of(MotorStatusFront)
-
-BLENDED = """title = "the motors brake too, for long: it goes downhill"
-[start]
-speed_mps = 20.0
-[driver]
-pedal = [[0.2, 0.0], [0.4, 0.6]]
-[[road]]
-start_m = -100.0
-grade = -0.25
-[end]
-duration_s = 40.0
-[ecu.blend]
-blending_factor = 0.7
-"""
 
 
 class Side:
@@ -170,7 +156,7 @@ class Rig:
 @pytest.fixture
 def rig(cards: Cards, tmp_path: Path) -> Iterator[Rig]:
     scenario = tmp_path / "blended.toml"
-    scenario.write_text(BLENDED)
+    scenario.write_text(blended(40.0))
     with open_bus(cards[0].spec, BusName.VEHICLE) as car, open_bus(cards[1].spec, BusName.VEHICLE) as ecu:
         rig = Rig(car, ecu, scenario)
         rig.until(lambda: rig.mode is BrakeMode.NORMAL and rig.torque_nm < BRAKING_NM, 300)

@@ -8,6 +8,7 @@ import time
 import numpy as np
 import pytest
 from processes import alive, children_of, result_of, wait_until
+from started import BRAKING_NM, blended
 
 from dbc.contract import contract
 from dbc.frame import BusName
@@ -20,21 +21,6 @@ SAFE_FRAMES = 5  # of 10 ms: the other side is safe within 50 ms
 STOPPED_S = (0.02, 0.05, 0.2)
 RECOVERY_S = 1.0
 BURST_S = 0.05
-BRAKING_NM = -100.0
-
-BLENDED = """title = "the motors brake too, for long: it goes downhill"
-[start]
-speed_mps = 20.0
-[driver]
-pedal = [[0.2, 0.0], [0.4, 0.6]]
-[[road]]
-start_m = -100.0
-grade = -0.25
-[end]
-duration_s = 60.0
-[ecu.blend]
-blending_factor = 0.7
-"""
 
 
 class Drive:
@@ -75,7 +61,7 @@ class Drive:
 
 @pytest.fixture
 def drive(start, channel, tmp_path):
-    (tmp_path / "blended.toml").write_text(BLENDED)
+    (tmp_path / "blended.toml").write_text(blended(60.0))
     yield Drive(start("run", "blended.toml", "--json", "--bus", channel, "--out", "out"), tmp_path)
     name, base = channel.removeprefix("loopback:"), base_directory()
     assert not (base.exists() and list(base.glob(f"{name}*"))), "a socket is left"

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from processes import result_of, wait_until
-from started import COMMAND, Started, brakes, latest
+from started import COMMAND, Started, blended, brakes, latest
 
 from dbc.frame import BusName, Frame, LinkEvent, LinkState
 from dbc.messages import EhbState, MotorDemandFront
@@ -146,27 +146,12 @@ def test_both_buses_pass_old_frames_do_not_and_a_lost_end_is_told_and_found_agai
         assert "dropped for their age" in listener.words.read_text().splitlines()[-1]
 
 
-BLENDED = """title = "the motors brake too, for long: it goes downhill"
-[start]
-speed_mps = 20.0
-[driver]
-pedal = [[0.2, 0.0], [0.4, 0.6]]
-[[road]]
-start_m = -100.0
-grade = -0.25
-[end]
-duration_s = 6.0
-[ecu.blend]
-blending_factor = 0.7
-"""
-
-
 @pytest.mark.slow
 def test_with_the_ecu_beyond_a_stalled_tunnel_both_sides_are_safe_meanwhile_and_go_on_after(
     ends, start, tmp_path, capsys
 ):
     _, seeker, here, there, _ = ends
-    (tmp_path / "blended.toml").write_text(BLENDED)
+    (tmp_path / "blended.toml").write_text(blended(6.0))
     ecu = start("ecu", "blended.toml", "--bus", there, "--realtime")
     wait_until(lambda: "every 10 ms" in ecu.stderr.readline(), "the ECU")
     record = start("record", "there.log", "--bus", there)

@@ -31,22 +31,23 @@ SOURCES = {
     "lab": (
         "dbc", "hil/bus", "hil/rt", "hil/bench/node_process.py", "hil/bench/real.py", "hil/bench/bench_run.py",
         "hil/bench/port.py", "hil/bench/recorder.py", "tests/vcan", "tests/contract/test_bus.py",
-        "tests/contract/test_clock.py",
-        "tests/support/candump.py", "tests/support/processes.py", "tests/support/slcan_device.py",
-        "tests/support/started.py", ".ci/vcan-lab", ".ci/vcan-lab-init",
+        "tests/contract/test_clock.py", "tests/support/candump.py", "tests/support/lab.py",
+        "tests/support/processes.py", "tests/support/slcan_device.py", "tests/support/started.py",
+        ".ci/vcan-lab", ".ci/vcan-lab-init",
     ),
     "adapter": (
-        "dbc", "ecu/node.py", "ecu/law/trouble_codes.py", "plant/demands.py", "hil/bus", "hil/rt",
+        "dbc", "ecu/node.py", "ecu/diagnostics", "ecu/law/trouble_codes.py", "plant/demands.py", "hil/bus", "hil/rt",
         "hil/bench/node_process.py", "hil/bench/real.py", "hil/bench/bench_run.py", "hil/bench/hold.py",
         "hil/bench/port.py", "hil/bench/recorder.py", "hil/cli/ecu.py", "hil/cli/plant.py", "hil/cli/run.py",
-        "tests/adapter", "tests/support/candump.py", "tests/support/processes.py", "tests/support/started.py",
+        "tests/adapter", "tests/support/candump.py", "tests/support/lab.py", "tests/support/processes.py",
+        "tests/support/started.py",
         ".ci/adapter-lab", ".ci/adapter-lab-init",
     ),
 }  # fmt: skip
 """What the outcome of each run depends on."""
 
 
-def lab_tests(name: str = "lab") -> set[str]:
+def lab_tests(name: str) -> set[str]:
     """Files whose tests run in the lab of a real SocketCAN, or in that of emulated adapters."""
     files = [ROOT / path for path in SOURCES[name] if path.startswith("tests/")]
     return {

@@ -47,3 +47,20 @@ def latest(log: Path, message: type[Any], count: int = 1) -> list[Any]:
 def brakes(demand: Any) -> bool:
     """Whether every motor of a motor demand brakes."""
     return all(torque is not None and torque < BRAKING_NM for torque in demand)
+
+
+def blended(duration_s: float) -> str:
+    """A scenario: a car goes downhill, so that the motors brake too, for so long."""
+    return f"""title = "the motors brake too, for long: it goes downhill"
+[start]
+speed_mps = 20.0
+[driver]
+pedal = [[0.2, 0.0], [0.4, 0.6]]
+[[road]]
+start_m = -100.0
+grade = -0.25
+[end]
+duration_s = {duration_s}
+[ecu.blend]
+blending_factor = 0.7
+"""

@@ -6,7 +6,6 @@ import errno
 import fcntl
 import json
 import os
-import platform
 import shutil
 import socket
 import struct
@@ -20,8 +19,8 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
-import passed
 from candump import Candump
+from lab import Lab
 from slcan_device import SlcanDevice
 from started import COMMAND, Started
 
@@ -31,50 +30,15 @@ IFF_UP = 1  # linux/if.h
 N_TTY, N_SLCAN = 0, 17  # linux/tty.h
 LAB = os.environ.get("VCAN_LAB")  # set by .ci/vcan-lab: "kernel" or "uml"
 
-
-FIGURES = pytest.StashKey[list[str]]()
-BEGAN = pytest.StashKey[str]()
-
-
-def pytest_report_header() -> str | None:
-    """Name the kernel and its CAN drivers where the tests on it are meant to run."""
-    if LAB is None:
-        return None
-    modules = [line.split()[0] for line in Path("/proc/modules").read_text().splitlines()]
-    found = ", ".join(sorted(name for name in modules if name.startswith(("can", "vcan", "slcan"))))
-    return f"SocketCAN: Linux {platform.release()} ({LAB}), modules {found or 'built in'}"
-
-
-def pytest_sessionstart(session: pytest.Session) -> None:
-    """Note the state of the sources that are tested."""
-    if LAB is not None and session.config.getoption("--write-passed"):
-        session.config.stash[BEGAN] = passed.state("lab")
-
-
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Note that the lab's tests pass, where that is asked for and all of them ran."""
-    if BEGAN not in session.config.stash:
-        return
-    stats = session.config.pluginmanager.get_plugin("terminalreporter").stats  # type: ignore[union-attr]
-    whole = not any(stats.get(kind) for kind in ("skipped", "deselected", "xfailed"))
-    ran = {report.nodeid.partition("::")[0] for report in stats.get("passed", [])}
-    if session.exitstatus == pytest.ExitCode.OK and whole and ran >= passed.lab_tests():
-        facts = {"kernel": f'"{platform.release()} ({LAB})"', "tests": session.testscollected}
-        session.config.stash.setdefault(FIGURES, []).append(passed.write("lab", session.config.stash[BEGAN], facts))
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """Print what was measured, whether the tests passed or not."""
-    if figures := config.stash.get(FIGURES, []):
-        terminalreporter.section("measured on the kernel's SocketCAN")
-        for figure in figures:
-            terminalreporter.write_line(figure)
+_lab = Lab("lab", LAB, "SocketCAN", ("can", "vcan", "slcan"), "the kernel's SocketCAN")
+pytest_report_header, pytest_terminal_summary = _lab.report_header, _lab.terminal_summary
+pytest_sessionstart, pytest_sessionfinish = _lab.sessionstart, _lab.sessionfinish
 
 
 @pytest.fixture(scope="session")
-def figure(pytestconfig: pytest.Config) -> Callable[[str], None]:
+def figure() -> Callable[[str], None]:
     """Take a line for the end of the test run's output."""
-    return pytestconfig.stash.setdefault(FIGURES, []).append
+    return _lab.figures.append
 
 
 def _absent(reason: str, required: bool) -> NoReturn:

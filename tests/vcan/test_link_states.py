@@ -12,7 +12,7 @@ import pytest
 import slcan_device as adapter
 from processes import RUN_LIMIT_S, alive, children_of, result_of, wait_until
 from slcan_device import SlcanFrame
-from started import BRAKING_NM, brakes, latest
+from started import BRAKING_NM, blended, brakes, latest
 
 from dbc.contract import spec_of
 from dbc.frame import BusName, Frame, LinkEvent, LinkState
@@ -36,20 +36,6 @@ STEADY_FRAMES = 20
 UNDER_WAY_S = 0.5
 """What may still come of before: frames in the driver's queue, and a controller that a busy host runs late."""
 BRAKE_STATUS, MOTOR_DEMAND = spec_of(BrakeStatus), spec_of(MotorDemandFront)
-
-BLENDED = """title = "the motors brake too, for long: it goes downhill"
-[start]
-speed_mps = 20.0
-[driver]
-pedal = [[0.2, 0.0], [0.4, 0.6]]
-[[road]]
-start_m = -100.0
-grade = -0.25
-[end]
-duration_s = 20.0
-[ecu.blend]
-blending_factor = 0.7
-"""
 
 
 class TwoSides:
@@ -129,7 +115,7 @@ class TwoSides:
 @pytest.fixture
 def sides(slcan: SlcanInterface, tmp_path: Path) -> Iterator[TwoSides]:
     scenario = tmp_path / "blended.toml"
-    scenario.write_text(BLENDED)
+    scenario.write_text(blended(20.0))
     with open_bus(f"socketcan:{slcan.name}", BusName.VEHICLE) as bus:
         sides = TwoSides(slcan, bus, scenario)
         sides.until(lambda: sides.mode is BrakeMode.NORMAL and sides.torque_nm < BRAKING_NM, 300)
@@ -236,7 +222,7 @@ def test_a_run_tells_the_states_of_its_link_and_that_bus_off_spoilt_it(
     candump: Callable[[str], Candump],
     figure: Callable[[str], None],
 ) -> None:
-    (folder / "blended.toml").write_text(BLENDED)
+    (folder / "blended.toml").write_text(blended(20.0))
     slcan.set("txqueuelen", "1000")  # the default of 10 is shorter than what the car says in one tick
     witness = candump(slcan.name)
     spec = f"socketcan:{slcan.name}"

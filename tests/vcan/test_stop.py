@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import pytest
 from processes import RUN_LIMIT_S, alive, children_of, result_of, wait_until
-from started import brakes, latest
+from started import blended, brakes, latest
 
 from dbc.bench_messages import ManoeuvreState, TruthMotion
 from dbc.contract import contract, spec_of
@@ -67,19 +67,6 @@ speed_mps = 5.0
 pedal = [[1.0, 0.0], [1.2, 0.6]]
 [end]
 duration_s = 10.0
-"""
-BLENDED = """title = "the motors brake too, for long: it goes downhill"
-[start]
-speed_mps = 20.0
-[driver]
-pedal = [[0.2, 0.0], [0.4, 0.6]]
-[[road]]
-start_m = -100.0
-grade = -0.25
-[end]
-duration_s = 40.0
-[ecu.blend]
-blending_factor = 0.7
 """
 
 
@@ -210,7 +197,7 @@ def test_decode_reads_candumps_own_file(observed: Observed) -> None:
 def test_a_killed_plant_takes_the_motor_demand_to_zero_and_no_pressure(
     lab_vcan0: str, folder: Path, begin: Begin, candump: Witness, figure: Figure
 ) -> None:
-    (folder / "blended.toml").write_text(BLENDED)
+    (folder / "blended.toml").write_text(blended(40.0))
     witness = candump(lab_vcan0)
     bench = begin("run", "blended.toml", "--json", "--bus", f"socketcan:{lab_vcan0}", "--out", "killed-plant")
     log = folder / "killed-plant" / "recording.log"
@@ -270,7 +257,7 @@ def test_a_killed_plant_takes_the_motor_demand_to_zero_and_no_pressure(
 def test_a_killed_ecu_leaves_the_brake_to_its_own_pedal_map(
     lab_vcan0: str, folder: Path, begin: Begin, candump: Witness, figure: Figure
 ) -> None:
-    (folder / "blended.toml").write_text(BLENDED)
+    (folder / "blended.toml").write_text(blended(40.0))
     witness = candump(lab_vcan0)
     spec = f"socketcan:{lab_vcan0}"
     plant, ecu = begin("plant", "blended.toml", "--bus", spec), begin("ecu", "blended.toml", "--bus", spec)
