@@ -116,7 +116,7 @@ def _record_around(args: argparse.Namespace, sources: Sequence[Source], stop: St
     before_ns, after_ns = (round((AROUND_S if s is None else s) * 1e9) for s in (args.before, args.after))
     try:
         trigger = Trigger(args.trigger, databases(args.dbc)[0])
-        recorder = TriggerRecorder(args.out, sources, trigger, before_ns, after_ns, _say)
+        recorder = TriggerRecorder(args.out, sources, trigger, before_ns, after_ns, _say, most_files=args.count)
     except RecorderError as error:
         raise BrakebenchError(str(error)) from error
     clock = WallClock()
@@ -127,7 +127,7 @@ def _record_around(args: argparse.Namespace, sources: Sequence[Source], stop: St
         _say(f"waiting for {' or '.join(args.trigger)}")
         for _ in Loop(clock, FLUSH_PERIOD_NS).ticks():
             recorder.flush(clock.now_ns())
-            if stop.asked or (len(recorder.files) == args.count and not recorder.writing):
+            if stop.asked or recorder.done:
                 break
     finally:
         recorder.close(clock.now_ns())
