@@ -13,7 +13,7 @@ import numpy as np
 from hil.bench.playback import LATE_NS, Replay
 from hil.bench.replay_selection import ALL, ReplayError, Selection, select
 from hil.cli.log_options import add_databases
-from hil.cli.options import add_bus, add_json, add_transmit
+from hil.cli.options import add_bus, add_json, add_transmit, seconds
 from hil.errors import INTERRUPTED_EXIT_CODE, Verdict
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--to", dest="end", metavar="TIME", help="up to here, included")
     parser.add_argument(
         "--max-gap",
-        type=_seconds,
+        type=seconds,
         metavar="S",
         help="shorten longer pauses of what is sent to so many seconds of the log",
     )
@@ -84,16 +84,6 @@ def _speed(text: str) -> float:
         value = math.nan
     if not 0.001 <= value <= 1000.0:
         raise argparse.ArgumentTypeError(f"expected a number from 0.001 to 1000, got {text!r}")
-    return value
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"expected seconds, 0 or more, got {text!r}")
     return value
 
 
@@ -160,11 +150,11 @@ def run(args: argparse.Namespace) -> int:
         if wait_for is not None:
             _say(f"waiting for 0x{wait_for:X}")
             replay.wait()
-        n, seconds = len(selection.time_ns), selection.time_ns[-1] * 1e-9 / args.speed
+        n, whole_s = len(selection.time_ns), selection.time_ns[-1] * 1e-9 / args.speed
         again = ", again and again" if args.loop else ""
         on = ", ".join(specs.values())
         if not stop.asked:
-            _say(f"replaying {n} frames of {args.log} as {args.role} on {on}: {seconds:.1f} s{again}")
+            _say(f"replaying {n} frames of {args.log} as {args.role} on {on}: {whole_s:.1f} s{again}")
         replay.run()
     facts = result(args, on, len(recording.frames), selection, replay)
     if args.json:
