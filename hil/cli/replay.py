@@ -3,6 +3,7 @@
 import argparse
 import json
 import math
+import re
 import sys
 from contextlib import ExitStack
 from pathlib import Path
@@ -15,6 +16,7 @@ from hil.bench.replay_selection import ALL, ReplayError, Selection, select
 from hil.cli.log_options import add_databases
 from hil.cli.options import add_bus, add_json, add_transmit, seconds
 from hil.errors import INTERRUPTED_EXIT_CODE, Verdict
+from hil.log.frames import MAX_EXTENDED_ID
 
 if TYPE_CHECKING:
     from hil.log.signals.databases import Databases
@@ -69,7 +71,9 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     )
     parser.add_argument("--loop", action="store_true", help="begin again at the end, until Ctrl-C")
     parser.add_argument(
-        "--wait-for", metavar="ID", help="start with the first frame of this identifier (0x1A0) or message on the bus"
+        "--wait-for",
+        metavar="ID",
+        help="start with the first frame of this identifier (hexadecimal: 0x1A0) or message on the bus",
     )
     add_transmit(parser)
     parser.add_argument("--speed", type=_speed, default=1.0, metavar="X", help="2 is twice as fast (default: 1)")
@@ -99,13 +103,12 @@ def _identifier(text: str, known: "Databases") -> int:
     for message in known.messages():
         if message.name == text:
             return message.can_id
-    try:
-        value = int(text, 16 if text.lower().startswith("0x") else 10)
-    except ValueError:
-        value = -1
-    if not 0 <= value < 1 << 29:
-        raise ReplayError(f"--wait-for {text}: expected an identifier as 0x1A0, or a message of the database")
-    return value
+    # 714 would be decimal to one reader and hexadecimal to the next
+    if not re.fullmatch(r"0[xX][0-9a-fA-F]+", text) or int(text, 16) > MAX_EXTENDED_ID:
+        raise ReplayError(
+            f"--wait-for {text}: expected an identifier in hexadecimal with 0x, as 0x1A0, or a message of the database"
+        )
+    return int(text, 16)
 
 
 def run(args: argparse.Namespace) -> int:
