@@ -19,7 +19,10 @@ class Quantity(NamedTuple):
 
 
 def _of_wheels(name: str, unit: str, read: Callable[[View, int], float]) -> list[Quantity]:
-    return [Quantity(f"{name}_{wheel}", unit, lambda v, i=i: read(v, i)) for i, wheel in enumerate(WHEELS)]  # type: ignore[misc]
+    def of_wheel(i: int) -> Callable[[View], float]:
+        return lambda v: read(v, i)
+
+    return [Quantity(f"{name}_{wheel}", unit, of_wheel(i)) for i, wheel in enumerate(WHEELS)]
 
 
 QUANTITIES: tuple[Quantity, ...] = (

@@ -146,7 +146,8 @@ def select(
         beyond_ns = np.maximum(np.diff(time_ns) - max_gap_ns, 0)
         gaps, cut_ns = int(np.count_nonzero(beyond_ns)), int(beyond_ns.sum())
         time_ns[1:] -= np.cumsum(beyond_ns)
-    identities = tuple(_identity(k, buses[k >> 30], known[k], book.states_cycles) for k in keys.tolist())
+    states_cycles = book.databases.states_cycles
+    identities = tuple(_identity(k, buses[k >> 30], known[k], states_cycles) for k in keys.tolist())
     return Selection(table, time_ns, identities, code.astype(np.int32), phase_ns, left_out, gaps, cut_ns)
 
 
@@ -160,7 +161,6 @@ class _Book:
             [name] if databases is None else [channel for channel, bus in bus_of.items() if bus == name]
             for name in buses
         ]
-        self.states_cycles = any(message.cycle_time_ms for message in self.databases.messages())
 
     def message(self, key: int) -> Message | None:
         for channel in self._channels[key >> 30]:
@@ -217,5 +217,4 @@ def _identity(key: int, bus: str, message: Message | None, states_cycles: bool) 
     extended, can_id = bool(key >> 29 & 1), key & 0x1FFFFFFF
     if message is None:
         return Identity(bus, can_id, extended, "", "", False)
-    # a database that states no cycle time at all tells nothing of which message has none
     return Identity(bus, can_id, extended, message.name, message.sender, states_cycles and not message.cycle_time_ms)

@@ -40,6 +40,7 @@ class TriggerRecorder:
     say : takes what happens, one line at a time.
     epoch_ns : as of `CandumpLines`.
     ring_bytes : most text that is kept.
+    most_files : files behind which no further one is begun, nor a trigger counted; None where there is no limit.
 
     Attributes
     ----------
@@ -62,6 +63,7 @@ class TriggerRecorder:
         say: Callable[[str], None] = lambda _: None,
         epoch_ns: int | None = None,
         ring_bytes: int = RING_BYTES,
+        most_files: int | None = None,
     ) -> None:
         self.lines = CandumpLines(epoch_ns)
         self.triggers = self.shortened_ns = 0
@@ -73,6 +75,7 @@ class TriggerRecorder:
         self._say = say
         self._ring: deque[_Piece] = deque()
         self._kept, self._most = 0, ring_bytes
+        self._most_files = most_files
         self._dropped_ns: int | None = None  # stamp up to which the ring had no room
         self._file: int | None = None
         self._end_ns = 0
@@ -86,9 +89,9 @@ class TriggerRecorder:
             )
 
     @property
-    def writing(self) -> bool:
-        """Whether a file is open."""
-        return self._file is not None
+    def done(self) -> bool:
+        """Whether the last of ``most_files`` is written."""
+        return self._file is None and len(self.files) == self._most_files
 
     def flush(self, now_ns: int) -> None:
         """Take what arrived until ``now_ns`` (monotonic), keep it, and write what is due.
@@ -104,9 +107,12 @@ class TriggerRecorder:
             if self._file is not None and piece.first_ns <= self._end_ns:
                 append(self._file, self.files[-1], piece.text)
             for hit in self._trigger.hear(received):
-                self.triggers += 1
-                if self._file is None or hit.time_ns > self._end_ns:
+                if hit.time_ns > self._end_ns:
                     self._close()
+                if self.done:
+                    break
+                self.triggers += 1
+                if self._file is None:
                     self._open(hit)
         # what was stamped before the end may come one flush later
         if self._file is not None and now_ns > self._end_ns + FLUSH_PERIOD_NS:

@@ -16,10 +16,8 @@ Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
 FEWEST = 10  # frames of a message, below which its intervals tell nothing
 MOVED = 0.02  # of the range of a signal in the record: beyond it a signal has moved; above the noise of sensors
-FAR, SOON_S = (
-    0.2,
-    0.2,
-)  # of the range, within so many seconds: a movement that is a stimulus; a driver's foot takes that
+FAR = 0.2  # of the range: a movement beyond it is a stimulus, where it takes no longer than SOON_S; below is a drift
+SOON_S = 0.2  # a driver's foot takes that for a brake application
 REST_S = 0.5  # so long a signal stands before its next movement is a stimulus
 ANSWER_S = 1.0  # what comes later is no answer
 _OTHERS = int(FrameFlag.ERROR | FrameFlag.REMOTE)
@@ -117,6 +115,7 @@ def cyclic_messages(frames: FrameTable, databases: Databases) -> list[Cyclic]:
     """Every message of a record that has a cycle, by channel and identifier; those sent on a change are left out."""
     key = frames.channel.astype(np.int64) << 30 | frames.extended.astype(np.int64) << 29 | frames.can_id
     data_frames = (frames.flags & _OTHERS) == 0
+    states_cycles = databases.states_cycles
     found = []
     for code in np.unique(key[data_frames]).tolist():
         time_ns = np.sort(frames.time_ns[data_frames & (key == code)])
@@ -125,9 +124,9 @@ def cyclic_messages(frames: FrameTable, databases: Databases) -> list[Cyclic]:
         channel, extended, can_id = frames.channels[code >> 30], bool(code >> 29 & 1), code & 0x1FFFFFFF
         message = databases.message(channel, can_id, extended)
         stated_ms = None if message is None else message.cycle_time_ms
-        interval_ms = np.diff(time_ns) * 1e-6
-        if stated_ms == 0:
+        if message is not None and states_cycles and not stated_ms:
             continue
+        interval_ms = np.diff(time_ns) * 1e-6
         cycle_ms = float(stated_ms or np.median(interval_ms))
         missed = np.rint(interval_ms[interval_ms > 1.5 * cycle_ms] / cycle_ms) - 1.0 if cycle_ms > 0.0 else np.empty(0)
         found.append(

@@ -80,8 +80,7 @@ def _finite(value: float) -> float | None:
 
 def _facts(samples: list[tuple[int, "Sample"]], step: int) -> dict[str, float]:
     """How many values, how many ticks without one, and what they are (NaN where none is a number)."""
-    ticks = [one.tick for _, one in samples]
-    missing = sum(max(0, (after - before) % _TICKS // step - 1) for before, after in pairwise(ticks))
+    missing = sum(max(0, (after - before) // step - 1) for before, after in pairwise(sorted(_by_tick(samples))))
     known = [one.value for _, one in samples if math.isfinite(one.value)] or [math.nan]
     return {
         "samples": len(samples),
@@ -92,16 +91,25 @@ def _facts(samples: list[tuple[int, "Sample"]], step: int) -> dict[str, float]:
     }
 
 
+def _by_tick(samples: list[tuple[int, "Sample"]]) -> list[int]:
+    """Tick of each sample, counted from the first one's."""
+    if not samples:
+        return []
+    first_ns, first_tick = samples[0][0], samples[0][1].tick
+    ticks = []
+    for time_ns, one in samples:
+        # the byte tells the tick, the time of reception in which round of 256
+        tick = (one.tick - first_tick) % _TICKS
+        ticks.append(tick + round(((time_ns - first_ns) / _TICK_NS - tick) / _TICKS) * _TICKS)
+    return ticks
+
+
 def _write(path: Path, names: list[str], samples: list[tuple[int, "Sample"]]) -> None:
     """A row per tick of the law: its time since the first, s, counted in ticks, and the values that came with it."""
     from hil.log.atomic_write import atomic_write
 
     rows: dict[int, dict[str, float]] = {}
-    first_ns, first_tick = samples[0][0], samples[0][1].tick
-    for time_ns, one in samples:
-        # the byte tells the tick, the time of reception in which round of 256
-        tick = (one.tick - first_tick) % _TICKS
-        tick += round(((time_ns - first_ns) / _TICK_NS - tick) / _TICKS) * _TICKS
+    for tick, (_, one) in zip(_by_tick(samples), samples, strict=True):
         rows.setdefault(tick, {})[one.name] = one.value
     with atomic_write(path, False, []) as temporary, temporary.open("w", newline="") as file:
         writer = csv.writer(file)

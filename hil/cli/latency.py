@@ -10,7 +10,12 @@ from hil.cli.options import add_json
 from hil.errors import BrakebenchError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dbc.frame import Frame
     from hil.bench.wire_timing import Cyclic, Response, Spread
+    from hil.bus.bus import Bus
+    from hil.bus.transmit import ListeningBus
     from hil.log.frames import FrameTable
 
 
@@ -74,7 +79,7 @@ def _read(log: str) -> "FrameTable":
 
 
 def _listen(spec: str, for_s: float) -> "FrameTable":
-    from dbc.frame import BusName, Frame
+    from dbc.frame import BusName
     from hil.bench.wire_timing import table_of
     from hil.bus.transmit import open_for_role
     from hil.rt.clock import WallClock
@@ -83,15 +88,36 @@ def _listen(spec: str, for_s: float) -> "FrameTable":
     if not 0.0 < for_s <= 3600.0:
         raise BrakebenchError(f"--for {for_s:g}: expected seconds above 0, at most 3600")
     stop, clock = StopSignal(), WallClock()
-    heard: list[Frame] = []
     with stop.at_once():
         bus = open_for_role(spec, BusName.VEHICLE, transmit=False)
     with bus:
-        print(f"listening to {bus.name} for {for_s:g} s", file=sys.stderr, flush=True)
+        _say(f"listening to {bus.name} for {for_s:g} s")
         end_ns = clock.now_ns() + round(for_s * 1e9)
-        while not stop.asked and clock.now_ns() < end_ns:
-            heard += [item for item in bus.receive(0.1) if isinstance(item, Frame)]
-    return table_of(heard)
+        return table_of(_hear(bus, lambda: not stop.asked and clock.now_ns() < end_ns))
+
+
+def _hear(bus: "Bus | ListeningBus", goes_on: "Callable[[], bool]") -> "list[Frame]":
+    """Frames of a bus; says what listening means there, and what was lost."""
+    from dbc.frame import Frame, LinkState
+    from hil.bus.transmit import ListeningBus
+
+    if isinstance(bus, ListeningBus):
+        _say(bus.words)
+    heard: list[Frame] = []
+    lost = 0
+    while goes_on():
+        for item in bus.receive(0.1):
+            if isinstance(item, Frame):
+                heard.append(item)
+            elif item.state is LinkState.RX_OVERFLOW:
+                lost += item.number
+    if lost:
+        _say(f"{lost} frames were lost on the way here: cycles missed and jitter are partly this machine's")
+    return heard
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
 
 
 def _values(

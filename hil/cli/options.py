@@ -1,6 +1,7 @@
 """Options that several commands share."""
 
 import argparse
+import math
 
 
 def add_bus(parser: argparse.ArgumentParser) -> None:
@@ -74,3 +75,20 @@ def add_node_options(parser: argparse.ArgumentParser) -> None:
     add_force(parser)
     add_realtime(parser)
     add_ready_fd(parser)
+
+
+def seconds(text: str, most_s: float = math.inf) -> float:
+    """Read a time of an option, 0 to ``most_s``; never infinite.
+
+    Raises
+    ------
+    argparse.ArgumentTypeError : it is none.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (0.0 <= value <= most_s and value < math.inf):
+        such = f"0 to {most_s:.10g}" if most_s < math.inf else "0 or more"
+        raise argparse.ArgumentTypeError(f"expected seconds, {such}, got {text!r}")
+    return value

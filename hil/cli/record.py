@@ -2,9 +2,9 @@
 
 import argparse
 import contextlib
-import math
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from dbc.frame import BusName
@@ -12,7 +12,7 @@ from hil.bench.recorder import FLUSH_PERIOD_NS, Recorder, RecorderError, Source
 from hil.bus.channel import bench_channel
 from hil.bus.open import open_bus
 from hil.bus.transmit import open_for_role
-from hil.cli.options import add_bus, add_ready_fd
+from hil.cli.options import add_bus, add_ready_fd, seconds
 from hil.errors import BrakebenchError, Verdict
 from hil.faults.line import FaultyListener
 from hil.rt.clock import WallClock
@@ -45,25 +45,16 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         metavar="CONDITION",
         help="write only around this; repeatable: any of them",
     )
+    around = partial(seconds, most_s=MOST_S)
     parser.add_argument(
-        "--before", type=_seconds, metavar="S", help=f"seconds before the trigger (default: {AROUND_S:g})"
+        "--before", type=around, metavar="S", help=f"seconds before the trigger (default: {AROUND_S:g})"
     )
-    parser.add_argument("--after", type=_seconds, metavar="S", help=f"seconds after it (default: {AROUND_S:g})")
+    parser.add_argument("--after", type=around, metavar="S", help=f"seconds after it (default: {AROUND_S:g})")
     parser.add_argument("--count", type=_count, metavar="N", help="end after so many files (default: at Ctrl-C)")
     # as of `hil.cli.log_options`, which loads all that reads logs
     parser.add_argument("--dbc", metavar="[BUS=]FILE", action="append", default=[], help="database of the conditions")
     add_ready_fd(parser)
     parser.set_defaults(run=run)
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value <= MOST_S:
-        raise argparse.ArgumentTypeError(f"expected seconds, 0 to {MOST_S:g}, got {text!r}")
-    return value
 
 
 def _count(text: str) -> int:
@@ -116,7 +107,7 @@ def _record_around(args: argparse.Namespace, sources: Sequence[Source], stop: St
     before_ns, after_ns = (round((AROUND_S if s is None else s) * 1e9) for s in (args.before, args.after))
     try:
         trigger = Trigger(args.trigger, databases(args.dbc)[0])
-        recorder = TriggerRecorder(args.out, sources, trigger, before_ns, after_ns, _say)
+        recorder = TriggerRecorder(args.out, sources, trigger, before_ns, after_ns, _say, most_files=args.count)
     except RecorderError as error:
         raise BrakebenchError(str(error)) from error
     clock = WallClock()
@@ -127,7 +118,7 @@ def _record_around(args: argparse.Namespace, sources: Sequence[Source], stop: St
         _say(f"waiting for {' or '.join(args.trigger)}")
         for _ in Loop(clock, FLUSH_PERIOD_NS).ticks():
             recorder.flush(clock.now_ns())
-            if stop.asked or (len(recorder.files) == args.count and not recorder.writing):
+            if stop.asked or recorder.done:
                 break
     finally:
         recorder.close(clock.now_ns())

@@ -3,6 +3,7 @@
 import argparse
 import json
 import math
+import re
 import sys
 from contextlib import ExitStack
 from pathlib import Path
@@ -13,8 +14,9 @@ import numpy as np
 from hil.bench.playback import LATE_NS, Replay
 from hil.bench.replay_selection import ALL, ReplayError, Selection, select
 from hil.cli.log_options import add_databases
-from hil.cli.options import add_bus, add_json, add_transmit
+from hil.cli.options import add_bus, add_json, add_transmit, seconds
 from hil.errors import INTERRUPTED_EXIT_CODE, Verdict
+from hil.log.frames import MAX_EXTENDED_ID
 
 if TYPE_CHECKING:
     from hil.log.signals.databases import Databases
@@ -63,13 +65,15 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--to", dest="end", metavar="TIME", help="up to here, included")
     parser.add_argument(
         "--max-gap",
-        type=_seconds,
+        type=seconds,
         metavar="S",
         help="shorten longer pauses of what is sent to so many seconds of the log",
     )
     parser.add_argument("--loop", action="store_true", help="begin again at the end, until Ctrl-C")
     parser.add_argument(
-        "--wait-for", metavar="ID", help="start with the first frame of this identifier (0x1A0) or message on the bus"
+        "--wait-for",
+        metavar="ID",
+        help="start with the first frame of this identifier (hexadecimal: 0x1A0) or message on the bus",
     )
     add_transmit(parser)
     parser.add_argument("--speed", type=_speed, default=1.0, metavar="X", help="2 is twice as fast (default: 1)")
@@ -87,16 +91,6 @@ def _speed(text: str) -> float:
     return value
 
 
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"expected seconds, 0 or more, got {text!r}")
-    return value
-
-
 def _mapped(text: str) -> tuple[str, str]:
     channel, _, bus = text.partition("=")
     if not channel or not bus:
@@ -109,13 +103,12 @@ def _identifier(text: str, known: "Databases") -> int:
     for message in known.messages():
         if message.name == text:
             return message.can_id
-    try:
-        value = int(text, 16 if text.lower().startswith("0x") else 10)
-    except ValueError:
-        value = -1
-    if not 0 <= value < 1 << 29:
-        raise ReplayError(f"--wait-for {text}: expected an identifier as 0x1A0, or a message of the database")
-    return value
+    # 714 would be decimal to one reader and hexadecimal to the next
+    if not re.fullmatch(r"0[xX][0-9a-fA-F]+", text) or int(text, 16) > MAX_EXTENDED_ID:
+        raise ReplayError(
+            f"--wait-for {text}: expected an identifier in hexadecimal with 0x, as 0x1A0, or a message of the database"
+        )
+    return int(text, 16)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -160,11 +153,11 @@ def run(args: argparse.Namespace) -> int:
         if wait_for is not None:
             _say(f"waiting for 0x{wait_for:X}")
             replay.wait()
-        n, seconds = len(selection.time_ns), selection.time_ns[-1] * 1e-9 / args.speed
+        n, whole_s = len(selection.time_ns), selection.time_ns[-1] * 1e-9 / args.speed
         again = ", again and again" if args.loop else ""
         on = ", ".join(specs.values())
         if not stop.asked:
-            _say(f"replaying {n} frames of {args.log} as {args.role} on {on}: {seconds:.1f} s{again}")
+            _say(f"replaying {n} frames of {args.log} as {args.role} on {on}: {whole_s:.1f} s{again}")
         replay.run()
     facts = result(args, on, len(recording.frames), selection, replay)
     if args.json:

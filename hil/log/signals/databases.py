@@ -71,6 +71,11 @@ class Databases:
         for database in self.all():
             yield from database.messages.values()
 
+    @property
+    def states_cycles(self) -> bool:
+        """Whether they state any cycle time; if so, a message without one is sent on a change, else nothing is told."""
+        return any(message.cycle_time_ms for message in self.messages())
+
     def decoder(self, wanted: Collection[str] | None = None) -> Decoder:
         """Return a decoder of these; ``wanted`` as of `hil.log.signals.decode.Decoder`."""
         return Decoder({"": self.general or NONE, **self.by_channel}, wanted)

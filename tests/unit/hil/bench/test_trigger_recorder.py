@@ -68,10 +68,10 @@ def test_a_file_holds_what_was_before_and_after_to_a_flush(path, tmp_path):
 
 
 def test_a_trigger_within_a_file_is_counted_and_a_later_one_gets_its_own_with_its_past(path, tmp_path):
-    bench = Bench(path)
+    bench = Bench(path, most_files=2)
     bench.run(4.0, faults_s=[1.5, 1.7, 2.0])
     assert (bench.recorder.triggers, [one.name for one in bench.recorder.files]) == (3, ["trip-1.log", "trip-2.log"])
-    assert not bench.recorder.writing
+    assert bench.recorder.done
     assert times_ms(tmp_path / "trip-2.log")[0] <= 1500  # overlaps the first: each file is whole
 
 
@@ -79,6 +79,19 @@ def test_two_triggers_in_one_flush(path):
     bench = Bench(path, before_s=0.0, after_s=0.0, conditions=["0x130"])
     bench.run(0.02)
     assert (bench.recorder.triggers, len(bench.recorder.files)) == (2, 2)
+
+
+def test_the_last_file_ends_though_its_frame_keeps_coming(path, tmp_path):
+    bench = Bench(path, before_s=0.0, after_s=0.1, conditions=["BRAKE_STATUS"], most_files=1)
+    bench.run(FLUSH_PERIOD_NS / S)
+    assert not bench.recorder.done
+    bench.run(1.0)
+    assert bench.recorder.done
+    bench.recorder.close(bench.now_ns)
+    assert [one.name for one in tmp_path.iterdir()] == ["trip-1.log"]
+    assert 110 <= times_ms(tmp_path / "trip-1.log")[1] <= 110 + FLUSH_PERIOD_NS // MS
+    assert len(bench.said) == 1  # nothing was cut short
+    assert bench.recorder.triggers <= (110 * MS + FLUSH_PERIOD_NS) // STEP_NS  # those that are in the file
 
 
 def test_a_trigger_right_at_the_begin_has_what_there_is(path):
@@ -89,11 +102,11 @@ def test_a_trigger_right_at_the_begin_has_what_there_is(path):
 
 
 def test_a_silent_bus_ends_the_file_in_time(path):
-    bench = Bench(path)
+    bench = Bench(path, most_files=1)
     bench.run(1.0, faults_s=[1.0])
-    assert bench.recorder.writing
+    assert not bench.recorder.done
     bench.recorder.flush(bench.now_ns + 2 * S)
-    assert not bench.recorder.writing
+    assert bench.recorder.done
 
 
 def test_a_stop_ends_the_file_and_says_what_is_missing(path):

@@ -5,7 +5,9 @@ import json
 import numpy as np
 import pytest
 
+from dbc.bench_messages import FaultCommand
 from dbc.contract import spec_of
+from dbc.database import Database, Message
 from dbc.exchange import Transmitter
 from dbc.frame import BusName, Frame
 from dbc.messages import BrakePedal, EhbDemandFront, WheelSpeedFront
@@ -61,6 +63,16 @@ def test_jitter_is_held_against_the_stated_cycle():
     assert (late.jitter.n, late.jitter.p50_ms, late.jitter.max_ms) == (100, 0.0, 20.0)
     assert (late.shortest_ms, late.longest_ms, late.missed) == (8.0, 30.0, 2)
     assert (other.name, other.cycle_ms, other.stated, other.jitter.max_ms) == ("0x7F0", 7.0, False, 0.0)
+
+
+def test_a_message_without_a_cycle_in_a_database_of_cycles_is_sent_on_a_change():
+    spec = spec_of(FaultCommand)
+    times = np.cumsum(np.arange(20) * 37 * MS)
+    table = table_of([Frame(BusName.BENCH, spec.can_id, bytes(8), int(t)) for t in times])
+    assert cyclic_messages(table, OWN) == []
+    plain = Databases(Database("plain", {(spec.can_id, False): Message("FAULT", spec.can_id, False, 8, ())}, ()))
+    (listed,) = cyclic_messages(table, plain)  # which states no cycle at all
+    assert (listed.name, listed.stated, listed.frames) == ("FAULT", False, 20)
 
 
 def test_what_is_not_there_is_named():

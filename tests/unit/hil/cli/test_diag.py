@@ -77,6 +77,15 @@ def test_data_routines_and_the_rest(ask, ecu):
     assert ask("request", "24F190").endswith("64 F1 90 01\n")
 
 
+@pytest.mark.parametrize("action", [("io", "0x0100", "adjust", "7f"), ("session", "extended")])
+def test_a_time_that_cannot_be_held_is_refused_before_anything_moves(ecu, channel, capsys, action):
+    for text in ("nan", "-1", "inf", "86400", "soon"):
+        with pytest.raises(SystemExit):
+            typed(*action, f"--hold={text}", "--bus", channel, *IDS)
+        assert f"argument --hold: expected seconds, 0 to 86399, got {text!r}" in capsys.readouterr().err
+    assert ecu.asked == []
+
+
 def test_a_session_first_and_everything_as_json(ask, ecu):
     facts = json.loads(ask("--session", "extended", "read", "0xF190", "--json"))
     assert ecu.asked == [b"\x10\x03", b"\x22\xf1\x90"]

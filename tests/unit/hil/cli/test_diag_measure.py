@@ -33,6 +33,8 @@ def test_missing_values_are_told_by_the_tick_number():
     facts = _facts(frames("speed", ticks, [1.0, 2.0, math.nan, 3.0, 4.0, 5.0]), step=1)
     assert facts == {"samples": 6, "missing": 5, "least": 1.0, "greatest": 5.0, "mean": 3.0}
     assert _facts(frames("speed", [0, 10, 30], [1.0] * 3), step=10)["missing"] == 1
+    assert _facts(frames("speed", [40, 140, 440], [1.0] * 3), step=100)["missing"] == 2  # more than a round of the byte
+    assert _facts(frames("speed", [0, 1, 600], [1.0] * 3), step=1)["missing"] == 598
     assert math.isnan(_facts(frames("speed", [1], [math.nan]), step=1)["mean"])
 
 
