@@ -16,10 +16,9 @@ from hil.faults.line import FaultyNode
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop, run_node
 from hil.rt.process import StopSignal, end_with_parent, say_ready
-from hil.rt.realtime import request_realtime, request_timer_slack
+from hil.rt.realtime import GRANTED, NOT_GRANTED, request_punctuality
 
 NODE_PERIOD_NS = 10_000_000
-GRANTED, NOT_GRANTED = "granted", "NOT granted"
 
 
 @runtime_checkable
@@ -104,9 +103,7 @@ def serve(
                 owned = owned_by(plays) if sends is None else sends
                 port.refuse_others(owned, lambda: stop.asked, f"this {role.name}", "send nevertheless with --force")
             say(f"{role.name}: on {bus}, every {NODE_PERIOD_NS / 1e6:g} ms")
-            for grant in request_realtime() if realtime else [request_timer_slack()]:
-                if realtime or not grant.granted:
-                    say(f"{role.name}: {grant.what}: {GRANTED if grant.granted else NOT_GRANTED}, {grant.detail}")
+            request_punctuality(realtime, lambda text: say(f"{role.name}: {text}"))
             say_ready(ready_fd)
         health = Transmitter()
         reports = any(spec.type is role.timing for spec in contract(BusName.BENCH).sent_by(*plays))

@@ -8,9 +8,8 @@ from dbc.frame import BusName, Frame, Received
 from hil.bench.bench_run import BenchError, BenchRun, BenchState, RecordingError, Say, silent
 from hil.bench.node_process import ECU, NODE_PERIOD_NS, PLANT, grants_in
 from hil.bench.port import names_of, owned_by
-from hil.bench.share import ALONE
 from hil.bench.stimulus import BENCH_PHASE_NS
-from hil.bus.bus import Bus, BusError, parse_spec
+from hil.bus.bus import JOINABLE, Bus, BusError, parse_spec
 from hil.bus.channel import bench_channel, claim_channel, shared_channel
 from hil.bus.listen import refuse_others
 from hil.bus.open import open_bus
@@ -18,7 +17,7 @@ from hil.bus.transmit import check_transmit
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop, Tick
 from hil.rt.process import Child, StopSignal, interrupts_held, wait_for_end
-from hil.rt.realtime import may_be_realtime
+from hil.rt.realtime import realtime_refusal
 from hil.scenario.scenario import Scenario
 
 READY_TIMEOUT_NS = 120_000_000_000  # a first start compiles the plant
@@ -90,7 +89,7 @@ class RealBench(BenchRun):
 
     def _begin(self) -> None:
         try:
-            if parse_spec(self.spec).kind not in ALONE and not self._share():
+            if parse_spec(self.spec).kind not in JOINABLE and not self._share():
                 return
             self._join(BusName.BENCH, bench_channel(self.spec))
             self._join(BusName.VEHICLE, self._joined)
@@ -151,7 +150,7 @@ class RealBench(BenchRun):
     def _granted(self) -> str:
         """What the nodes run with, for people."""
         if not self._realtime:
-            if may_be_realtime():
+            if not realtime_refusal():
                 return "scheduled as any program: --realtime is recommended, this process may have SCHED_FIFO"
             return "scheduled as any program: --realtime asks for more, `brakebench doctor` says what it would get"
         return f"real time: {grants_in(child.error_path.read_text() for child in self._children[1:])}"

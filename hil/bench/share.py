@@ -4,17 +4,15 @@ import contextlib
 from collections.abc import Callable
 
 from dbc.frame import BusName, Frame, LinkEvent
-from hil.bus.bus import parse_spec, wait
+from hil.bus.bus import JOINABLE, parse_spec, wait
 from hil.bus.channel import resolve, shared_channel
 from hil.bus.loopback import LoopbackBus
 from hil.bus.transmit import ListeningBus, open_for_role
 from hil.errors import BrakebenchError
 from hil.rt.process import StopSignal, end_with_parent, say_ready
-from hil.rt.realtime import request_realtime, request_timer_slack
+from hil.rt.realtime import request_punctuality
 
 _TURN_S = 0.05  # how often a stop is looked at
-ALONE = ("loopback", "socketcan", "virtual", "udp_multicast", "brakebench")
-"""Kinds of bus that any number of processes joins by itself."""
 
 
 class ShareError(BrakebenchError):
@@ -48,7 +46,7 @@ def serve_share(
         end_with_parent()
     stop = StopSignal()
     spec = resolve(spec)
-    if parse_spec(spec).kind in ALONE:
+    if parse_spec(spec).kind in JOINABLE:
         raise ShareError(f"share: {spec}: any number of processes may join it as it is")
     channel = shared_channel(spec)
     sent = heard = 0
@@ -59,19 +57,19 @@ def serve_share(
             say(f"share: {adapter.name} is {channel} for all others")
             if isinstance(adapter, ListeningBus):
                 say(f"share: {adapter.words}")
-            for grant in request_realtime() if realtime else [request_timer_slack()]:
-                if not grant.granted:
-                    say(f"share: {grant.what}: NOT granted, {grant.detail}")
+            request_punctuality(realtime, lambda text: say(f"share: {text}"))
             say_ready(ready_fd)
         while not stop.asked:
             wait([adapter, loopback], _TURN_S)
             arrived = adapter.receive(0.0)
             loopback.relay(arrived)
-            heard += len(arrived)
-            for item in arrived:
-                if isinstance(item, LinkEvent):
-                    say(f"share: {adapter.name}: {item.state} ({item.number}) {item.detail}".rstrip())
-            out = [item for item in loopback.receive(0.0) if isinstance(item, Frame)]
+            heard += sum(isinstance(item, Frame) for item in arrived)
+            leaving = loopback.receive(0.0)
+            for name, items in ((adapter.name, arrived), (channel, leaving)):
+                for item in items:
+                    if isinstance(item, LinkEvent):
+                        say(f"share: {name}: {item.state} ({item.number}) {item.detail}".rstrip())
+            out = [item for item in leaving if isinstance(item, Frame)]
             if out:
                 adapter.send(out)
                 sent += len(out)

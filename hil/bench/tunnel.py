@@ -14,7 +14,7 @@ from hil.bus.tunnel_wire import GarbledError
 from hil.errors import BrakebenchError
 from hil.rt.clock import monotonic_ns
 from hil.rt.process import StopSignal
-from hil.rt.realtime import request_realtime, request_timer_slack
+from hil.rt.realtime import request_punctuality
 from plant.demands import DEMAND_TIMEOUT_NS
 
 LIFETIME_NS = DEMAND_TIMEOUT_NS // 2
@@ -182,9 +182,7 @@ def serve_tunnel(
                 stack.enter_context(LoopbackBus(parse_spec(name).channel, bus))
                 for name, bus in ((spec, BusName.VEHICLE), (bench_channel(spec), BusName.BENCH))
             ]
-            for grant in request_realtime() if realtime else [request_timer_slack()]:
-                if not grant.granted:
-                    say(f"tunnel: {grant.what}: NOT granted, {grant.detail}")
+            request_punctuality(realtime, lambda text: say(f"tunnel: {text}"))
             say(f"tunnel: {spec} {line.words}")
         tunnel = Tunnel(buses, line, lifetime_ns, say)
         try:

@@ -61,6 +61,10 @@ OWN_KINDS = ("loopback", "socketcan")
 """Kinds of bus of our own (`hil.bus.open`); any other is left to python-can."""
 
 
+JOINABLE = frozenset({"loopback", "socketcan", "socketcand", "virtual", "udp_multicast", "brakebench"})
+"""Kinds of bus that any number of processes joins as it is; any other has one owner."""
+
+
 class BusSpec(NamedTuple):
     """A bus by name: ``kind:channel`` and the driver's options."""
 

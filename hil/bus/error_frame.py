@@ -3,6 +3,7 @@
 import re
 
 from dbc.frame import BusName, LinkEvent, LinkState, Received
+from hil.bus.can_frame import ERROR_FLAG
 
 CAN_ERR_TX_TIMEOUT = 0x001
 CAN_ERR_CRTL = 0x004
@@ -13,6 +14,7 @@ CAN_ERR_BUSOFF = 0x040
 CAN_ERR_BUSERROR = 0x080
 CAN_ERR_RESTARTED = 0x100
 CAN_ERR_CNT = 0x200
+MOST_NUMBER = 0xFFFFFF  # occurrences that the three bytes of a record hold
 
 # data[1]: a state is reported once, with the side that caused it
 _CONTROLLER = (
@@ -106,6 +108,22 @@ def events_of(error_class: int, data: bytes, bus: BusName, time_ns: int) -> list
     if error_class == disconnected and data[4] == no_wire:
         return [LinkEvent(bus, LinkState.DISCONNECTED, time_ns)]
     return link_events(error_class, data, bus, time_ns)
+
+
+def event_of_record(
+    flagged: int, length: int, number: int, data: bytes, bus: BusName, time_ns: int
+) -> LinkEvent | None:
+    """The link event of a record with an error frame of ours; None where it is none.
+
+    Parameters
+    ----------
+    flagged : class of the error frame with the flags of `hil.bus.can_frame`.  length, data : its data bytes.
+    number : occurrences.
+    """
+    found = events_of(flagged ^ ERROR_FLAG, data, bus, time_ns)
+    if length != len(data) or flagged >> 30 or len(found) != 1:
+        return None
+    return found[0]._replace(number=number)
 
 
 def append_event(event: LinkEvent, received: list[Received]) -> None:

@@ -19,14 +19,13 @@ import struct
 
 from dbc.frame import BusName, Frame, LinkEvent, Received
 from hil.bus.can_frame import CAN_FRAME, ERROR_FLAG, EXTENDED_FLAG, EXTENDED_MASK, STANDARD_MASK
-from hil.bus.error_frame import error_frame, events_of
+from hil.bus.error_frame import MOST_NUMBER, error_frame, event_of_record
 
 MAGIC = b"BBL1"
 MAX_FRAMES = 64
 _frame = tuple.__new__  # what a named tuple's own constructor calls, at half the cost
 _HEADER = struct.Struct("=4sIQq")
 _EVENT = struct.Struct("=IB3s8s")
-_MOST_NUMBER = 0xFFFFFF
 MAX_PACKET = _HEADER.size + MAX_FRAMES * CAN_FRAME.size
 
 
@@ -38,16 +37,13 @@ def pack_header(count: int, sequence: int, time_ns: int) -> bytes:
 def pack_event(event: LinkEvent) -> bytes:
     """Return a link event in place of a frame."""
     error_class, data = error_frame(event)
-    number = min(event.number, _MOST_NUMBER).to_bytes(3, "little")
+    number = min(event.number, MOST_NUMBER).to_bytes(3, "little")
     return _EVENT.pack(ERROR_FLAG | error_class, len(data), number, data)
 
 
 def _event(packet: bytes, index: int, bus: BusName, time_ns: int) -> LinkEvent | None:
     flagged, length, number, data = _EVENT.unpack_from(packet, _HEADER.size + index * _EVENT.size)
-    found = events_of(flagged ^ ERROR_FLAG, data, bus, time_ns)
-    if length != 8 or flagged >> 30 or len(found) != 1:
-        return None
-    return found[0]._replace(number=int.from_bytes(number, "little"))
+    return event_of_record(flagged, length, int.from_bytes(number, "little"), data, bus, time_ns)
 
 
 def unpack(packet: bytes, bus: BusName) -> tuple[int, list[Received]] | None:

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from dbc.frame import BusName, Frame, LinkEvent, LinkState, Received
-from hil.bus.bus import BusSpec
+from hil.bus.bus import JOINABLE, BusSpec
 from hil.bus.can_frame import pack_frame
 from hil.bus.channel import claim_adapter
 from hil.bus.driver_threads import MOST_AGE_NS, DriverThreads
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     import can
 
 _MOST_RECEIVED = 1 << 16  # frames and events that wait to be received; beyond it they are lost and counted
-_SHARED = {"virtual", "udp_multicast", "brakebench", "socketcan", "socketcand"}  # any number of processes joins
 # with a timeout of 0 these write half a line, or fail although they sent; None waits
 _SEND_TIMEOUTS_S: dict[str, float | None] = {"slcan": MOST_AGE_NS * 1e-9, "canalystii": None}
 
@@ -54,7 +53,7 @@ class PythonCanBus:
         self._overrun = 0
         self._closed = False
         claim = contextlib.ExitStack()
-        if spec.kind not in _SHARED:
+        if spec.kind not in JOINABLE:
             claim.enter_context(claim_adapter(spec))
         self._claim = claim
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)

@@ -75,6 +75,7 @@ def open_driver(spec: BusSpec) -> tuple["can.BusABC", "can.Message | None"]:
     except Exception as error:  # drivers raise ImportError, OSError, NameError, ...
         raise BusError(f"bus {spec.name}: {reason(spec, error)}") from error
     if spec.kind == "slcan":
+        # slcan's own attribute, which BusABC does not declare
         driver.serialPortOrig = BufferedPort(driver.serialPortOrig)  # type: ignore[attr-defined]
     try:
         return driver, driver.recv(0.0)

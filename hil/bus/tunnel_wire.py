@@ -16,12 +16,11 @@ frame (`hil.bus.error_frame`).
 """
 
 import struct
-from collections.abc import Sequence
 from typing import NamedTuple
 
-from dbc.frame import BusName, Frame, LinkEvent, Received
+from dbc.frame import BusName, Frame, Received
 from hil.bus.can_frame import ERROR_FLAG, EXTENDED_FLAG, EXTENDED_MASK, STANDARD_MASK
-from hil.bus.error_frame import error_frame, events_of
+from hil.bus.error_frame import MOST_NUMBER, error_frame, event_of_record
 from hil.errors import BrakebenchError
 
 HELLO = b"BBTUNL1\n"
@@ -32,7 +31,6 @@ UNKNOWN = -(1 << 63)
 _HEADER = struct.Struct("!HqqQQ")
 _RECORD = struct.Struct("!BIB3s8sq")
 _BUSES = (BusName.VEHICLE, BusName.BENCH)
-_MOST_NUMBER = 0xFFFFFF
 _SHOWN = 24  # bytes of what was expected to be something else
 
 
@@ -62,7 +60,7 @@ def _record(item: Received) -> bytes:
         flagged = item.can_id | EXTENDED_FLAG if item.extended else item.can_id
         return _RECORD.pack(bus, flagged, len(item.data), b"\0\0\0", item.data, item.time_ns)
     error_class, data = error_frame(item)
-    number = min(item.number, _MOST_NUMBER).to_bytes(3, "big")
+    number = min(item.number, MOST_NUMBER).to_bytes(3, "big")
     return _RECORD.pack(bus, ERROR_FLAG | error_class, len(data), number, data, item.time_ns)
 
 
@@ -116,7 +114,7 @@ class PacketReader:
                 if can_id <= (EXTENDED_MASK if extended else STANDARD_MASK):
                     return Frame(name, can_id, data[:length], time_ns, extended)
             else:
-                found: Sequence[LinkEvent] = events_of(flagged ^ ERROR_FLAG, data, name, time_ns)
-                if length == 8 and not flagged >> 30 and len(found) == 1:
-                    return found[0]._replace(number=int.from_bytes(number, "big"))
+                event = event_of_record(flagged, length, int.from_bytes(number, "big"), data, name, time_ns)
+                if event is not None:
+                    return event
         raise GarbledError(f"expected a frame or a link event, got {self._seen(at)}")

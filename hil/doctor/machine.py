@@ -6,7 +6,7 @@ import resource
 from pathlib import Path
 
 from hil.doctor.line import Line, Status, read, write_as_root
-from hil.rt.realtime import PRIORITY
+from hil.rt.realtime import PRIORITY, realtime_refusal
 
 _CAP_IPC_LOCK = 14  # linux/capability.h
 _FAST_CLOCKS = {"tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page"}  # read without a system call
@@ -21,14 +21,9 @@ def machine_lines(root: Path = Path("/")) -> list[Line]:
 def scheduling_line(root: Path) -> Line:
     """Try what ``--realtime`` asks for, and give it back."""
     model = next((word for word in platform.version().split() if word.startswith("PREEMPT")), "no preemption")
-    policy, parameter = os.sched_getscheduler(0), os.sched_getparam(0)
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
-    except OSError as error:
-        return Line(
-            "real time", Status.WARNING, f"no SCHED_FIFO ({error.strerror}); kernel: {model}", _allow_scheduling(root)
-        )
-    os.sched_setscheduler(0, policy, parameter)
+    refusal = realtime_refusal()
+    if refusal:
+        return Line("real time", Status.WARNING, f"no SCHED_FIFO ({refusal}); kernel: {model}", _allow_scheduling(root))
     return Line("real time", Status.OK, f"--realtime gets SCHED_FIFO {PRIORITY}; kernel: {model}")
 
 

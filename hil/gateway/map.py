@@ -164,7 +164,7 @@ def _oldest_ns(table: Table, cycle: int, where: str) -> int:
     return round(age_ms * 1e6)
 
 
-def _conversion(table: Table, signal: Signal, where: str) -> Conversion:
+def _conversion(table: Table, where: str) -> Conversion:
     if "above" in table:
         if set(_CONVERSION) & set(table):
             raise GatewayError(f"{where}: above: a switch has no {', '.join(_CONVERSION)}")
@@ -209,7 +209,7 @@ def _to_theirs(database: UserDatabase, name: str, table: Any, where: str) -> ToT
                 f"{', '.join(list(fields)[:3])}, got {entry.get('from')!r}"
             )
         spec, index = fields[entry["from"]]
-        conversion = _conversion(entry, signal, here)
+        conversion = _conversion(entry, here)
         if conversion.factor == 0.0 or signal.factor == 0:
             raise GatewayError(f"{here}: a scale, sign or factor of 0 cannot be turned round")
         sources.append(FromOurs(signal, spec, index, conversion, _raw_none(entry, signal, here)))
@@ -242,9 +242,7 @@ def _field(
     name, _, signal_name = str(entry.get("from")).partition(".")
     message = database.message(name, f"{where}: from")
     signal = signal_of(message, signal_name, f"{where}: from")
-    return FromTheirs(
-        receive.heard(message), signal, _conversion(entry, signal, where), _raw_none(entry, signal, where)
-    )
+    return FromTheirs(receive.heard(message), signal, _conversion(entry, where), _raw_none(entry, signal, where))
 
 
 class _Receive:

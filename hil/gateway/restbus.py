@@ -36,8 +36,9 @@ def sendings(database: UserDatabase, nodes: Collection[str], settings: Path | No
             sender = database.messages[name].sender or "nobody"
             raise GatewayError(f"{settings}: send.{name}: it is sent by {sender}, not by {', '.join(nodes)}")
     found = []
+    source = database.path if settings is None else settings
     for name in sorted(chosen, key=lambda one: database.messages[one].can_id):
-        where = f"{settings}: send.{name}"
+        where = f"{source}: send.{name}"
         table = only(tables.get(name, {}), ("cycle_ms", "counter", "protection", "start"), where)
         message = database.messages[name]
         stated = only(table.get("start", {}), tuple(s.name for s in message.signals), f"{where}.start")

@@ -18,7 +18,7 @@ from hil.gateway.restbus import RestBus
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop
 from hil.rt.process import StopSignal
-from hil.rt.realtime import request_realtime, request_timer_slack
+from hil.rt.realtime import request_punctuality
 
 PERIOD_NS = 1_000_000
 """Of the ticks: cycle times of a database are whole milliseconds."""
@@ -70,7 +70,8 @@ def serve_gateway(
             from_ours, from_theirs = _received(our_bus, say), _received(their_bus, say)
             their_bus.send(their_side.step(tick.now_ns, from_ours))
             our_bus.send(our_side.step(tick.now_ns, from_theirs))
-            for name in (_named(from_ours, our_side.names) | _named(from_theirs, their_side.names)) - others:
+            heard = _named(our_bus, from_ours, our_side.names) | _named(their_bus, from_theirs, their_side.names)
+            for name in heard - others:
                 others.add(name)
                 say(_TOO.format(name))
             if stop.asked:
@@ -105,7 +106,7 @@ def serve_restbus(
                     say(str(error))
             received = _received(bus, say)
             bus.send(restbus.step(tick.now_ns, received))
-            for name in _named(received, restbus.names) - others:
+            for name in _named(bus, received, restbus.names) - others:
                 others.add(name)
                 say(_TOO.format(name))
             if stop.asked:
@@ -133,14 +134,14 @@ def _refuse_others(bus: Bus | ListeningBus, names: Mapping[tuple[int, bool], str
 
 
 def _loop(realtime: bool, say: Say) -> Loop:
-    for grant in request_realtime() if realtime else [request_timer_slack()]:
-        if realtime or not grant.granted:
-            say(f"{grant.what}: {'granted' if grant.granted else 'NOT granted'}, {grant.detail}")
+    request_punctuality(realtime, say)
     return Loop(WallClock(), PERIOD_NS)
 
 
-def _named(received: list[Received], names: Mapping[tuple[int, bool], str]) -> set[str]:
-    """Messages of ours, by identifier and extended, that somebody else has sent."""
+def _named(bus: Bus | ListeningBus, received: list[Received], names: Mapping[tuple[int, bool], str]) -> set[str]:
+    """Messages of ours, by identifier and extended, that somebody else has sent; none where we only listen."""
+    if isinstance(bus, ListeningBus):
+        return set()
     return {names[i.can_id, i.extended] for i in received if isinstance(i, Frame) and (i.can_id, i.extended) in names}
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 PRIORITY = 50
 """SCHED_FIFO priority, 1..99: above every ordinary process; the kernel's threaded interrupts have 50 too."""
 
+GRANTED, NOT_GRANTED = "granted", "NOT granted"
 _PR_SET_TIMERSLACK = 29  # linux/prctl.h
 _MCL_CURRENT, _MCL_FUTURE = 1, 2  # bits/mman-linux.h
 _CAP_IPC_LOCK = 14  # linux/capability.h
@@ -46,15 +47,23 @@ def request_realtime() -> list[Grant]:
     return [step() for step in steps]
 
 
-def may_be_realtime() -> bool:
-    """Whether this process would be granted SCHED_FIFO; it is tried, and given back at once."""
+def request_punctuality(realtime: bool, say: Callable[[str], None]) -> None:
+    """Ask for all with ``realtime``, else for what is free; say what was granted, of the free part a refusal alone."""
+    for grant in request_realtime() if realtime else [request_timer_slack()]:
+        if realtime or not grant.granted:
+            say(f"{grant.what}: {GRANTED if grant.granted else NOT_GRANTED}, {grant.detail}")
+
+
+def realtime_refusal() -> str:
+    """Why this process would not be granted SCHED_FIFO, empty where it would; it is tried, and given back at once."""
     policy, parameter = os.sched_getscheduler(0), os.sched_getparam(0)
+    kept = policy & os.SCHED_RESET_ON_FORK  # may be set by anybody, cleared with CAP_SYS_NICE alone: sched(7)
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
-    except OSError:
-        return False
+        os.sched_setscheduler(0, os.SCHED_FIFO | kept, os.sched_param(PRIORITY))
+    except OSError as error:
+        return error.strerror or str(error)
     os.sched_setscheduler(0, policy, parameter)
-    return True
+    return ""
 
 
 def _scheduling() -> Grant:

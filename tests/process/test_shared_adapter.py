@@ -74,6 +74,22 @@ def test_frames_and_link_events_pass_with_their_times_and_a_second_owner_is_refu
     assert "disconnected" in words
 
 
+@pytest.mark.slow
+def test_what_the_sharer_itself_lost_of_the_loopback_is_said(start, device, spec):
+    share = start("share", "--bus", spec, "--transmit")
+    share.stderr.readline()
+    with open_bus(shared_channel(spec), VEHICLE) as one:
+        share.send_signal(signal.SIGSTOP)
+        for _ in range(200):  # more than its queue holds
+            one.send([Frame(VEHICLE, 0x123, b"\x01")] * 64)
+        share.send_signal(signal.SIGCONT)
+        one.send([Frame(VEHICLE, 0x124, b"\x02")])
+        wait_until(lambda: any(line.startswith("t124") for line in device.commands) or share.poll(), "the last frame", 30)
+        share.send_signal(signal.SIGINT)
+        words = share.communicate(timeout=RUN_LIMIT_S)[1]
+    assert f"{shared_channel(spec)}: rx_overflow (" in words
+
+
 @pytest.mark.parametrize(
     ("bus", "words"),
     [

@@ -60,10 +60,10 @@ _CODES = f"""
 
 The three bytes of a code are its number in [trouble-codes.md](trouble-codes.md) and 0x00. The law debounces: a code
 that it finds active is failed, pending and confirmed in the same tick, and the warning indicator is asked for while it
-is active. When the code heals, *test failed* and the indicator are cleared. The snapshot (record 0x01) holds the car when the code
-became confirmed; extended data are how often it became active (0x01), operation cycles without failure (0x02) and the
-fault detection counter (0x03). An operation cycle lasts from one ECUReset to the next; after {AGED_AFTER} of them
-without failure a code is forgotten. The memory lasts over resets, not over the end of the process.
+is active. When the code heals, *test failed* and the indicator are cleared. The snapshot (record 0x01) holds the car
+when the code became confirmed; extended data are how often it became active (0x01), operation cycles without failure
+(0x02) and the fault detection counter (0x03). An operation cycle lasts from one ECUReset to the next; after
+{AGED_AFTER} of them without failure a code is forgotten. The memory lasts over resets, not over the end of the process.
 ClearDiagnosticInformation takes all codes (0xFFFFFF) or one; one that is still active comes again at the next tick.
 
 ## SecurityAccess

@@ -54,8 +54,25 @@ def test_what_was_refused_is_said_with_a_remedy(monkeypatch):
 
 def test_whether_it_would_be_granted_changes_nothing():
     before = os.sched_getscheduler(0)
-    assert realtime.may_be_realtime() in (True, False)
+    assert realtime.realtime_refusal() == realtime.realtime_refusal()
     assert os.sched_getscheduler(0) == before
+
+
+def test_whether_it_would_be_granted_needs_no_right_to_clear_a_flag(monkeypatch):
+    """Who has no more than rtprio may set SCHED_RESET_ON_FORK, and never clear it: sched(7)."""
+    now = [os.SCHED_OTHER]
+
+    def without_capability(_, policy, parameter):
+        if now[0] & os.SCHED_RESET_ON_FORK and not policy & os.SCHED_RESET_ON_FORK:
+            raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+        now[0] = policy
+
+    monkeypatch.setattr(os, "sched_getscheduler", lambda _: now[0])
+    monkeypatch.setattr(os, "sched_setscheduler", without_capability)
+    for flag in (0, os.SCHED_RESET_ON_FORK):
+        now[0] = os.SCHED_OTHER | flag
+        assert realtime.realtime_refusal() == ""
+        assert now[0] == os.SCHED_OTHER | flag
 
 
 def test_memory_is_not_locked_under_a_limit(monkeypatch):
