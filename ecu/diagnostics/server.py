@@ -156,12 +156,12 @@ class DiagnosticServer:
             motor,
             services.silent,
             services.parameters,
-            services.routines.zero_pa if services.routines.zero_found else None,
+            services.routines.zero_pa,
             services.forget,
             restart,
             restart and services.restart == HARD_RESET,
         )
-        services.parameters, services.forget, services.routines.zero_found = None, (), False
+        services.parameters, services.forget, services.routines.zero_pa = None, (), None
         if restart:
             services.restart = None
         return orders if orders != NO_ORDERS else NO_ORDERS

@@ -248,6 +248,13 @@ def test_zero_of_the_pressure_sensors(bench):
     client.ecu_reset(1)
     bench.tester.step(100)
     assert client.read_data_by_identifier_first(0x0205)[0] == pytest.approx(6e5)
+    car.pressure_fl_pa = 1.5e5
+    bench.unlock()
+    client.start_routine(0x0203)
+    bench.tester.step(60)
+    status = client.get_routine_result(0x0203).service_data.routine_status_record
+    assert struct.unpack(">B4f", status) == pytest.approx((2, 1.5e5, 0.0, 0.0, 0.0))
+    assert client.read_data_by_identifier_first(0x0205)[0] == pytest.approx(0.0, abs=1.0)
 
 
 def test_messages_are_silent_only_while_the_car_stands(bench):
