@@ -155,7 +155,7 @@ class EcuNode:
             motor = instead(outputs.motor_demand_nm, orders.motor_nm)
             self.memory, self.outputs = asked_instead(m, outputs, pressure, motor)
         frames = self._tell(now_ns, self.outputs or outputs)
-        self._silenced = orders.silent
+        self._silenced = orders.silent and not orders.restart  # a reset ends the session that silenced it
         if orders.silent:
             frames = [frame for frame in frames if frame.bus is not BusName.VEHICLE]
         self._obey(orders)

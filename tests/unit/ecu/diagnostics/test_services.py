@@ -275,6 +275,16 @@ def test_messages_are_silent_only_while_the_car_stands(bench):
     refused(0x22, client.communication_control, 1, 1)
 
 
+def test_after_a_reset_a_silenced_node_says_farewell_again(bench):
+    client, node = bench.client, bench.rig.node
+    client.change_session(3)
+    client.communication_control(1, 1)
+    assert node.farewell(bench.rig.tick * 10_000_000) == []
+    client.ecu_reset(1)
+    assert any(frame.bus.value == "vehicle" for frame in bench.tester.step(20))
+    assert len(node.farewell(bench.rig.tick * 10_000_000)) == 4
+
+
 def test_periodic_reading_at_100_hz(bench):
     tester = bench.tester
     bench.client.change_session(3)
