@@ -70,6 +70,7 @@ class DiagnosticServer:
         """
         services, link = self._services, self._link
         self.troubles = view.troubles
+        was_off = not services.memory.enabled
         services.memory.update(view.troubles)
         if services.session != Session.DEFAULT and not self._busy and now_ns - self._active_ns >= S3_NS:
             services.enter(Session.DEFAULT)
@@ -86,7 +87,9 @@ class DiagnosticServer:
         if orders.restart:
             services.memory.new_cycle()
             services.enter(Session.DEFAULT)
-        self.awake = self._busy or services.session != Session.DEFAULT or services.restart is not None
+        in_session = services.session != Session.DEFAULT
+        # codes that came with their setting off are taken at the tick after it
+        self.awake = self._busy or in_session or services.restart is not None or was_off
         return frames, orders
 
     @property
