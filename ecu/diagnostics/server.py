@@ -79,8 +79,10 @@ class DiagnosticServer:
             self._pending = None
         for frame in received:
             self._take(now_ns, frame, view)
-        frames = [_frame(PERIODIC, data) for data in services.due(now_ns, view)]
-        frames += [_frame(RESPONSE, data) for data in link.frames(now_ns)]
+        link.burst = BURST - len(services.periodic)
+        # more would be flow controls of requests that others have cut off since
+        frames = [_frame(RESPONSE, data) for data in link.frames(now_ns)[-BURST:]]
+        frames += [_frame(PERIODIC, data) for data in services.due(now_ns, view, BURST - len(frames))]
         if self._busy:
             self._active_ns = now_ns
         orders = self._orders(view)
@@ -142,7 +144,7 @@ class DiagnosticServer:
         ticks = 0
         for size in (block,) * full + ((rest,) if rest else ()):
             # its flow control, then its frames
-            ticks += 1 + (gap_ticks * (size - 1) if gap_ticks else (size - 1) // BURST)
+            ticks += 1 + (gap_ticks * (size - 1) if gap_ticks else (size - 1) // self._link.burst)
         return ticks * self._period_ns
 
     def _orders(self, view: View) -> Orders:

@@ -230,11 +230,11 @@ class Services:
             self.periodic.update(dict.fromkeys(known, (RATES_NS[mode], now_ns)))
         return b""
 
-    def due(self, now_ns: int, view: View) -> list[bytes]:
-        """Periodic identifiers that are due, each with its record."""
-        out = []
+    def due(self, now_ns: int, view: View, most: int) -> list[bytes]:
+        """Periodic identifiers that are due, each with its record; beyond ``most`` they stay due."""
+        out: list[bytes] = []
         for low, (period_ns, due_ns) in self.periodic.items():
-            if due_ns <= now_ns:
+            if due_ns <= now_ns and len(out) < most:
                 self.periodic[low] = period_ns, max(due_ns + period_ns, now_ns + 1)
                 out.append(bytes((low,)) + quantities.record(quantities.QUANTITIES[low], view))
         return out

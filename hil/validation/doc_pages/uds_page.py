@@ -42,8 +42,9 @@ finds exactly this.
   size and STmin of the tester's last flow control. Before the first flow control it assumes the slowest values. If a
   tester becomes slower between two answers, one answer may end late.
 - **Lengths**: requests up to {MOST_REQUEST} bytes, answers up to {MOST_ANSWER} (longer: 0x14). At most {BURST}
-  diagnostic frames are sent per tick, for adapters with short queues. While an answer is being sent, other requests are
-  ignored, except tester present with a suppressed answer.
+  diagnostic frames are sent per tick, for adapters with short queues: answers first, then periodic data. A long answer
+  leaves room for all periodic identifiers that are active, and takes longer for it. While an answer is being sent,
+  other requests are ignored, except tester present with a suppressed answer.
 - **Functional requests** are answered, but the negative answers {_SILENT} are not sent. **Suppressed** positive
   answers: bit 0x80 of the sub-function.
 - **Checks** come in the order of ISO 14229-1: 0x11 service, 0x7F session, 0x13 least length, 0x12 sub-function, 0x31

@@ -8,12 +8,13 @@ import pytest
 from uds_tester import functional
 from udsoncan.exceptions import NegativeResponseException
 
-from dbc.diagnostic_ids import REQUEST, REQUEST_FUNCTIONAL, RESPONSE
+from dbc.diagnostic_ids import PERIODIC, REQUEST, REQUEST_FUNCTIONAL, RESPONSE
 from dbc.frame import BusName, Frame
 from dbc.isotp import segment
 from dbc.messages import WheelSpeedFront
 from ecu.diagnostics.calibration import PARAMETERS
 from ecu.diagnostics.identifiers import IDENTIFIERS
+from ecu.diagnostics.protocol import BURST
 
 DEMAND_FL = 0x4000
 
@@ -311,6 +312,37 @@ def test_periodic_reading_at_100_hz(bench):
     tester.periodic.clear()
     tester.step(20)
     assert tester.periodic == []
+
+
+def test_answers_come_before_periodic_data_and_both_keep_to_the_queues_of_adapters(bench):
+    tester, ticks = bench.tester, []
+    step = tester._tick
+    tester._tick = lambda out: ticks.append([f for f in step(out) if f.can_id in (RESPONSE, PERIODIC)]) or ticks[-1]
+    bench.client.change_session(3)
+    ticks.clear()
+    assert tester.ask("2a 03 00 01 02 03 04 05 06 07") == ["6a"]
+    begun = next(frames for frames in ticks if any(frame.can_id == PERIODIC for frame in frames))
+    assert [frame.can_id for frame in begun] == [RESPONSE] + [PERIODIC] * 8
+    tester.periodic.clear()
+    dids = [did for did, one in PARAMETERS.items() if one.numbers][:40]
+    bench.client.read_data_by_identifier(dids)
+    asked = tester.now_ns
+    bench.client.read_data_by_identifier(dids)  # its flow control is known now: one frame a tick takes too long
+    first, last = tester.answered_ns
+    assert first - asked <= 50_000_000 < last - asked
+    long = segment(b"\x22" + b"".join(did.to_bytes(2, "big") for did in dids))[0]
+    present = Frame(BusName.VEHICLE, REQUEST_FUNCTIONAL, b"\x02\x3e\x00")
+    tester._tick([Frame(BusName.VEHICLE, REQUEST, long), present])  # a flow control and an answer at once
+    tester.step(5)
+    tester._tick([Frame(BusName.VEHICLE, REQUEST, long)] * 12)  # only the last one is worth a flow control
+    tester.step(5)
+    assert max(map(len, ticks)) == BURST
+    records = [data for frames in ticks for data in (f.data for f in frames if f.can_id == PERIODIC)]
+    for low in range(8):
+        counts = [data[1] for data in records if data[0] == low]
+        assert len(counts) > 50
+        # one that had no room came a tick later
+        assert sum((b - a) & 0xFF != 1 for a, b in pairwise(counts)) <= 2
 
 
 def test_suppressed_answers_and_functional_requests(bench):
