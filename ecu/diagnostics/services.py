@@ -111,13 +111,13 @@ class Services:
         return self._serve[request[0]](now_ns, request, view)
 
     def enter(self, session: Session) -> None:
-        """Begin a session: what needs one or the lock is given back, the rest with the default session."""
+        """Begin a session: what needs the lock is given back, the rest with the default session (ISO 14229-1)."""
         self.session = session
         self.security.lock()
         self.actuators.release()
         self.routines.abort()
-        self.periodic.clear()
         if session == Session.DEFAULT:
+            self.periodic.clear()
             self.silent = False
             self.memory.enabled = True
 

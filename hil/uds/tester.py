@@ -174,6 +174,7 @@ class Tester:
         lows : low bytes of the data identifiers.
         """
         self.session(EXTENDED_SESSION)
+        self.ask(bytes((_PERIODIC, _STOP)))  # of another tester that has just ended: it counts among the most at once
         self._connection.take_periodic(0.0)
         self.ask(bytes((_PERIODIC, rate)) + lows)
         taken: list[tuple[int, bytes]] = []

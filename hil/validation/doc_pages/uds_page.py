@@ -50,7 +50,7 @@ finds exactly this.
 - **Checks** come in the order of ISO 14229-1: 0x11 service, 0x7F session, 0x13 least length, 0x12 sub-function, 0x31
   identifier, 0x33 lock, 0x13 length, 0x31 value, 0x22 conditions.
 - **The session ends** {S3_NS // 10**9} s after the last request. Then, and at each change of session, the tester's
-  demands go back to the law, routines stop, periodic data end, the lock closes; with the default session messages are
+  demands go back to the law, routines stop, the lock closes; with the default session periodic data end, messages are
   sent again and the setting of codes is on.
 - **The driver comes first**: pressures and motors are the tester's only while the car stands by every wheel speed and
   by the estimate, the mode has demands and the driver does not brake. In the tick in which one of these ends, the law

@@ -314,6 +314,17 @@ def test_periodic_reading_at_100_hz(bench):
     assert tester.periodic == []
 
 
+@pytest.mark.parametrize(("session", "number"), [(3, 20), (1, 0)])
+def test_periodic_reading_ends_with_the_default_session_only(bench, session, number):
+    tester = bench.tester
+    bench.client.change_session(3)
+    assert tester.ask("2a 03 00") == ["6a"]
+    bench.client.change_session(session)
+    tester.periodic.clear()
+    tester.step(20)
+    assert len(tester.periodic) == number
+
+
 def test_answers_come_before_periodic_data_and_both_keep_to_the_queues_of_adapters(bench):
     tester, ticks = bench.tester, []
     step = tester._tick
