@@ -2,7 +2,8 @@
 
 from enum import IntEnum
 
-P2_NS = 50_000_000  # ISO 14229-2: an answer ends within it, or 0x78 comes first
+# ISO 14229-2: an answer begins within it; choice: it ends within it, or 0x78 comes first (udsoncan waits for the end)
+P2_NS = 50_000_000
 P2_STAR_NS = 10_000_000_000  # choice: the longest answer at the longest STmin of 127 ms, see MOST_ANSWER
 S3_NS = 5_000_000_000  # ISO 14229-2: S3 server, a session other than the default one ends without requests
 LATENESS_NS = 10_000_000  # choice: of P2, for the tick of a busy machine

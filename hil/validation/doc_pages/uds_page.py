@@ -37,8 +37,9 @@ finds exactly this.
 | answers | 0x{RESPONSE:03X} |
 | periodic data, without ISO-TP | 0x{PERIODIC:03X} |
 
-- **Times**: P2 {P2_NS // 10**6} ms, P2* {P2_STAR_NS // 10**9} s, S3 {S3_NS // 10**9} s. A complete answer ends within
-  P2. If it would take longer, response pending (0x78) is sent first. The controller estimates the duration from block
+- **Times**: P2 {P2_NS // 10**6} ms, P2* {P2_STAR_NS // 10**9} s, S3 {S3_NS // 10**9} s. ISO 14229-2 asks that
+  an answer begins within P2. Here a complete answer ends within P2, because some testers (udsoncan) measure to its end.
+  If it would take longer, response pending (0x78) is sent first. The controller estimates the duration from block
   size and STmin of the tester's last flow control. Before the first flow control it assumes the slowest values. If a
   tester becomes slower between two answers, one answer may end late.
 - **Lengths**: requests up to {MOST_REQUEST} bytes, answers up to {MOST_ANSWER} (longer: 0x14). At most {BURST}
