@@ -191,7 +191,7 @@ class Conversation:
         """Whether a message answers the request that is open: of the same first byte, it is no periodic data then."""
         partner = self.addresses.partner(identifier)
         asked = None if partner is None else self._asked.get((place, partner))
-        return asked is not None and asked.service == describe(data).service
+        return asked is not None and asked.wanted and asked.service == describe(data).service
 
     def _ask(self, joined: JoinedMessage, place: int, identifier: Identifier, said: Said) -> None:
         with_sub = said.service in names.WITH_SUBFUNCTION and len(joined.data) > 1
