@@ -89,6 +89,7 @@ class DiagnosticServer:
         if orders.restart:
             services.memory.new_cycle()
             services.enter(Session.DEFAULT)
+        link.errors.clear()  # a tester sees for itself what was given up
         in_session = services.session != Session.DEFAULT
         # codes that came with their setting off are taken at the tick after it
         self.awake = self._busy or in_session or services.restart is not None or was_off
@@ -106,12 +107,10 @@ class DiagnosticServer:
             request = self._link.take(now_ns, frame.data)
         if request is None:
             return
-        if self._services.session != Session.DEFAULT:
-            self._active_ns = now_ns
+        self._active_ns = now_ns
         if self._services.restart is not None or ((self._link.sending or self._pending) and not _silent(request)):
             return  # an answer is on its way, and a tester waits for it
         answer = self._answer(now_ns, request, frame.can_id == REQUEST_FUNCTIONAL, view)
-        self._active_ns = now_ns
         if answer is None:
             return
         if self._duration_ns(len(answer)) > P2_NS - LATENESS_NS - self._period_ns:

@@ -99,7 +99,6 @@ class Tester:
         tell: Callable[[Exchange], None] = lambda _: None,
     ) -> None:
         self.known = known
-        self.exchanges: list[Exchange] = []
         self._connection, self._tell = connection, tell
         for name in ("UdsClient", connection.name):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # all of it comes as an error of ours
@@ -203,7 +202,7 @@ class Tester:
         self._asked(request, lambda: self._client.clear_dtc(group))
 
     def _asked(self, payload: bytes, do: Callable[[], Any]) -> Any:
-        """Do what asks; its errors become ours, and the exchange is kept."""
+        """Do what asks; its errors become ours, and the exchange is told."""
         begin_ns = monotonic_ns()
         answer = b""
         try:
@@ -225,8 +224,7 @@ class Tester:
             answer = error.response.original_payload or b""
             raise NoAnswerError(f"{service_text(payload[0])}: {error}: {answer.hex(' ')}") from error
         finally:
-            self.exchanges.append(Exchange(payload, answer, monotonic_ns() - begin_ns))
-            self._tell(self.exchanges[-1])
+            self._tell(Exchange(payload, answer, monotonic_ns() - begin_ns))
 
 
 def _found(answer: Any) -> list[FoundDtc]:

@@ -98,6 +98,7 @@ def test_seed_and_key(bench):
     client = bench.client
     client.change_session(3)
     refused(0x24, client.send_key, 2, bytes(4))
+    assert bench.tester.ask("27 02") == ["7f 27 13"]  # the length is looked at first
     for code in (0x35, 0x35, 0x36):
         client.request_seed(1)
         refused(code, client.send_key, 2, bytes(4))
@@ -400,4 +401,5 @@ def test_an_answer_that_nobody_takes_is_given_up(bench):
     for _ in range(30):
         step(1)
     assert not bench.server.awake
+    assert bench.server._link.errors == []  # nobody reads them: they must not grow
     assert bench.tester.ask("3e 00") == ["7e 00"]
