@@ -84,7 +84,9 @@ def test_what_the_sharer_itself_lost_of_the_loopback_is_said(start, device, spec
             one.send([Frame(VEHICLE, 0x123, b"\x01")] * 64)
         share.send_signal(signal.SIGCONT)
         one.send([Frame(VEHICLE, 0x124, b"\x02")])
-        wait_until(lambda: any(line.startswith("t124") for line in device.commands) or share.poll(), "the last frame", 30)
+        wait_until(
+            lambda: any(line.startswith("t124") for line in device.commands) or share.poll(), "the last frame", 30
+        )
         share.send_signal(signal.SIGINT)
         words = share.communicate(timeout=RUN_LIMIT_S)[1]
     assert f"{shared_channel(spec)}: rx_overflow (" in words
