@@ -147,15 +147,15 @@ class EcuNode:
 
     def _diagnose(self, now_ns: int, inputs: Inputs, outputs: Outputs) -> list[Frame]:
         """End a tick in which diagnostics take part: frames to send, theirs last."""
-        m = self.memory
-        view = View(m.time_s, inputs, outputs, m.estimates, m.friction, m.troubles, self.parameters)
+        m, zero = self.memory, self._pressure_zero_pa
+        view = View(m.time_s, inputs, outputs, m.estimates, m.friction, m.troubles, self.parameters, zero)
         answers, orders = self.diagnostics.step(now_ns, self._receiver.others, view)
         if orders.pressure_pa is not None or orders.motor_nm is not None:
             pressure = instead(outputs.pressure_demand_pa, orders.pressure_pa)
             motor = instead(outputs.motor_demand_nm, orders.motor_nm)
             self.memory, self.outputs = asked_instead(m, outputs, pressure, motor)
         frames = self._tell(now_ns, self.outputs or outputs)
-        self._silenced = orders.silent
+        self._silenced = orders.silent and not orders.restart  # a reset ends the session that silenced it
         if orders.silent:
             frames = [frame for frame in frames if frame.bus is not BusName.VEHICLE]
         self._obey(orders)

@@ -15,7 +15,10 @@ _WITH_DEMANDS = (BrakeMode.NORMAL, BrakeMode.DEGRADED, BrakeMode.FRICTION_ONLY)
 
 
 class View(NamedTuple):
-    """The controller after the law's step; the diagnostics read it and change nothing in it."""
+    """The controller after the law's step; the diagnostics read it and change nothing in it.
+
+    ``pressure_zero_pa``: what the node takes off what the pressure sensors show.
+    """
 
     time_s: float
     inputs: Inputs
@@ -24,6 +27,7 @@ class View(NamedTuple):
     friction: Four
     troubles: TroubleMemory
     parameters: EcuParameters
+    pressure_zero_pa: Four
 
     @property
     def standstill(self) -> bool:

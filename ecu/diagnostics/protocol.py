@@ -2,13 +2,14 @@
 
 from enum import IntEnum
 
-P2_NS = 50_000_000  # ISO 14229-2: an answer ends within it, or 0x78 comes first
+# ISO 14229-2: an answer begins within it; choice: it ends within it, or 0x78 comes first (udsoncan waits for the end)
+P2_NS = 50_000_000
 P2_STAR_NS = 10_000_000_000  # choice: the longest answer at the longest STmin of 127 ms, see MOST_ANSWER
 S3_NS = 5_000_000_000  # ISO 14229-2: S3 server, a session other than the default one ends without requests
 LATENESS_NS = 10_000_000  # choice: of P2, for the tick of a busy machine
 MOST_REQUEST = MOST_ANSWER = 512  # bytes; 73 consecutive frames of 130 ms (127 ms in ticks of 10 ms): 9.5 s
-BURST = 8  # choice: diagnostic frames a tick at most, 2 ms of a bus of 500 kbit/s; adapters queue 10
-MOST_PERIODIC = 8  # choice: periodic identifiers at once, for the same reason
+MOST_PERIODIC = 8  # choice: periodic identifiers at once, 2 ms of a bus of 500 kbit/s
+BURST = MOST_PERIODIC + 1  # diagnostic frames a tick at most: one is left for answers; adapters queue 10
 NEGATIVE = 0x7F
 POSITIVE = 0x40
 SUPPRESS = 0x80

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 from ecu.diagnostics.exchange import View
 from ecu.diagnostics.protocol import Nrc, Refused
-from ecu.law.types import UNKNOWN, ZERO, Four
+from ecu.law.types import UNKNOWN, Four
 
 SELF_TEST, BLEED, PRESSURE_ZERO = 0x0201, 0x0202, 0x0203
 NAMES = {SELF_TEST: "self test", BLEED: "bleed the brake", PRESSURE_ZERO: "zero of the pressure sensors"}
@@ -30,7 +30,12 @@ class State(IntEnum):
 
 
 class Routines:
-    """Runs at most one routine at a time; results stay until it is started again."""
+    """Runs at most one routine at a time; results stay until it is started again.
+
+    Attributes
+    ----------
+    zero_pa : zero of the pressure sensors that was just found, until the server takes it; the node keeps it.
+    """
 
     def __init__(self) -> None:
         self._states = dict.fromkeys(NAMES, State.NOT_STARTED)
@@ -38,8 +43,7 @@ class Routines:
         self._running: int | None = None
         self._since_s = 0.0
         self._samples: list[Four] = []
-        self.zero_pa: Four = ZERO
-        self.zero_found = False
+        self.zero_pa: Four | None = None
 
     @property
     def running(self) -> bool:
@@ -90,7 +94,7 @@ class Routines:
             return self._bleed(elapsed_s)
         self._samples.append(view.inputs.pressure_pa)
         if elapsed_s >= ZERO_S:
-            self._find_zero()
+            self._find_zero(view.pressure_zero_pa)
         return None
 
     def _bleed(self, elapsed_s: float) -> Four | None:
@@ -103,14 +107,13 @@ class Routines:
         pressure[wheel] = BLEED_PA if phase_s < PULSE_S else 0.0
         return (pressure[0], pressure[1], pressure[2], pressure[3])
 
-    def _find_zero(self) -> None:
+    def _find_zero(self, known: Four) -> None:
         n = len(self._samples)
         a, b, c, d = (sum(values) / n for values in zip(*self._samples, strict=True))
-        known = self.zero_pa
         found = (known[0] + a, known[1] + b, known[2] + c, known[3] + d)
         self._running = None
         if all(abs(value) <= ZERO_MOST_PA for value in found):  # NaN is none
-            self._states[PRESSURE_ZERO], self.zero_pa, self.zero_found = State.DONE, found, True
+            self._states[PRESSURE_ZERO], self.zero_pa = State.DONE, found
         else:
             self._states[PRESSURE_ZERO], found = State.FAILED, found if math.isfinite(sum(found)) else UNKNOWN
         self._results[PRESSURE_ZERO] = struct.pack(">4f", *found)

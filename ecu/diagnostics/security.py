@@ -41,9 +41,9 @@ class Security:
         if request[1] & 0x7F == REQUEST_SEED:
             expect_length(request, 2)
             return bytes((REQUEST_SEED,)) + self._new_seed(now_ns)
+        expect_length(request, 6)
         if self._seed is None:
             raise Refused(Nrc.REQUEST_SEQUENCE_ERROR)
-        expect_length(request, 6)
         seed, self._seed = self._seed, None
         if request[2:] == key_of(seed):
             self.unlocked, self._wrong = True, 0

@@ -70,6 +70,7 @@ class DiagnosticServer:
         """
         services, link = self._services, self._link
         self.troubles = view.troubles
+        was_off = not services.memory.enabled
         services.memory.update(view.troubles)
         if services.session != Session.DEFAULT and not self._busy and now_ns - self._active_ns >= S3_NS:
             services.enter(Session.DEFAULT)
@@ -78,15 +79,20 @@ class DiagnosticServer:
             self._pending = None
         for frame in received:
             self._take(now_ns, frame, view)
-        frames = [_frame(PERIODIC, data) for data in services.due(now_ns, view)]
-        frames += [_frame(RESPONSE, data) for data in link.frames(now_ns)]
+        link.burst = BURST - len(services.periodic)
+        # more would be flow controls of requests that others have cut off since
+        frames = [_frame(RESPONSE, data) for data in link.frames(now_ns)[-BURST:]]
+        frames += [_frame(PERIODIC, data) for data in services.due(now_ns, view, BURST - len(frames))]
         if self._busy:
             self._active_ns = now_ns
         orders = self._orders(view)
         if orders.restart:
             services.memory.new_cycle()
             services.enter(Session.DEFAULT)
-        self.awake = self._busy or services.session != Session.DEFAULT or services.restart is not None
+        link.errors.clear()  # a tester sees for itself what was given up
+        in_session = services.session != Session.DEFAULT
+        # codes that came with their setting off are taken at the tick after it
+        self.awake = self._busy or in_session or services.restart is not None or was_off
         return frames, orders
 
     @property
@@ -101,12 +107,10 @@ class DiagnosticServer:
             request = self._link.take(now_ns, frame.data)
         if request is None:
             return
-        if self._services.session != Session.DEFAULT:
-            self._active_ns = now_ns
+        self._active_ns = now_ns
         if self._services.restart is not None or ((self._link.sending or self._pending) and not _silent(request)):
             return  # an answer is on its way, and a tester waits for it
         answer = self._answer(now_ns, request, frame.can_id == REQUEST_FUNCTIONAL, view)
-        self._active_ns = now_ns
         if answer is None:
             return
         if self._duration_ns(len(answer)) > P2_NS - LATENESS_NS - self._period_ns:
@@ -139,7 +143,7 @@ class DiagnosticServer:
         ticks = 0
         for size in (block,) * full + ((rest,) if rest else ()):
             # its flow control, then its frames
-            ticks += 1 + (gap_ticks * (size - 1) if gap_ticks else (size - 1) // BURST)
+            ticks += 1 + (gap_ticks * (size - 1) if gap_ticks else (size - 1) // self._link.burst)
         return ticks * self._period_ns
 
     def _orders(self, view: View) -> Orders:
@@ -156,12 +160,12 @@ class DiagnosticServer:
             motor,
             services.silent,
             services.parameters,
-            services.routines.zero_pa if services.routines.zero_found else None,
+            services.routines.zero_pa,
             services.forget,
             restart,
             restart and services.restart == HARD_RESET,
         )
-        services.parameters, services.forget, services.routines.zero_found = None, (), False
+        services.parameters, services.forget, services.routines.zero_pa = None, (), None
         if restart:
             services.restart = None
         return orders if orders != NO_ORDERS else NO_ORDERS

@@ -111,13 +111,13 @@ class Services:
         return self._serve[request[0]](now_ns, request, view)
 
     def enter(self, session: Session) -> None:
-        """Begin a session: what needs one or the lock is given back, the rest with the default session."""
+        """Begin a session: what needs the lock is given back, the rest with the default session (ISO 14229-1)."""
         self.session = session
         self.security.lock()
         self.actuators.release()
         self.routines.abort()
-        self.periodic.clear()
         if session == Session.DEFAULT:
+            self.periodic.clear()
             self.silent = False
             self.memory.enabled = True
 
@@ -230,11 +230,11 @@ class Services:
             self.periodic.update(dict.fromkeys(known, (RATES_NS[mode], now_ns)))
         return b""
 
-    def due(self, now_ns: int, view: View) -> list[bytes]:
-        """Periodic identifiers that are due, each with its record."""
-        out = []
+    def due(self, now_ns: int, view: View, most: int) -> list[bytes]:
+        """Periodic identifiers that are due, each with its record; beyond ``most`` they stay due."""
+        out: list[bytes] = []
         for low, (period_ns, due_ns) in self.periodic.items():
-            if due_ns <= now_ns:
+            if due_ns <= now_ns and len(out) < most:
                 self.periodic[low] = period_ns, max(due_ns + period_ns, now_ns + 1)
                 out.append(bytes((low,)) + quantities.record(quantities.QUANTITIES[low], view))
         return out

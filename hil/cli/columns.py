@@ -11,8 +11,8 @@ LEAST_NAME = 8
 
 
 def terminal_width() -> int:
-    """Letters of a line: those of the terminal (or of COLUMNS), 100 where there is none."""
-    return max(LEAST_WIDTH, min(MOST_WIDTH, shutil.get_terminal_size((100, 24)).columns))
+    """Letters of a line: those of the terminal (or of COLUMNS); the most without one: pipes want whole names."""
+    return max(LEAST_WIDTH, min(MOST_WIDTH, shutil.get_terminal_size((MOST_WIDTH, 24)).columns))
 
 
 def say(lines: Iterable[str]) -> None:

@@ -129,6 +129,8 @@ def run(args: argparse.Namespace) -> int:
 
     spec = resolve(args.bus)
     named = {str(BusName.VEHICLE): spec, str(BusName.BENCH): bench_channel(spec)}
+    for bus in (spec, *(named.get(bus) or resolve(bus) for _, bus in args.map)):
+        check_transmit(bus, args.transmit, "a replay sends")
     known = databases(args.dbc)[0] if args.dbc else None
     wait_for = None if args.wait_for is None else _identifier(args.wait_for, known or Databases.own())
     begin, end = (None if text is None else Moment.parse(text, UTC) for text in (args.begin, args.end))
@@ -142,8 +144,6 @@ def run(args: argparse.Namespace) -> int:
     specs = {bus: named.get(bus) or resolve(bus) for bus in used}
     if len(set(specs.values())) < len(specs):
         raise ReplayError(f"--map: {' and '.join(specs)} are one bus; name it once, as vehicle where it is --bus")
-    for bus in specs.values():
-        check_transmit(bus, args.transmit, "a replay sends")
     request_timer_slack()
     with ExitStack() as stack:
         kinds = {bus: BusName.BENCH if bus == BusName.BENCH else BusName.VEHICLE for bus in specs}

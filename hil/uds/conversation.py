@@ -16,7 +16,6 @@ from hil.uds.known import FOREIGN, Names
 from hil.uds.words import Kind, Said, describe
 
 _CHANNEL_SHIFT = 32
-_PERIODIC, _STOP = 0x2A, 4  # ReadDataByPeriodicIdentifier, and its mode that ends it
 
 
 class Spoken(NamedTuple):
@@ -181,17 +180,17 @@ class Conversation:
     def _say(self, joined: JoinedMessage, place: int, channel: str, identifier: Identifier) -> Said:
         known = self._names_of(channel, identifier)
         if identifier in self.addresses.periodic:
-            return Said(Kind.OTHER, _PERIODIC, known.periodic_text(joined.data))
+            return Said(Kind.OTHER, names.READ_PERIODICALLY, known.periodic_text(joined.data))
         low = joined.data[0] if joined.data else -1
         if low in self._periodic.get((place, identifier), ()) and not self._is_due(joined.data, place, identifier):
-            return Said(Kind.OTHER, _PERIODIC, known.periodic_text(joined.data))
+            return Said(Kind.OTHER, names.READ_PERIODICALLY, known.periodic_text(joined.data))
         return describe(joined.data, known)
 
     def _is_due(self, data: bytes, place: int, identifier: Identifier) -> bool:
         """Whether a message answers the request that is open: of the same first byte, it is no periodic data then."""
         partner = self.addresses.partner(identifier)
         asked = None if partner is None else self._asked.get((place, partner))
-        return asked is not None and asked.service == describe(data).service
+        return asked is not None and asked.wanted and asked.service == describe(data).service
 
     def _ask(self, joined: JoinedMessage, place: int, identifier: Identifier, said: Said) -> None:
         with_sub = said.service in names.WITH_SUBFUNCTION and len(joined.data) > 1
@@ -210,7 +209,7 @@ class Conversation:
         if partner is not None and asked is not None and asked.service == said.service:
             if said.kind is not Kind.PENDING:
                 self._asked[place, partner] = asked._replace(wanted=False)
-                if said.kind is Kind.ANSWER and said.service == _PERIODIC:
+                if said.kind is Kind.ANSWER and said.service == names.READ_PERIODICALLY:
                     self._send_periodically((place, identifier), asked.data)
             return joined.start_ns - asked.end_ns
         to_all = self._asked_all.get(place)
@@ -222,7 +221,7 @@ class Conversation:
     def _send_periodically(self, where: tuple[int, Identifier], request: bytes) -> None:
         """Take note of the periodic data that a request begins or ends; without identifiers the end is that of all."""
         active = self._periodic.setdefault(where, set())
-        if request[1:2] != bytes((_STOP,)):
+        if request[1:2] != bytes((names.STOP_SENDING,)):
             active.update(request[2:])
         elif len(request) > 2:
             active.difference_update(request[2:])

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from hil.log.frames import FrameFlag, FrameTable
 from hil.uds.addresses import Identifier, keys_of, standard_keys
-from hil.uds.names import NEGATIVE_RESPONSE, REPEATED, RESPONSE_OFFSET, SERVICES
+from hil.uds.names import NEGATIVE_RESPONSE, REPEATED, RESPONSE_OFFSET, SERVICES, SUPPRESS_BIT, WITH_SUBFUNCTION
 
 ANSWER_WITHIN_NS = 5_000_000_000  # P2* of ISO 14229-2
 _CHANNEL_SHIFT = 32
@@ -98,8 +98,8 @@ class PairFinder:
         channel = key >> _CHANNEL_SHIFT
         if meaning > 0:
             repeated = bytearray(message[1 : 1 + REPEATED.get(meaning, 0)])
-            if repeated and meaning not in (0x22, 0x2E, 0x2F):
-                repeated[0] &= 0x7F  # without the bit that asks for no answer
+            if repeated and meaning in WITH_SUBFUNCTION:
+                repeated[0] &= ~SUPPRESS_BIT
             self._asked[channel, meaning] = _Asked(time_ns, key, bytes(repeated))
             return
         refused = -meaning == NEGATIVE_RESPONSE

@@ -8,6 +8,9 @@ PENDING = 0x78
 """Negative response code: the request is taken, the answer follows within P2*."""
 SUPPRESS_BIT = 0x80
 """Bit of a sub-function: no positive answer is wanted."""
+READ_DATA, READ_PERIODICALLY = 0x22, 0x2A
+STOP_SENDING = 0x04
+"""Transmission mode of ReadDataByPeriodicIdentifier that ends it."""
 
 SERVICES: Mapping[int, str] = {
     0x10: "DiagnosticSessionControl",

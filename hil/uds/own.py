@@ -18,7 +18,7 @@ from ecu.diagnostics.trouble_memory import dtc_of
 from ecu.law.trouble_codes import CODES
 from hil.errors import BrakebenchError
 from hil.uds.addresses import Identifier
-from hil.uds.known import FOREIGN, Did, Names, value_text
+from hil.uds.known import FOREIGN, Did, Names, named, value_text
 
 REQUEST, ANSWER = Identifier(diagnostic_ids.REQUEST, False), Identifier(diagnostic_ids.RESPONSE, False)
 FUNCTIONAL, PERIODIC = Identifier(diagnostic_ids.REQUEST_FUNCTIONAL, False), Identifier(diagnostic_ids.PERIODIC, False)
@@ -26,12 +26,14 @@ LEVEL = (REQUEST_SEED + 1) // 2
 """Level of security access."""
 SIGN = Identifier(spec_of(BrakeStatus).can_id, False)
 """Our ECU is on a bus where this message is."""
+_MODES: dict[int, str] = {mode: mode.name for mode in BrakeMode}
+_STATES: dict[int, str] = {state: state.name.lower().replace("_", " ") for state in routines.State}
 _RECORDS = {"fault detection counter": lambda data: str(int.from_bytes(data, "big", signed=True))}
 
 
 def _number(value: float, name: str) -> str:
-    if name.endswith("mode") and value in tuple(BrakeMode):
-        return BrakeMode(int(value)).name
+    if name.endswith("mode") and value in _MODES:
+        return _MODES[int(value)]
     return f"{value:.7g}"
 
 
@@ -76,10 +78,10 @@ def _did(one: DataIdentifier) -> Did:
 
 def _routine(number: int) -> Did:
     def value(data: bytes) -> str:
-        state, results = routines.State(data[0]).name.lower().replace("_", " "), data[1:]
+        state, results = named(_STATES, data[0]), data[1:]
         if number == routines.SELF_TEST and len(results) == 4:
             supplied, codes, mode = struct.unpack(">HBB", results)
-            return f"{state}, sources supplied 0x{supplied:03X}, active codes {codes}, mode {BrakeMode(mode).name}"
+            return f"{state}, sources supplied 0x{supplied:03X}, active codes {codes}, mode {named(_MODES, mode)}"
         if number == routines.PRESSURE_ZERO and len(results) == 16:
             return f"{state}, {', '.join(f'{pressure:.7g}' for pressure in struct.unpack('>4f', results))} Pa"
         return f"{state}, {results.hex(' ')}" if results else state

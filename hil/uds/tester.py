@@ -18,7 +18,16 @@ from hil.errors import BrakebenchError, Verdict
 from hil.rt.clock import monotonic_ns
 from hil.uds.dtc import ALL_CODES
 from hil.uds.known import FOREIGN, Names
-from hil.uds.names import REPEATED, RESPONSE_OFFSET, SUPPRESS_BIT, WITH_SUBFUNCTION
+from hil.uds.names import (
+    NEGATIVE_RESPONSE,
+    READ_DATA,
+    READ_PERIODICALLY,
+    REPEATED,
+    RESPONSE_OFFSET,
+    STOP_SENDING,
+    SUPPRESS_BIT,
+    WITH_SUBFUNCTION,
+)
 from hil.uds.transport import IsoTpConnection
 from hil.uds.words import Said, describe, refusal_text, service_text
 
@@ -28,8 +37,6 @@ PENDING_WITHIN_S = 10.0  # P2* of the tester: twice the 5 s of ISO 14229-2
 PRESENT_EVERY_S = 2.0
 """Between two requests that keep a session alive: S3 of the client in ISO 14229-2, well before the ECU's 5 s."""
 EXTENDED_SESSION = 3
-_PERIODIC, _STOP = 0x2A, 4  # ReadDataByPeriodicIdentifier, and its mode that ends it
-_READ = 0x22  # of several identifiers the ECU may leave out the first
 ALL_WITHIN_S = 120.0  # of a request that the ECU holds up with response pending
 
 
@@ -99,7 +106,6 @@ class Tester:
         tell: Callable[[Exchange], None] = lambda _: None,
     ) -> None:
         self.known = known
-        self.exchanges: list[Exchange] = []
         self._connection, self._tell = connection, tell
         for name in ("UdsClient", connection.name):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # all of it comes as an error of ours
@@ -138,7 +144,8 @@ class Tester:
         if answer is None:
             return b""
         got = bytes(answer.original_payload)
-        n = REPEATED.get(payload[0], 0) if payload[0] != _READ or len(payload) == 3 else 0
+        # of several identifiers the ECU may leave out the first
+        n = REPEATED.get(payload[0], 0) if payload[0] != READ_DATA or len(payload) == 3 else 0
         if got[1 : 1 + n] != bytes(
             (payload[1] & ~SUPPRESS_BIT, *payload[2 : 1 + n]) if with_sub else payload[1 : 1 + n]
         ):
@@ -174,8 +181,11 @@ class Tester:
         lows : low bytes of the data identifiers.
         """
         self.session(EXTENDED_SESSION)
+        self.ask(
+            bytes((READ_PERIODICALLY, STOP_SENDING))
+        )  # of another tester that has just ended: it counts among the most at once
         self._connection.take_periodic(0.0)
-        self.ask(bytes((_PERIODIC, rate)) + lows)
+        self.ask(bytes((READ_PERIODICALLY, rate)) + lows)
         taken: list[tuple[int, bytes]] = []
         try:
             while seconds > 0.0:
@@ -184,7 +194,7 @@ class Tester:
                 seconds -= part_s
                 self.present()
         finally:
-            self.ask(bytes((_PERIODIC, _STOP)))
+            self.ask(bytes((READ_PERIODICALLY, STOP_SENDING)))
         return taken + self._connection.take_periodic(0.0)
 
     def codes(self, mask: int) -> list[FoundDtc]:
@@ -202,7 +212,7 @@ class Tester:
         self._asked(request, lambda: self._client.clear_dtc(group))
 
     def _asked(self, payload: bytes, do: Callable[[], Any]) -> Any:
-        """Do what asks; its errors become ours, and the exchange is kept."""
+        """Do what asks; its errors become ours, and the exchange is told."""
         begin_ns = monotonic_ns()
         answer = b""
         try:
@@ -212,7 +222,7 @@ class Tester:
             return response
         except NegativeResponseException as error:
             code = int(error.response.code or 0)
-            answer = bytes((0x7F, payload[0], code))
+            answer = bytes((NEGATIVE_RESPONSE, payload[0], code))
             raise RefusedError(payload[0], code) from error
         except TimeoutException as error:
             trouble = "; ".join(self._connection.trouble)
@@ -224,8 +234,7 @@ class Tester:
             answer = error.response.original_payload or b""
             raise NoAnswerError(f"{service_text(payload[0])}: {error}: {answer.hex(' ')}") from error
         finally:
-            self.exchanges.append(Exchange(payload, answer, monotonic_ns() - begin_ns))
-            self._tell(self.exchanges[-1])
+            self._tell(Exchange(payload, answer, monotonic_ns() - begin_ns))
 
 
 def _found(answer: Any) -> list[FoundDtc]:

@@ -11,14 +11,15 @@ import isotp
 from udsoncan.connections import BaseConnection
 from udsoncan.exceptions import TimeoutException
 
+from dbc.diagnostic_ids import FRAME_BYTES, PADDING
 from dbc.frame import BusName, Frame, LinkEvent, LinkState
+from dbc.isotp import single_most
 from hil.bus.bus import Bus
 from hil.errors import BrakebenchError
 from hil.rt.clock import monotonic_ns
 from hil.uds.addresses import Identifier
 
-PADDING = 0xCC  # ISO 15765-2: the byte that causes no stuff bits
-SINGLE_MOST = 7
+SINGLE_MOST = single_most(FRAME_BYTES)
 _MOST_BYTES = 1 << 24  # longest answer taken; memory is used as it comes
 _STEP_S = 0.002  # longest wait while a segmented request is sent: separation times count in ms
 _LOST = {LinkState.TX_OVERFLOW, LinkState.DISCONNECTED, LinkState.BUS_OFF, LinkState.NO_ACK}
@@ -107,7 +108,7 @@ class IsoTpConnection(BaseConnection):
             if len(payload) > SINGLE_MOST:
                 raise BrakebenchError(f"a request of {len(payload)} bytes to all ECUs; at most {SINGLE_MOST} fit")
             data = bytes((len(payload),)) + payload
-            self._put(self._functional, data.ljust(8, bytes((PADDING,))))
+            self._put(self._functional, data.ljust(FRAME_BYTES, bytes((PADDING,))))
             return
         self._stack.send(payload)
         self._stack.process()

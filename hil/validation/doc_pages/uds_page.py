@@ -37,19 +37,21 @@ finds exactly this.
 | answers | 0x{RESPONSE:03X} |
 | periodic data, without ISO-TP | 0x{PERIODIC:03X} |
 
-- **Times**: P2 {P2_NS // 10**6} ms, P2* {P2_STAR_NS // 10**9} s, S3 {S3_NS // 10**9} s. A complete answer ends within
-  P2. If it would take longer, response pending (0x78) is sent first. The controller estimates the duration from block
+- **Times**: P2 {P2_NS // 10**6} ms, P2* {P2_STAR_NS // 10**9} s, S3 {S3_NS // 10**9} s. ISO 14229-2 asks that
+  an answer begins within P2. Here a complete answer ends within P2, because some testers (udsoncan) measure to its end.
+  If it would take longer, response pending (0x78) is sent first. The controller estimates the duration from block
   size and STmin of the tester's last flow control. Before the first flow control it assumes the slowest values. If a
   tester becomes slower between two answers, one answer may end late.
 - **Lengths**: requests up to {MOST_REQUEST} bytes, answers up to {MOST_ANSWER} (longer: 0x14). At most {BURST}
-  diagnostic frames are sent per tick, for adapters with short queues. While an answer is being sent, other requests are
-  ignored, except tester present with a suppressed answer.
+  diagnostic frames are sent per tick, for adapters with short queues: answers first, then periodic data. A long answer
+  leaves room for all periodic identifiers that are active, and takes longer for it. While an answer is being sent,
+  other requests are ignored, except tester present with a suppressed answer.
 - **Functional requests** are answered, but the negative answers {_SILENT} are not sent. **Suppressed** positive
   answers: bit 0x80 of the sub-function.
 - **Checks** come in the order of ISO 14229-1: 0x11 service, 0x7F session, 0x13 least length, 0x12 sub-function, 0x31
   identifier, 0x33 lock, 0x13 length, 0x31 value, 0x22 conditions.
 - **The session ends** {S3_NS // 10**9} s after the last request. Then, and at each change of session, the tester's
-  demands go back to the law, routines stop, periodic data end, the lock closes; with the default session messages are
+  demands go back to the law, routines stop, the lock closes; with the default session periodic data end, messages are
   sent again and the setting of codes is on.
 - **The driver comes first**: pressures and motors are the tester's only while the car stands by every wheel speed and
   by the estimate, the mode has demands and the driver does not brake. In the tick in which one of these ends, the law

@@ -8,12 +8,13 @@ import pytest
 from uds_tester import functional
 from udsoncan.exceptions import NegativeResponseException
 
-from dbc.diagnostic_ids import REQUEST, REQUEST_FUNCTIONAL, RESPONSE
+from dbc.diagnostic_ids import PERIODIC, REQUEST, REQUEST_FUNCTIONAL, RESPONSE
 from dbc.frame import BusName, Frame
 from dbc.isotp import segment
 from dbc.messages import WheelSpeedFront
 from ecu.diagnostics.calibration import PARAMETERS
 from ecu.diagnostics.identifiers import IDENTIFIERS
+from ecu.diagnostics.protocol import BURST
 
 DEMAND_FL = 0x4000
 
@@ -97,6 +98,7 @@ def test_seed_and_key(bench):
     client = bench.client
     client.change_session(3)
     refused(0x24, client.send_key, 2, bytes(4))
+    assert bench.tester.ask("27 02") == ["7f 27 13"]  # the length is looked at first
     for code in (0x35, 0x35, 0x36):
         client.request_seed(1)
         refused(code, client.send_key, 2, bytes(4))
@@ -248,6 +250,13 @@ def test_zero_of_the_pressure_sensors(bench):
     client.ecu_reset(1)
     bench.tester.step(100)
     assert client.read_data_by_identifier_first(0x0205)[0] == pytest.approx(6e5)
+    car.pressure_fl_pa = 1.5e5
+    bench.unlock()
+    client.start_routine(0x0203)
+    bench.tester.step(60)
+    status = client.get_routine_result(0x0203).service_data.routine_status_record
+    assert struct.unpack(">B4f", status) == pytest.approx((2, 1.5e5, 0.0, 0.0, 0.0))
+    assert client.read_data_by_identifier_first(0x0205)[0] == pytest.approx(0.0, abs=1.0)
 
 
 def test_messages_are_silent_only_while_the_car_stands(bench):
@@ -266,6 +275,16 @@ def test_messages_are_silent_only_while_the_car_stands(bench):
     bench.tester.step(5)
     assert any(frame.bus.value == "vehicle" for frame in bench.tester.step())
     refused(0x22, client.communication_control, 1, 1)
+
+
+def test_after_a_reset_a_silenced_node_says_farewell_again(bench):
+    client, node = bench.client, bench.rig.node
+    client.change_session(3)
+    client.communication_control(1, 1)
+    assert node.farewell(bench.rig.tick * 10_000_000) == []
+    client.ecu_reset(1)
+    assert any(frame.bus.value == "vehicle" for frame in bench.tester.step(20))
+    assert len(node.farewell(bench.rig.tick * 10_000_000)) == 4
 
 
 def test_periodic_reading_at_100_hz(bench):
@@ -294,6 +313,48 @@ def test_periodic_reading_at_100_hz(bench):
     tester.periodic.clear()
     tester.step(20)
     assert tester.periodic == []
+
+
+@pytest.mark.parametrize(("session", "number"), [(3, 20), (1, 0)])
+def test_periodic_reading_ends_with_the_default_session_only(bench, session, number):
+    tester = bench.tester
+    bench.client.change_session(3)
+    assert tester.ask("2a 03 00") == ["6a"]
+    bench.client.change_session(session)
+    tester.periodic.clear()
+    tester.step(20)
+    assert len(tester.periodic) == number
+
+
+def test_answers_come_before_periodic_data_and_both_keep_to_the_queues_of_adapters(bench):
+    tester, ticks = bench.tester, []
+    step = tester._tick
+    tester._tick = lambda out: ticks.append([f for f in step(out) if f.can_id in (RESPONSE, PERIODIC)]) or ticks[-1]
+    bench.client.change_session(3)
+    ticks.clear()
+    assert tester.ask("2a 03 00 01 02 03 04 05 06 07") == ["6a"]
+    begun = next(frames for frames in ticks if any(frame.can_id == PERIODIC for frame in frames))
+    assert [frame.can_id for frame in begun] == [RESPONSE] + [PERIODIC] * 8
+    tester.periodic.clear()
+    dids = [did for did, one in PARAMETERS.items() if one.numbers][:40]
+    bench.client.read_data_by_identifier(dids)
+    asked = tester.now_ns
+    bench.client.read_data_by_identifier(dids)  # its flow control is known now: one frame a tick takes too long
+    first, last = tester.answered_ns
+    assert first - asked <= 50_000_000 < last - asked
+    long = segment(b"\x22" + b"".join(did.to_bytes(2, "big") for did in dids))[0]
+    present = Frame(BusName.VEHICLE, REQUEST_FUNCTIONAL, b"\x02\x3e\x00")
+    tester._tick([Frame(BusName.VEHICLE, REQUEST, long), present])  # a flow control and an answer at once
+    tester.step(5)
+    tester._tick([Frame(BusName.VEHICLE, REQUEST, long)] * 12)  # only the last one is worth a flow control
+    tester.step(5)
+    assert max(map(len, ticks)) == BURST
+    records = [data for frames in ticks for data in (f.data for f in frames if f.can_id == PERIODIC)]
+    for low in range(8):
+        counts = [data[1] for data in records if data[0] == low]
+        assert len(counts) > 50
+        # one that had no room came a tick later
+        assert sum((b - a) & 0xFF != 1 for a, b in pairwise(counts)) <= 2
 
 
 def test_suppressed_answers_and_functional_requests(bench):
@@ -340,4 +401,5 @@ def test_an_answer_that_nobody_takes_is_given_up(bench):
     for _ in range(30):
         step(1)
     assert not bench.server.awake
+    assert bench.server._link.errors == []  # nobody reads them: they must not grow
     assert bench.tester.ask("3e 00") == ["7e 00"]

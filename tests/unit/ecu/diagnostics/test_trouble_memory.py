@@ -55,6 +55,20 @@ def test_the_setting_of_codes_off_keeps_the_memory_as_it_is(bench):
     assert bench.server.memory.enabled
 
 
+def test_a_failure_that_began_with_the_setting_off_is_seen_when_the_session_ends(bench):
+    client, car = bench.client, bench.rig.car
+    client.change_session(3)
+    client.control_dtc_setting(2)
+    car.silent.add(Steering)
+    bench.tester.step(50)
+    client.change_session(1)
+    bench.tester.step(2)
+    assert not bench.server.awake
+    car.silent.clear()
+    bench.tester.step(50)
+    assert status_of(client) == 0x2E
+
+
 def test_a_cycle_begins_with_a_reset(bench):
     client, car = bench.client, bench.rig.car
     car.silent.add(Steering)

@@ -77,12 +77,14 @@ def test_periodic_data_are_told_from_answers():
     frames = exchange(0x7E0, 0x7E8, b"\x2a\x03\x01\x62", b"\x6a", 0)
     frames += [(100 * MS, 0x7E8, b"\x03\x01\x07\x00"), (101 * MS, 0x7E8, b"\x03\x62\x01\x02")]
     frames += exchange(0x7E0, 0x7E8, VIN_REQUEST, VIN, 200 * MS)
+    frames += [(250 * MS, 0x7E8, b"\x03\x62\x01\x02")]  # the request of the same first byte is answered
     frames += exchange(0x7E0, 0x7E8, b"\x2a\x04", b"\x6a", 300 * MS)
     frames += [(400 * MS, 0x7E8, b"\x03\x01\x07\x00")]
     messages, _ = read(frames, names_of=lambda *_: known)
     texts = [m.said.text for m in messages]
     assert texts[2:4] == ["periodic data, 0xF201 speed = 7 m/s", "periodic data, 0xF262 = 01 02"]
     assert "WAUZZZ4M1HA000001" in texts[5]
+    assert texts[6] == texts[3]
     assert not texts[-1].startswith("periodic data")
 
 

@@ -10,6 +10,7 @@ from hil.errors import BrakebenchError
 from hil.uds import names
 from hil.uds.dtc import dtc_number, dtc_text, status_text
 from hil.uds.known import Did, Names
+from hil.uds.own import OWN as OUR_ECU
 from hil.uds.words import Kind, describe
 
 OWN = Names(
@@ -101,8 +102,29 @@ def test_services_and_negative_codes_are_those_of_udsoncan():
 
 @given(st.binary(max_size=60))
 def test_any_bytes_are_said_without_an_error(message):
-    for known in (Names(), OWN):
+    for known in (Names(), OWN, OUR_ECU):
         assert describe(message, known).text
+
+
+_TEST = "0x0201 self test"
+
+
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [
+        ("71 01 02 02 02", "start, 0x0202 bleed the brake = done"),
+        ("71 01 02 01 10", "start, 0x0201 self test = 0x10"),
+        ("71 03 02 01 02 03 FF 00 01", f"result, {_TEST} = done, sources supplied 0x3FF, active codes 0, mode NORMAL"),
+        ("71 03 02 01 05 03 FF 00 7B", f"result, {_TEST} = 0x05, sources supplied 0x3FF, active codes 0, mode 0x7B"),
+    ],
+)
+def test_states_and_modes_of_our_ecu_are_named_where_they_have_a_name(message, words):
+    assert describe(bytes.fromhex(message), OUR_ECU).text == f"RoutineControl, {words}"
+
+
+@given(st.sampled_from(sorted(OUR_ECU.routines)), st.binary(max_size=20))
+def test_any_answer_of_a_routine_of_our_ecu_is_said(routine, data):
+    assert describe(b"\x71\x03" + routine.to_bytes(2, "big") + data, OUR_ECU).text
 
 
 @given(st.integers(0, 0xFFFFFF))
