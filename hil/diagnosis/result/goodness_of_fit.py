@@ -32,7 +32,7 @@ class ChannelFit:
     Attributes
     ----------
     noise : standard deviation of its white noise, in ``unit``, as the logs show it.
-    error : root mean square of the free-run residual.  error_as_told : the same of the vehicle as the set tells it.
+    error : root mean square of the free-run residual.  error_as_stated : the same of the vehicle as its set states it.
     unexplained : ``error`` over the root mean square of what the channel does: along the road, the change since the
         start of the segment, else its value.
     autocorrelation : of the innovations from sample to sample, 0 if the noise model describes what is left.
@@ -46,7 +46,7 @@ class ChannelFit:
     unit: str
     noise: float
     error: float
-    error_as_told: float
+    error_as_stated: float
     unexplained: float
     autocorrelation: float
     whiteness_p: float
@@ -58,7 +58,7 @@ class ChannelFit:
         """As printed."""
         return {
             "channel": self.channel, "unit": self.unit, "noise": self.noise, "error": self.error,
-            "error_as_told": self.error_as_told, "unexplained": self.unexplained,
+            "error_as_stated": self.error_as_stated, "unexplained": self.unexplained,
             "autocorrelation": self.autocorrelation, "whiteness_p": self.whiteness_p,
             "worst_log": self.worst_log, "worst_from_s": self.worst_s[0], "worst_to_s": self.worst_s[1],
             "worst_error": self.worst_error, "described": self.described,
@@ -66,11 +66,11 @@ class ChannelFit:
 
     @property
     def described(self) -> bool:
-        """Whether the model describes the channel, as told or as fitted.
+        """Whether the model describes the channel, as stated or as fitted.
 
         A fit weighs innovations: what drifts slowly in free run may be farther off than it was.
         """
-        limit, least = _MOST_UNEXPLAINED.get(self.track, np.inf), min(self.error, self.error_as_told)
+        limit, least = _MOST_UNEXPLAINED.get(self.track, np.inf), min(self.error, self.error_as_stated)
         unexplained = self.unexplained * least / self.error if self.error else 0.0
         return unexplained <= limit or least <= _LEAST_OVER_NOISE * self.noise
 
@@ -90,14 +90,14 @@ def goodness_of_fit(diagnosis: Diagnosis) -> list[ChannelFit]:
         does = measured[name][:, 0] - (_at_segment_start(measured[name][:, 0], known, masks.segment_id))
         if name not in ("wheel.mean", "gps"):
             does = measured[name][:, 0]
-        told = squares_by_segment(diagnosis.nominal.residual[name][:, 0], known, masks.segment_id)
+        stated = squares_by_segment(diagnosis.nominal.residual[name][:, 0], known, masks.segment_id)
         error, size = root_mean_square(squares), float(np.sqrt(np.mean(does[known] ** 2)))
         rho, p = whiteness(innovations[name][known, 0])
         log, since_s, until_s = places[worst]
         fits.append(
             ChannelFit(
                 name, WORDS[name], UNITS[name.split(".")[0]], noise.tracks[name].a, error,
-                root_mean_square(told), error / max(size, 1e-12), rho, p, log, (since_s, until_s),
+                root_mean_square(stated), error / max(size, 1e-12), rho, p, log, (since_s, until_s),
                 float(by_segment[worst]),
             )
         )  # fmt: skip

@@ -17,10 +17,6 @@ RETIRED = re.compile(
 )
 VERDICT = "cannot_tell_apart"
 """A value in the JSON, which stays."""
-EXCEPTIONS: dict[str, tuple[str, ...]] = {
-    "result/goodness_of_fit.py": ("error_as_told", "as told or as fitted", "told = squares", "square(told)"),
-}
-"""File, relative to the room: phrases in which a word has another meaning, or is a key of the JSON."""
 
 
 def _phrases(text: str) -> Iterator[tuple[int, str]]:
@@ -37,8 +33,6 @@ def _phrases(text: str) -> Iterator[tuple[int, str]]:
 
 def _lines(path: Path) -> list[str]:
     text = path.read_text(encoding="utf-8").replace(VERDICT, "")
-    for phrase in EXCEPTIONS.get(path.relative_to(ROOM).as_posix(), ()):
-        text = text.replace(phrase, "")
     return [f"{line}: {word}" for line, words in _phrases(text) for word in RETIRED.findall(words)]
 
 

@@ -69,5 +69,5 @@ def test_a_fit_that_drifts_is_no_other_car(diagnosis):
     final = _rolls_on(diagnosis, diagnosis.final)
     speed = {one.track: one for one in goodness_of_fit(replace(diagnosis, final=final))}["wheel.mean"]
     assert speed.unexplained > 0.1
-    assert speed.error_as_told < 0.1 * speed.error
+    assert speed.error_as_stated < 0.1 * speed.error
     assert speed.described
