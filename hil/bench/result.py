@@ -37,6 +37,13 @@ _WRONG_LENGTH = "wrong length"
 _WHY = {FrameUse.CORRUPT: "corrupt", FrameUse.REPEATED: "repeated", FrameUse.OUT_OF_SEQUENCE: "out of sequence"}
 
 
+MEASURED = (
+    "stop_distance_m", "stop_time_s", "mean_decel_mps2", "mfdd_mps2", "demanded_decel_mps2", "energy_recuperated_j",
+    "frames_sent", "frames_lost", "frames_corrupt", "bus_load",
+)  # fmt: skip
+"""Numbers of `RunResult` that a run in virtual time has."""
+
+
 class UnknownSignalError(BrakebenchError, LookupError):
     """A name that neither of our two databases has."""
 

@@ -78,7 +78,7 @@ class Outcome:
 
 
 def run_scenario(
-    name: str,
+    name: str | Scenario,
     bus: str,
     *,
     out: str | None,
@@ -92,13 +92,17 @@ def run_scenario(
 ) -> Outcome:
     """Run one scenario in real or in virtual time and measure it.
 
+    Parameters
+    ----------
+    name : of the library, a path, or a scenario that was read already (in virtual time alone: nodes read a file).
+
     Raises
     ------
     BrakebenchError
         Before anything was started: no such scenario, a wrong field, a taken channel, somebody else who sends what
         this run would send, a folder that cannot be written.
     """
-    scenario = load_scenario(name)
+    scenario = name if isinstance(name, Scenario) else load_scenario(name)
     started_ns = wall_time_ns()
     stop = StopSignal()
     folder = Path(out) if out else new_folder(scenario.name)

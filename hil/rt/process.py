@@ -11,7 +11,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor
 from pathlib import Path
 
 from hil.rt.clock import WallClock
@@ -283,3 +283,10 @@ def wait_for_end(children: Sequence[Child], timeout_ns: int = STOP_TIMEOUT_NS) -
 def worker_pool(workers: int) -> ProcessPoolExecutor:
     """Processes that share independent work; each starts afresh and ends when we do."""
     return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=end_with_parent)
+
+
+def abandon(pool: Executor) -> None:
+    """End the processes of a `worker_pool` at once, whatever they do; what they did is lost."""
+    pool.shutdown(wait=False, cancel_futures=True)
+    for child in multiprocessing.active_children():
+        child.terminate()

@@ -3,11 +3,12 @@
 import hashlib
 import math
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import Any
 
 from dbc.contract import contract
 from dbc.frame import BusName
@@ -91,13 +92,40 @@ def load_scenario(name: str) -> Scenario:
         No such scenario, or a wrong field; the message names file, key and what is allowed.
     """
     source = find_scenario(name)
+    text, values = read_scenario_file(source)
+    return build_scenario(values, source, text)
+
+
+def read_scenario_file(source: Path | Traversable) -> tuple[bytes, dict[str, Any]]:
+    """Text of a scenario's file, and its tables as they stand there.
+
+    Raises
+    ------
+    hil.scenario.table.ScenarioError : it cannot be read, or is no TOML.
+    """
     try:
         text = source.read_bytes()
-        values = tomllib.loads(text.decode("utf-8"))
+        return text, tomllib.loads(text.decode("utf-8"))
     except OSError as error:
         raise ScenarioError(f"{source}: cannot be read ({error.strerror})") from error
     except (ValueError, RecursionError) as error:  # of the text's encoding or of TOML
         raise ScenarioError(f"{source}: not valid TOML: {error}") from error
+
+
+def build_scenario(values: Mapping[str, Any], source: Path | Traversable, text: bytes) -> Scenario:
+    """Check the tables of a scenario and make one value of them.
+
+    Parameters
+    ----------
+    values : as in the file, or with other numbers in their places.
+    source : the file; CSV traces lie beside it.
+    text : what is hashed, beside the CSV files.
+
+    Raises
+    ------
+    hil.scenario.table.ScenarioError, hil.scenario.parameters.ParameterError
+        A wrong field; the message names file, key and what is allowed.
+    """
     files = Files(source.parent if isinstance(source, Path) else _library())
     top = Table(values, source.name, files)
     title = top.text("title")
