@@ -1,27 +1,29 @@
-"""Tasks on workers: any `concurrent.futures` executor; a task during which a worker ended is run again, alone."""
+"""Independent work on workers: any `concurrent.futures` executor; what a worker ended in is done again, alone."""
 
 import contextlib
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
-from hil.campaign.tasks import Done, Task, killed, perform
 from hil.rt.process import abandon, worker_pool
 
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 MOST_KILLS = 4
-"""How often a run may end its worker before it is reported; as Dask, which allows three failures by default."""
-_AHEAD = 3  # tasks a worker that are handed out: enough that none waits, few enough that memory stays flat
+"""How often an item may end its worker before it is given up; as Dask, which allows three failures by default."""
+_AHEAD = 3  # batches a worker that are handed out: enough that none waits, few enough that memory stays flat
 _POLL_S = 0.5
 Stopped = Callable[[], bool]
 
 
 class Workers(Protocol):
-    """Processes that take tasks.
+    """Processes that take batches.
 
     Attributes
     ----------
-    count : how many.  kills : workers that have ended when a task is given up.
+    count : how many.  kills : workers that have ended when a batch comes back with `is_kill`.
     """
 
     count: int
@@ -36,7 +38,7 @@ class Workers(Protocol):
         ...
 
     def is_kill(self, error: BaseException) -> bool:
-        """Whether a task was given up because its worker ended."""
+        """Whether a batch was given up because its worker ended."""
         ...
 
 
@@ -63,97 +65,128 @@ class LocalWorkers:
         return isinstance(error, BrokenExecutor)
 
 
-def work(tasks: Iterable[Task], workers: Workers, stopped: Stopped = lambda: False) -> Iterator[Done]:
-    """Yield what came of each task, in any order; a few are under way at a time.
+@dataclass(frozen=True)
+class Killed:
+    """What stands for an item that ended its worker so many times."""
 
-    Tasks during which a worker ended are run again one by one; the one that ends its worker again is run by its single
-    runs, and a run that ends its worker `MOST_KILLS` times is `killed`. Once ``stopped``, nothing new begins, and what
-    is under way is given up.
+    times: int
+
+
+@dataclass(frozen=True)
+class _Work(Generic[Item, Result]):
+    function: Callable[[Item], Result]
+    workers: Workers
+    stopped: Stopped
+
+    def submit(self, executor: Executor, batch: Sequence[Item]) -> "Future[list[Result]]":
+        return executor.submit(_each, self.function, batch)
+
+
+def work(
+    batches: Iterable[Sequence[Item]],
+    function: Callable[[Item], Result],
+    workers: Workers,
+    stopped: Stopped = lambda: False,
+) -> Iterator[tuple[Sequence[Item], list[Result | Killed]]]:
+    """Yield each batch with the results of its items, batches in any order; a few are under way at a time.
+
+    Batches during which a worker ended are done again one by one; one that ends its worker again is done by its single
+    items, and an item that ends its worker `MOST_KILLS` times is `Killed`. What ``function`` raises is raised. Once
+    ``stopped``, nothing new begins, and what is under way is given up.
     """
-    queue = iter(tasks)
-    suspects: deque[Task] = deque()
+    queue, job = iter(batches), _Work(function, workers, stopped)
+    suspects: deque[Sequence[Item]] = deque()
     while True:
-        with _executor(workers, workers.count, stopped) as executor:
-            yield from _together(queue, executor, workers, suspects, stopped)
+        with _executor(job, workers.count) as executor:
+            yield from _together(queue, executor, job, suspects)
         if stopped() or not suspects:
             return
-        yield from _alone(suspects, workers, stopped)
+        yield from _alone(suspects, job)
+
+
+def _each(function: Callable[[Item], Result], batch: Sequence[Item]) -> list[Result]:
+    """In a worker."""
+    return [function(item) for item in batch]
 
 
 @contextlib.contextmanager
-def _executor(workers: Workers, count: int, stopped: Stopped) -> Iterator[Executor]:
-    executor = workers.open(count)
+def _executor(job: _Work[Item, Result], count: int) -> Iterator[Executor]:
+    executor = job.workers.open(count)
     at_once = True
     try:
         yield executor
-        at_once = stopped()
+        at_once = job.stopped()
     finally:
-        workers.close(executor, at_once)
+        job.workers.close(executor, at_once)
 
 
 def _together(
-    queue: Iterator[Task], executor: Executor, workers: Workers, suspects: deque[Task], stopped: Stopped
-) -> Iterator[Done]:
-    """Until the queue is empty, or a worker has ended: then ``suspects`` are all tasks that it may have had."""
-    under_way: dict[Future[Done], Task] = {}
-    while not stopped():
-        while not suspects and len(under_way) < _AHEAD * workers.count:
-            task = next(queue, None)
-            if task is None:
+    queue: Iterator[Sequence[Item]],
+    executor: Executor,
+    job: _Work[Item, Result],
+    suspects: deque[Sequence[Item]],
+) -> Iterator[tuple[Sequence[Item], list[Result | Killed]]]:
+    """Until the queue is empty, or a worker has ended: then ``suspects`` are all batches that it may have had."""
+    under_way: dict[Future[list[Result]], Sequence[Item]] = {}
+    while not job.stopped():
+        while not suspects and len(under_way) < _AHEAD * job.workers.count:
+            batch = next(queue, None)
+            if batch is None:
                 break
             try:
-                under_way[executor.submit(perform, task)] = task
+                under_way[job.submit(executor, batch)] = batch
             except BrokenExecutor:
-                suspects.append(task)
+                suspects.append(batch)
         if not under_way:
             return
         for future in wait(under_way, timeout=_POLL_S, return_when=FIRST_COMPLETED).done:
-            task = under_way.pop(future)
+            batch = under_way.pop(future)
             error = future.exception()
             if error is None:
-                yield future.result()
-            elif workers.is_kill(error):
-                suspects.append(task)
-            elif not stopped():
+                yield batch, [*future.result()]
+            elif job.workers.is_kill(error):
+                suspects.append(batch)
+            elif not job.stopped():
                 raise error
 
 
-def _alone(suspects: deque[Task], workers: Workers, stopped: Stopped) -> Iterator[Done]:
-    """One task at a time, so that a worker that ends tells which."""
-    while suspects and not stopped():
-        task = suspects.popleft()
-        is_guilty = workers.kills >= MOST_KILLS  # by the cluster's own account; of a pool it is one of several
-        done = None if is_guilty else _attempt(task, workers, stopped)
-        if done is None and len(task.runs) > 1:
-            done = Done()
-            for single in task.single():
-                done.add(_insist(single, workers, stopped))
-        elif done is None:
-            done = _insist(task, workers, stopped, kills=workers.kills)
-        if not stopped():
-            yield done
+def _alone(
+    suspects: deque[Sequence[Item]], job: _Work[Item, Result]
+) -> Iterator[tuple[Sequence[Item], list[Result | Killed]]]:
+    """One batch at a time, so that a worker that ends tells which."""
+    while suspects and not job.stopped():
+        batch = suspects.popleft()
+        is_guilty = job.workers.kills >= MOST_KILLS  # by the cluster's own account; of a pool it is one of several
+        done = None if is_guilty else _attempt(batch, job)
+        kills = job.workers.kills if len(batch) == 1 else 0
+        found: list[Result | Killed] = [] if done is None else [*done]
+        for item in batch if done is None else ():
+            result = _insist(item, job, kills)
+            found.append(result)
+        if not job.stopped():
+            yield batch, found
 
 
-def _insist(single: Task, workers: Workers, stopped: Stopped, kills: int = 0) -> Done:
-    """One run, until it has ended its worker too often."""
-    while kills < MOST_KILLS and not stopped():
-        done = _attempt(single, workers, stopped)
+def _insist(item: Item, job: _Work[Item, Result], kills: int) -> Result | Killed:
+    """One item, until it has ended its worker too often; ``kills`` times it has."""
+    while kills < MOST_KILLS and not job.stopped():
+        done = _attempt([item], job)
         if done is not None:
-            return done
-        kills += workers.kills
-    return Done([killed(single.runs[0], kills)])
+            return done[0]
+        kills += job.workers.kills
+    return Killed(kills)
 
 
-def _attempt(task: Task, workers: Workers, stopped: Stopped) -> Done | None:
-    """What came of a task on a worker of its own; None where that ended, or we shall."""
-    with _executor(workers, 1, stopped) as executor:
-        future = executor.submit(perform, task)
-        while not stopped():
+def _attempt(batch: Sequence[Item], job: _Work[Item, Result]) -> list[Result] | None:
+    """Results of a batch on a worker of its own; None where that ended, or we shall."""
+    with _executor(job, 1) as executor:
+        future = job.submit(executor, batch)
+        while not job.stopped():
             if wait([future], timeout=_POLL_S).done:
                 error = future.exception()
                 if error is None:
                     return future.result()
-                if workers.is_kill(error):
+                if job.workers.is_kill(error):
                     return None
                 raise error
         return None

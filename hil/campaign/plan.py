@@ -14,13 +14,13 @@ import numpy as np
 
 from hil.bench.result import MEASURED
 from hil.campaign.sample import METHODS, Varied, sampled
-from hil.campaign.tasks import Base, Run, Task
+from hil.campaign.tasks import Base, Run, Runner
 from hil.scenario.scenario import build_scenario, find_scenario, read_scenario_file
 from hil.scenario.table import Files, ScenarioError, Table
 
 MOST_RUNS = 100_000_000
 RECORDINGS = ("failed", "all", "none")
-_PARTS, _MOST_IN_PART = 256, 1024  # a part is what one task runs and one file holds
+_PARTS, _MOST_IN_PART = 256, 1024  # a part is what a worker takes at a time and one file holds
 
 
 class CampaignError(ScenarioError):
@@ -94,12 +94,15 @@ class Plan:
         row = zip(self.varied, self.points[point], strict=True)
         return {one.name: one.shown(float(place)) for one, place in row}
 
-    def task(self, part: int) -> Task:
-        """What a worker needs for a part."""
-        first = part * self.part_size
-        runs = tuple(self.run(number) for number in range(first, min(self.size, first + self.part_size)))
-        used = {run.scenario for run in runs}
-        return Task(part, {name: base for name, base in self.bases.items() if name in used}, runs, self.recordings)
+    def part(self, number: int) -> list[Run]:
+        """Runs of a part."""
+        first = number * self.part_size
+        return [self.run(k) for k in range(first, min(self.size, first + self.part_size))]
+
+    @property
+    def runner(self) -> Runner:
+        """What workers do with a run."""
+        return Runner(self.bases, self.recordings)
 
     def _place(self, number: int) -> _Place:
         scenario, rest = divmod(number, len(self.points) * len(self.seeds))

@@ -2,7 +2,7 @@
 
 import fcntl
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -87,8 +87,8 @@ class Store:
         there = {path.name for path in self._results.iterdir()}
         return (part for part in range(self._plan.parts) if _name(part) not in there)
 
-    def add(self, part: int, done: Done) -> None:
-        """Write what came of a part: its recordings first, then its rows in the order of the runs.
+    def add(self, part: int, done: Sequence[Done]) -> None:
+        """Write what came of a part: its recordings first, then its rows.
 
         Raises
         ------
@@ -99,13 +99,14 @@ class Store:
         except LogError as error:
             raise StoreError(f"{error}; what was written before stands, and the same command goes on") from error
 
-    def _add(self, part: int, done: Done) -> None:
-        for number, content in done.recordings.items():
-            with atomic_write(self._recordings / f"{number:09d}{RECORDING_SUFFIX}", overwrite=True) as path:
-                path.write_bytes(content)
-        rows = sorted(done.rows, key=lambda row: row["run"])
+    def _add(self, part: int, done: Sequence[Done]) -> None:
+        for one in done:
+            if one.recording is not None:
+                name = f"{one.row['run']:09d}{RECORDING_SUFFIX}"
+                with atomic_write(self._recordings / name, overwrite=True) as path:
+                    path.write_bytes(one.recording)
         columns: dict[str, list[Any]] = {name: [] for name in self._schema.names}
-        for row in rows:
+        for row in (one.row for one in done):
             run = self._plan.run(row["run"])
             full = {"scenario": run.scenario, "seed": run.seed} | self._plan.inputs(row["run"]) | row
             for name, column in columns.items():

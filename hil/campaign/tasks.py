@@ -4,7 +4,7 @@ import copy
 import math
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
@@ -64,59 +64,47 @@ class Base:
 
 
 @dataclass(frozen=True)
-class Task:
-    """A part of a campaign."""
+class Done:
+    """What came of a run: its row, and its recording where that is kept."""
 
-    part: int
+    row: Row
+    recording: bytes | None = None
+
+
+@dataclass(frozen=True)
+class Runner:
+    """What a worker does with a run.
+
+    Attributes
+    ----------
+    bases : scenarios by name.
+    recordings : of which runs the recording is kept: ``failed``, ``all``, ``none``.
+    """
+
     bases: Mapping[str, Base]
-    runs: tuple[Run, ...]
     recordings: str
 
-    def single(self) -> list["Task"]:
-        """Each run as a task of its own."""
-        return [Task(self.part, self.bases, (run,), self.recordings) for run in self.runs]
-
-
-@dataclass
-class Done:
-    """What came of a task: a row for each run, and recordings by run."""
-
-    rows: list[Row] = field(default_factory=list)
-    recordings: dict[int, bytes] = field(default_factory=dict)
-
-    def add(self, other: "Done") -> None:
-        """Take the rows and recordings of another."""
-        self.rows += other.rows
-        self.recordings |= other.recordings
-
-
-def perform(task: Task) -> Done:
-    """Run a task; nothing that a run raises leaves it."""
-    done = Done()
-    for run in task.runs:
+    def __call__(self, run: Run) -> Done:
+        """Run it; whatever a run raises is a result."""
         signals: Signals | None = None
         row: Row = {"run": run.number}
         try:
-            scenario = task.bases[run.scenario].scenario(dict(run.changes))
+            scenario = self.bases[run.scenario].scenario(dict(run.changes))
         except BrakebenchError as error:
-            done.rows.append(row | {"verdict": REFUSED, "reason": str(error)})
-            continue
+            return Done(row | {"verdict": REFUSED, "reason": str(error)})
         try:
             signals = simulate(scenario, run.seed)
             row |= _measured(scenario, signals)
         except Exception as error:
-            # a run that falls over is a result, and the others go on
             row |= {"verdict": Verdict.BROKEN.value, "reason": f"{type(error).__name__}: {error}"}
-        done.rows.append(row)
-        wanted = task.recordings == "all" or (task.recordings == "failed" and row["verdict"] != Verdict.PASSED.value)
-        if wanted and signals is not None:
-            done.recordings[run.number] = _recording(signals)
-    return done
+        failed = row["verdict"] != Verdict.PASSED.value
+        wanted = self.recordings == "all" or (self.recordings == "failed" and failed)
+        return Done(row, _recording(signals) if wanted and signals is not None else None)
 
 
-def killed(run: Run, times: int) -> Row:
-    """Row of a run that ended its worker each time."""
-    return {"run": run.number, "verdict": KILLED, "reason": f"its worker process ended {times} times in this run"}
+def killed(run: Run, times: int) -> Done:
+    """What stands for a run that ended its worker each time."""
+    return Done({"run": run.number, "verdict": KILLED, "reason": f"its worker process ended {times} times in this run"})
 
 
 def _measured(scenario: Scenario, signals: Signals) -> Row:

@@ -75,7 +75,8 @@ def _run_missing(plan: "Plan", store: "Store", args: argparse.Namespace, stop: A
     import os
 
     from hil.campaign.dask_workers import DaskWorkers
-    from hil.campaign.engine import LocalWorkers, Workers, work
+    from hil.campaign.engine import Killed, LocalWorkers, Workers, work
+    from hil.campaign.tasks import killed
     from hil.cli.progress import Progress
     from hil.rt.clock import monotonic_ns
 
@@ -90,12 +91,15 @@ def _run_missing(plan: "Plan", store: "Store", args: argparse.Namespace, stop: A
     else:
         workers = LocalWorkers(min(args.workers or os.cpu_count() or 1, len(missing)))
     began_ns, runs = monotonic_ns(), 0
-    tasks = (plan.task(part) for part in missing)
+    batches = (plan.part(number) for number in missing)
     with Progress().part(0, f"{plan.size} runs") as progress:
-        for n, done in enumerate(work(tasks, workers, lambda: stop.asked), 1):
-            part = done.rows[0]["run"] // plan.part_size
-            store.add(part, done)
-            runs += len(done.rows)
+        for n, (batch, results) in enumerate(work(batches, plan.runner, workers, lambda: stop.asked), 1):
+            done = [
+                killed(run, result.times) if isinstance(result, Killed) else result
+                for run, result in zip(batch, results, strict=True)
+            ]
+            store.add(batch[0].number // plan.part_size, done)
+            runs += len(done)
             progress(n / len(missing))
     return runs / ((monotonic_ns() - began_ns) * 1e-9)
 

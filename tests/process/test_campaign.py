@@ -117,10 +117,9 @@ def test_a_full_disk_ends_it_with_what_was_written_and_it_goes_on(brakebench, ca
 def test_a_run_that_kills_its_workers_is_named_and_the_others_finish(campaign, tmp_path):
     plan = load_plan(tmp_path / campaign(9))
     log = tmp_path / "killed.txt"
-    tasks = [fatal(plan.task(part), FATAL_MPS, log) for part in range(plan.parts)]
-    done = performed(tasks, LocalWorkers(2))
-    assert [row["verdict"] for row in done.rows] == ["passed"] * 5 + ["killed"] + ["passed"] * 3
-    assert done.rows[5]["reason"] == "its worker process ended 4 times in this run"
+    rows = performed(plan, fatal(plan.runner, FATAL_MPS, log), LocalWorkers(2))
+    assert [row["verdict"] for row in rows] == ["passed"] * 5 + ["killed"] + ["passed"] * 3
+    assert rows[5]["reason"] == "its worker process ended 4 times in this run"
     assert 4 <= len(log.read_text().splitlines()) <= 6  # beside others once or twice before it is known
 
 
@@ -129,18 +128,17 @@ def test_dask_workers_give_the_same_and_what_kills_them_is_named(campaign, tmp_p
     from hil.campaign.dask_workers import DaskWorkers
 
     plan = load_plan(tmp_path / campaign(9))
-    tasks = [plan.task(part) for part in range(plan.parts)]
-    own = performed(tasks, LocalWorkers(1))
+    own = performed(plan, plan.runner, LocalWorkers(1))
     log = tmp_path / "killed.txt"
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None
     ) as cluster:
         workers = DaskWorkers(cluster.scheduler_address)
         assert workers.count == 2
-        assert performed(tasks, workers) == own
-        done = performed([fatal(task, FATAL_MPS, log) for task in tasks], workers)
+        assert performed(plan, plan.runner, workers) == own
+        rows = performed(plan, fatal(plan.runner, FATAL_MPS, log), workers)
         workers.leave()
-    assert [row["verdict"] for row in done.rows] == ["passed"] * 5 + ["killed"] + ["passed"] * 3
+    assert [row["verdict"] for row in rows] == ["passed"] * 5 + ["killed"] + ["passed"] * 3
     assert len(log.read_text().splitlines()) == 4
 
 

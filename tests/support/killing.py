@@ -5,8 +5,9 @@ import signal
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from hil.campaign.engine import work
-from hil.campaign.tasks import Base, Done, Task
+from hil.campaign.engine import Killed, Workers, work
+from hil.campaign.plan import Plan
+from hil.campaign.tasks import Base, Runner, killed
 
 
 @dataclass(frozen=True)
@@ -24,16 +25,16 @@ class KillingBase(Base):
         return super().scenario(changes)
 
 
-def fatal(task: Task, speed_mps: float, log: Path) -> Task:
-    """A task whose run at this speed ends its worker."""
-    bases = {name: KillingBase(**vars(base), fatal_mps=speed_mps, log=str(log)) for name, base in task.bases.items()}
-    return replace(task, bases=bases)
+def fatal(runner: Runner, speed_mps: float, log: Path) -> Runner:
+    """As a runner, but the run at this speed ends its worker."""
+    bases = {name: KillingBase(**vars(base), fatal_mps=speed_mps, log=str(log)) for name, base in runner.bases.items()}
+    return replace(runner, bases=bases)
 
 
-def performed(tasks, workers) -> Done:
-    """Everything together, in order of the runs."""
-    whole = Done()
-    for done in work(tasks, workers):
-        whole.add(done)
-    whole.rows.sort(key=lambda row: row["run"])
-    return whole
+def performed(plan: Plan, runner: Runner, workers: Workers) -> list[dict]:
+    """Rows of all runs, in their order."""
+    rows = []
+    for batch, results in work(map(plan.part, range(plan.parts)), runner, workers):
+        for run, result in zip(batch, results, strict=True):
+            rows.append((killed(run, result.times) if isinstance(result, Killed) else result).row)
+    return sorted(rows, key=lambda row: row["run"])

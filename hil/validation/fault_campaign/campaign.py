@@ -4,9 +4,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from hil.campaign.engine import Killed, LocalWorkers, work
+from hil.errors import BrakebenchError
 from hil.faults.catalogue import fault_named
 from hil.faults.fault import FaultError
-from hil.rt.process import worker_pool
 from hil.validation.fault_campaign.budgets import ORIGINS, judge
 from hil.validation.fault_campaign.cases import PAIR, SCENARIO, Case, cases, cases_of_time, pairs, virtual_faults
 from hil.validation.fault_campaign.drive import scenario_of
@@ -109,17 +110,14 @@ def _judged(everything: Sequence[Case], workers: int, progress: Callable[[float]
     """Run all cases; what was measured and missed, by the identity of the case."""
     scenario = scenario_of()
     found: Judged = {}
-    with worker_pool(workers) as pool:
-        try:
-            for number, (case, m) in enumerate(
-                zip(everything, pool.map(run, everything, chunksize=_CHUNK), strict=True)
-            ):
-                faults = [armed.injection() for armed in case.faults]
-                found[id(case)] = (case, m, judge(m, faults, scenario.ecu))
-                progress((number + 1) / len(everything))
-        except BaseException:  # a Ctrl-C must not wait for what nobody will see
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    batches = [everything[k : k + _CHUNK] for k in range(0, len(everything), _CHUNK)]
+    for batch, results in work(batches, run, LocalWorkers(workers)):
+        for case, m in zip(batch, results, strict=True):
+            if isinstance(m, Killed):
+                raise BrakebenchError(f"{case}: ended its worker process {m.times} times")
+            faults = [armed.injection() for armed in case.faults]
+            found[id(case)] = (case, m, judge(m, faults, scenario.ecu))
+        progress(len(found) / len(everything))
     return found
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hil.rt.process import worker_pool
+from hil.campaign.engine import Killed, LocalWorkers, work
+from hil.errors import BrakebenchError
 from hil.validation.reproduce.cases import CASES, Numbers
 from hil.validation.reproduce.claims import CLAIMS, Claim
 from hil.validation.reproduce.conditions import CONDITIONS, NOMINAL, Condition, taught
@@ -69,16 +70,13 @@ def measure(
     missing = [what for what in jobs if what not in store.numbers]
     if len(missing) < len(jobs):
         say(f"{len(jobs) - len(missing)} of {len(jobs)} cases were driven before")
-    with worker_pool(workers) as pool:
-        in_turn = pool.map(partial(job, extension=extension), missing)
-        try:
-            for done, (what, numbers) in enumerate(zip(missing, in_turn, strict=True), 1):
-                store.add(what, numbers)
-                if done % 20 == 0 or done == len(missing):
-                    say(f"{done} of {len(missing)} cases driven (seed {what[2]}, {conditions[what[1]].name})")
-        except BaseException:  # a Ctrl-C must not wait for hours of work that nobody will see
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    done = work([[what] for what in missing], partial(job, extension=extension), LocalWorkers(workers))
+    for n, ((what,), (numbers,)) in enumerate(done, 1):
+        if isinstance(numbers, Killed):
+            raise BrakebenchError(f"{what}: ended its worker process {numbers.times} times")
+        store.add(what, numbers)
+        if n % 20 == 0 or n == len(missing):
+            say(f"{n} of {len(missing)} cases driven (seed {what[2]}, {conditions[what[1]].name})")
     found: dict[tuple[str, int], list[Numbers]] = {}
     for what in jobs:
         found.setdefault(what[:2], []).append(store.numbers[what])

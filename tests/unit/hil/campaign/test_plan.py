@@ -25,7 +25,7 @@ def test_a_grid_combines_everything_and_noise_is_innermost(planned):
     assert [plan.inputs(k)["speed"] for k in (0, 3, 4, 11)] == [4.0, 4.0, 5.0, 6.0]
     assert [plan.run(k).seed for k in range(3)] == [7, 8, 7]
     assert plan.run(11).changes == (("start.speed_mps", 6.0), ("faults.0.share", 0.5))
-    runs = [run for part in range(plan.parts) for run in plan.task(part).runs]
+    runs = [run for part in range(plan.parts) for run in plan.part(part)]
     assert [run.number for run in runs] == list(range(12))
 
 

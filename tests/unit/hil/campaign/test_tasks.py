@@ -7,7 +7,7 @@ import pytest
 from hil.campaign.plan import CampaignError, load_plan
 from hil.campaign.report import build_report, verdict_of
 from hil.campaign.store import Store
-from hil.campaign.tasks import Done, killed, perform
+from hil.campaign.tasks import killed
 from hil.errors import Verdict
 from hil.log.read import read_log
 
@@ -22,8 +22,12 @@ def plan(planned):
 def done_of(plan, folder):
     store = Store(folder, plan)
     for part in store.missing():
-        store.add(part, perform(plan.task(part)))
+        store.add(part, list(map(plan.runner, plan.part(part))))
     return store
+
+
+def rows_of(plan):
+    return [plan.runner(run).row for part in range(plan.parts) for run in plan.part(part)]
 
 
 def test_results_have_inputs_verdict_expectations_and_figures(plan, tmp_path):
@@ -50,7 +54,7 @@ def test_the_same_campaign_gives_the_same_bytes(plan, tmp_path):
 def test_a_run_that_falls_over_is_a_row_and_the_others_go_on(planned):
     silenced = "".join(f'{{ fault = "lost", on = "EHB_DEMAND_{axle}", share = 1.0 }},' for axle in ("FRONT", "REAR"))
     plan = load_plan(planned(f'[[vary]]\nkey = "faults"\nvalues = [[{silenced}], []]\nlabels = ["silent", "none"]\n'))
-    rows = [row for part in range(plan.parts) for row in perform(plan.task(part)).rows]
+    rows = rows_of(plan)
     assert [(row["run"], row["verdict"]) for row in rows] == [(0, "broken"), (1, "passed")]
     assert "the plant never saw valid demands" in rows[0]["reason"]
 
@@ -59,7 +63,7 @@ def test_values_that_only_together_are_refused_are_told(planned):
     begins = '[[vary]]\nkey = "faults.0.at_s"\nvalues = [1.0, 3.0]\n'
     ends = '[[vary]]\nkey = "faults.0.until_s"\nvalues = [2.0, 5.0]\n'
     plan = load_plan(planned(begins + ends))
-    rows = [row for part in range(plan.parts) for row in perform(plan.task(part)).rows]
+    rows = rows_of(plan)
     assert [row["verdict"] for row in rows][2] == "refused"
     assert "until_s" in rows[2]["reason"]
 
@@ -101,10 +105,9 @@ def test_a_campaign_is_judged_by_its_worst_run(counts, verdict):
 
 def test_the_report_says_how_to_repeat_what_did_not_pass(plan, tmp_path):
     store = Store(tmp_path / "out", plan)
-    done = perform(plan.task(0))
-    store.add(0, done)
-    store.add(1, Done([killed(plan.run(1), 4)]))
-    store.add(2, perform(plan.task(2)))
+    for number in (0, 2):
+        store.add(number, [plan.runner(plan.run(number))])
+    store.add(1, [killed(plan.run(1), 4)])
     report = build_report(plan, store.table(), None)
     assert report.verdict is Verdict.BROKEN
     (table,) = report.sections[-1].tables
