@@ -45,6 +45,7 @@ COMMANDS = (
     "effects",
     "sensitivities",
     "faults",
+    "fmu",
 )
 """Subcommands in the order of the help; each is a module of this package."""
 
