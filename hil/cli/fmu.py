@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     export(args.what, scenario, args.out, args.force)
     say(
         [
-            f"{args.out}: FMI 3.0 co-simulation for Linux, {args.out.stat().st_size:,} bytes, numbers of {scenario.name}",
+            f"{args.out}: FMI 3.0 co-simulation for Linux, {args.out.stat().st_size:,} bytes, {scenario.name} inside",
             "where it runs: Python with brakebench installed, python3 on the PATH or named by BRAKEBENCH_PYTHON",
         ]
     )

@@ -30,7 +30,7 @@ def identifier(kind: Kind) -> str:
 
 def _text(root: Element) -> bytes:
     indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, "utf-8") + b"\n"
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, "unicode")}\n'.encode()
 
 
 def _number(value: float, kind: str) -> str:
@@ -85,10 +85,8 @@ def model_description(kind: Kind, table: Table, token: str, version: str) -> byt
     if on_bus:
         for known in (TX_DATA, TX_CLOCK):
             SubElement(structure, "Output", valueReference=str(known), dependencies="")
-    for reference in [
-        *outputs,
-        *([str(TX_CLOCK)] if on_bus else []),
-    ]:  # without dependencies: they may follow from all parameters
+    unknown = [*outputs, str(TX_CLOCK)] if on_bus else outputs
+    for reference in unknown:  # without dependencies: they may follow from all parameters
         SubElement(structure, "InitialUnknown", valueReference=reference)
     return _text(root)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from dbc.batch import Batch
 from dbc.contract import contract, spec_of
-from dbc.frame import BusName
+from dbc.frame import BusName, Received
 from ecu.node import SENT, SOURCES, EcuNode
 from ecu.parameters.ecu import EcuParameters
 from hil.fmu.can_node import CanNode
@@ -106,7 +106,7 @@ class EcuUnit:
         assert self._node is not None
         self._ticks += 1
         now_ns = self._ticks * PERIOD_NS
-        inbox = self._can.inbox(now_ns) if self._on_bus else list(self._batch.frames(now_ns))
+        inbox: list[Received] = [*(self._can.inbox(now_ns) if self._on_bus else self._batch.frames(now_ns))]
         frames = self._node.step(now_ns, inbox)
         if self._on_bus:
             self._can.send(frames)

@@ -1,4 +1,4 @@
-"""The process behind an FMU: answers the calls of hil/fmu/wrapper.c on its standard input, a socket, until that ends."""
+"""The process behind an FMU: answers calls of wrapper.c on its standard input, a socket, until that ends."""
 
 import os
 import socket

@@ -124,7 +124,7 @@ def _columns(name: str, value: Any) -> list[str]:
 
 
 def parameter_variables(value: object) -> Iterator[Variable]:
-    """Variables for the numbers of a parameter set: ``table.name``, of pairs and fours ``table.name_front``, ``_fl``."""
+    """Variables for the numbers of a parameter set: ``table.name``; pairs end in ``_front``, fours in ``_fl``, ..."""
     for name, part, hint in _numbers(value):
         unit, low, high = hint.__metadata__
         parts = part if isinstance(part, tuple) else (part,)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dbc.batch import Batch
-from dbc.contract import contract
+from dbc.contract import contract, spec_of
 from dbc.frame import BusName, Frame
 from ecu.node import SENT, SOURCES, EcuNode
 from hil.fmu.ecu_unit import BUS_NOTIFICATIONS, EcuUnit
@@ -16,14 +16,21 @@ from hil.scenario.scenario import load_scenario
 PARAMETERS = load_scenario("stop72").ecu
 SPEC = contract(BusName.VEHICLE).by_id
 SI = {
-    "BRAKE_PEDAL.PEDAL_TRAVEL_1": 0.5, "BRAKE_PEDAL.PEDAL_TRAVEL_2": 0.5, "BATTERY_STATUS.STATE_OF_CHARGE": 0.7,
+    "BRAKE_PEDAL.PEDAL_TRAVEL_1": 0.5,
+    "BRAKE_PEDAL.PEDAL_TRAVEL_2": 0.5,
+    "BATTERY_STATUS.STATE_OF_CHARGE": 0.7,
     "BATTERY_STATUS.CHARGE_POWER_LIMIT": 5e4,
-} | {f"WHEEL_SPEED_{a}.WHEEL_SPEED_{w}": 60.0 for a, w in (("FRONT", "FL"), ("FRONT", "FR"), ("REAR", "RL"), ("REAR", "RR"))}  # fmt: skip
+    "WHEEL_SPEED_FRONT.WHEEL_SPEED_FL": 60.0,
+    "WHEEL_SPEED_FRONT.WHEEL_SPEED_FR": 60.0,
+    "WHEEL_SPEED_REAR.WHEEL_SPEED_RL": 60.0,
+    "WHEEL_SPEED_REAR.WHEEL_SPEED_RR": 60.0,
+}
 
 
 def values(pedal=0.5):
     """Inputs as the node's messages hold them."""
-    fields = [f"{spec.name}.{f.signal}" for kind in SOURCES for spec in [contract(BusName.VEHICLE).by_type[kind]] for f in spec.fields]  # fmt: skip
+    specs = [spec_of(kind) for kind in SOURCES]
+    fields = [f"{spec.name}.{field.signal}" for spec in specs for field in spec.fields]
     told = SI | {"BRAKE_PEDAL.PEDAL_TRAVEL_1": pedal, "BRAKE_PEDAL.PEDAL_TRAVEL_2": pedal}
     return fields, [told.get(name, 0.0) for name in fields]
 
@@ -113,7 +120,7 @@ def test_on_a_bus_it_sends_the_nodes_frames_byte_for_byte():
         frames = alone.frames()
         alone.now_ns = tick * 10_000_000
         sent = [f for f in alone.tick(frames) if f.bus is BusName.VEHICLE]
-        assert [op for op in decode(data)] == [Transmit(f.can_id, f.data) for f in sent]
+        assert list(decode(data)) == [Transmit(f.can_id, f.data) for f in sent]
     demands = [SPEC[op.can_id].decode(op.data) for op in decode(said[-1]) if op.can_id == 0xA8]
     assert demands[0].pressure_demand_fl_pa > 1e6
 
