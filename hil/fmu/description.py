@@ -36,7 +36,7 @@ def _text(root: Element) -> bytes:
 def _number(value: float, kind: str) -> str:
     if kind == "Boolean":
         return "true" if value else "false"
-    return str(int(value)) if kind == "Int64" else repr(float(value))
+    return str(int(value)) if kind == "Int32" else repr(float(value))
 
 
 def model_description(kind: Kind, table: Table, token: str, version: str) -> bytes:

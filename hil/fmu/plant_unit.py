@@ -64,7 +64,7 @@ def variables(parameters: PlantParameters, start: Start) -> list[Variable]:
     of += [v for kind in kinds for v in signal_variables(kind, "output", ("manoeuvre",))]
     for name, (unit, low, high) in _START_OF.items():
         of.append(Variable(f"start.{name}", "Float64", "parameter", getattr(start, name), unit, "", low, high))
-    of.append(Variable("seed", "Int64", "parameter", 1, description="of all noise", low=0))
+    of.append(Variable("seed", "Int32", "parameter", 1, description="of all noise", low=0))
     return [*of, *parameter_variables(parameters)]
 
 

@@ -32,7 +32,7 @@ class Variable:
     """One variable. ``low`` and ``high``: bounds, where it has any; booleans are kept as integers."""
 
     name: str
-    kind: Literal["Float64", "Int64", "Boolean"]
+    kind: Literal["Float64", "Int32", "Boolean"]
     causality: Causality
     start: float = 0.0
     unit: str = ""
@@ -62,7 +62,7 @@ class Table:
         self.integers = np.array([int(v.start) for v in integers], np.int64)
         self._real = {v.name: k for k, v in enumerate(reals)}
         self._integer = {v.name: k for k, v in enumerate(integers)}
-        first = {"Int64": INTEGERS, "Boolean": BOOLEANS}
+        first = {"Int32": INTEGERS, "Boolean": BOOLEANS}
         self.references = self._real | {v.name: first[v.kind] + self._integer[v.name] for v in integers}
 
     def __getitem__(self, name: str) -> float | int:
@@ -93,7 +93,7 @@ def signal_variables(kind: type[Message], causality: Causality, leave: Sequence[
 
 
 def _signal(spec: MessageSpec, field: Field, causality: Causality) -> Variable:
-    name, kind = f"{spec.name}.{field.signal}", "Int64" if is_integer(field) else "Float64"
+    name, kind = f"{spec.name}.{field.signal}", "Int32" if is_integer(field) else "Float64"
     text = _comments(spec.bus).get((spec.can_id, field.signal), "")
     unit = _UNITS[field.name.removeprefix(field.signal.lower()).removeprefix("_")]
     start = max(0.0, field.minimum * field.si_per_unit) if causality == "input" else 0.0
@@ -128,7 +128,7 @@ def parameter_variables(value: object) -> Iterator[Variable]:
     for name, part, hint in _numbers(value):
         unit, low, high = hint.__metadata__
         parts = part if isinstance(part, tuple) else (part,)
-        kind: Literal["Int64", "Float64"] = "Int64" if typing.get_args(hint)[0] is int else "Float64"
+        kind: Literal["Int32", "Float64"] = "Int32" if typing.get_args(hint)[0] is int else "Float64"
         for column, number in zip(_columns(name, part), parts, strict=True):
             yield Variable(column, kind, "parameter", number, "" if unit == "1" else unit, low=low, high=high)
 

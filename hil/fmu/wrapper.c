@@ -396,7 +396,7 @@ API fmi3Status fmi3SetFloat64(void *instance, const Ref ref[], size_t n, const d
         }                                                                                                            \
         return OK;                                                                                                   \
     }
-OF_INTEGERS(Int64, int64_t, INTEGERS)
+OF_INTEGERS(Int32, int32_t, INTEGERS)
 OF_INTEGERS(Boolean, bool, BOOLEANS)
 
 API fmi3Status fmi3GetBinary(void *instance, const Ref ref[], size_t n, size_t size[], const uint8_t *value[],
@@ -520,7 +520,7 @@ API fmi3Status fmi3DeserializeFMUState(void *instance, const uint8_t bytes[], si
     API fmi3Status Name(void *instance) { return say(instance, ERROR, #Name ": this FMU does not have it"); }
 #define ABSENT_TYPE(Name) ABSENT(fmi3Get##Name) ABSENT(fmi3Set##Name)
 ABSENT_TYPE(Float32) ABSENT_TYPE(Int8) ABSENT_TYPE(UInt8) ABSENT_TYPE(Int16) ABSENT_TYPE(UInt16)
-ABSENT_TYPE(Int32) ABSENT_TYPE(UInt32) ABSENT_TYPE(UInt64) ABSENT_TYPE(String)
+ABSENT_TYPE(Int64) ABSENT_TYPE(UInt32) ABSENT_TYPE(UInt64) ABSENT_TYPE(String)
 ABSENT_TYPE(IntervalDecimal) ABSENT_TYPE(IntervalFraction) ABSENT_TYPE(ShiftDecimal) ABSENT_TYPE(ShiftFraction)
 ABSENT_TYPE(ContinuousStates) ABSENT(fmi3SetTime)
 ABSENT(fmi3GetNumberOfVariableDependencies) ABSENT(fmi3GetVariableDependencies)

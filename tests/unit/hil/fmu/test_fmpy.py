@@ -199,17 +199,17 @@ def test_plant_and_controller_together_stop_the_car(fmus):
     with instance(fmus / "plant.fmu") as car, instance(fmus / "ecu.fmu") as ecu:
         both = [name for name in car.names("output") if name in ecu.names("input")]
         demands = [name for name in ecu.names("output") if name in car.names("input")]
-        whole = [name for name in car.names("output", "Int64") if name in ecu.names("input", "Int64")]
+        whole = [name for name in car.names("output", "Int32") if name in ecu.names("input", "Int32")]
         assert (len(both), len(demands), len(whole)) == (21, 8, 6)
         car.start({"start.speed_mps": 15.0})
         ecu.start()
         for tick in range(500):
             ecu.set(dict(zip(both, car.get(both), strict=True)) | (pedal if tick > 150 else {}))
-            states = car.fmu.getInt64([car.references[name] for name in whole])
-            ecu.fmu.setInt64([ecu.references[name] for name in whole], states)
+            states = car.fmu.getInt32([car.references[name] for name in whole])
+            ecu.fmu.setInt32([ecu.references[name] for name in whole], states)
             asked = dict(zip(demands, ecu.get(demands), strict=True))
             car.set({name: 0.0 if np.isnan(value) else value for name, value in asked.items()})
             car.step(tick * 0.01, 0.01)
             ecu.step(tick * 0.01, 0.01)
-        assert ecu.fmu.getInt64([ecu.references["BRAKE_STATUS.MODE"]]) == [1]
+        assert ecu.fmu.getInt32([ecu.references["BRAKE_STATUS.MODE"]]) == [1]
         assert car.get(["TRUTH_MOTION.SPEED"])[0] < 5.0

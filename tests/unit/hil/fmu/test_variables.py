@@ -50,7 +50,7 @@ def test_names_are_those_of_dbc_and_parameter_sets_in_si():
     pressure = of("EHB_DEMAND_FRONT.PRESSURE_DEMAND_FL", variables)
     assert (pressure.unit, pressure.causality, pressure.start) == ("Pa", "input", 0.0)
     assert of("BATTERY_STATUS.CHARGE_POWER_LIMIT", variables).unit == "W"
-    assert of("MOTOR_STATUS_FRONT.FAULT_FL", variables).kind == "Int64"
+    assert of("MOTOR_STATUS_FRONT.FAULT_FL", variables).kind == "Int32"
     mass = of("vehicle.mass_kg", variables)
     assert (mass.start, mass.unit, mass.low, mass.high) == (SCENARIO.plant.vehicle.mass_kg, "kg", 300.0, 5000.0)
     assert of("vehicle.track_m_rear", variables).start == SCENARIO.plant.vehicle.track_m[1]
@@ -58,7 +58,7 @@ def test_names_are_those_of_dbc_and_parameter_sets_in_si():
 
 
 def test_the_controllers_whole_numbers_are_integers():
-    assert of("supervision.frames_to_upgrade", ecu_unit.variables(SCENARIO.ecu)).kind == "Int64"
+    assert of("supervision.frames_to_upgrade", ecu_unit.variables(SCENARIO.ecu)).kind == "Int32"
 
 
 def test_a_changed_number_comes_into_the_set_and_all_others_stay():
