@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from dbc.contract import contract
-from dbc.frame import BusName
+from dbc.frame import BusName, Node
 from hil.bench.bench_run import BenchRun, BenchState, OutputError
 from hil.bench.real import RealBench
 from hil.bench.result import RunResult, Signals, measure
@@ -89,8 +89,13 @@ def run_scenario(
     virtual: bool = False,
     without: Sequence[str] = (),
     transmit: bool = False,
+    make_plant: Callable[[Scenario], Node] | None = None,
 ) -> Outcome:
     """Run one scenario in real or in virtual time and measure it.
+
+    Parameters
+    ----------
+    make_plant : in virtual time, a node in the place of our car.
 
     Raises
     ------
@@ -107,7 +112,9 @@ def run_scenario(
         if virtual:
             bit_rate = contract(BusName.VEHICLE).bit_rate
             line = open_line(bus, bit_rate, seed) if is_timed(bus) else None
-            bench_run = VirtualBench(scenario, folder, seed, say, stop, line=line)
+            bench_run = VirtualBench(
+                scenario, folder, seed, say, stop, make_plant(scenario) if make_plant else None, line=line
+            )
         else:
             bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without, transmit)
         with bench_run:
