@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from dbc.contract import contract
-from dbc.frame import BusName, Node
+from dbc.frame import BusName
 from hil.bench.bench_run import BenchRun, BenchState, OutputError
 from hil.bench.real import RealBench
 from hil.bench.result import RunResult, Signals, measure
@@ -33,6 +33,9 @@ from hil.report.text import print_text
 from hil.rt.clock import wall_time_ns
 from hil.rt.process import Child, StopSignal
 from hil.scenario.scenario import Scenario, load_scenario
+
+if TYPE_CHECKING:
+    from hil.fmu.foreign_plant import OpenPlant
 
 EXPECTED = "Expected: "
 _FILES = {"log": "recording.log", "signals": "signals.parquet", "figure": "figure.png", "page": "report.html"}
@@ -89,13 +92,13 @@ def run_scenario(
     virtual: bool = False,
     without: Sequence[str] = (),
     transmit: bool = False,
-    make_plant: Callable[[Scenario], Node] | None = None,
+    plant: "OpenPlant | None" = None,
 ) -> Outcome:
     """Run one scenario in real or in virtual time and measure it.
 
     Parameters
     ----------
-    make_plant : in virtual time, a node in the place of our car.
+    plant : in virtual time, somebody else's FMU in the place of our car.
 
     Raises
     ------
@@ -112,9 +115,8 @@ def run_scenario(
         if virtual:
             bit_rate = contract(BusName.VEHICLE).bit_rate
             line = open_line(bus, bit_rate, seed) if is_timed(bus) else None
-            bench_run = VirtualBench(
-                scenario, folder, seed, say, stop, make_plant(scenario) if make_plant else None, line=line
-            )
+            node = None if plant is None else plant.node(scenario)
+            bench_run = VirtualBench(scenario, folder, seed, say, stop, node, line=line)
         else:
             bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without, transmit)
         with bench_run:
@@ -128,6 +130,8 @@ def run_scenario(
         say(explained(bench_run))
     say("measuring")
     provenance = {"realtime asked for": realtime, "command line": command_line, "started": started_ns // 1_000_000_000}
+    if plant is not None:
+        provenance["plant"] = str(plant)
     return finish(bench_run, seed, provenance)
 
 

@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
             without=args.without,
             command_line=" ".join(sys.argv[1:]),
             say=lambda line: print(line, file=sys.stderr, flush=True),
-            make_plant=None if foreign is None else foreign.node,
+            plant=foreign,
         )
     if args.json:
         print(outcome.json_text())

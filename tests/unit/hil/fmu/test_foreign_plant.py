@@ -77,6 +77,7 @@ def test_a_crash_ends_the_run_with_the_fmus_name(car, tmp_path, capsys, monkeypa
     assert main(words) == 3
     assert "car.fmu: the FMU has crashed: killed by SIGSEGV" in capsys.readouterr().out
     assert (tmp_path / "run" / "recording.log").stat().st_size > 10_000
+    assert "car.fmu (brakebench_plant, FMI 3.0, brakebench" in (tmp_path / "run" / "report.html").read_text()
 
 
 def test_a_stall_ends_with_the_fmus_name(car):
