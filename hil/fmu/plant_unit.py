@@ -85,6 +85,7 @@ class PlantUnit:
         self.table = Table(variables(parameters, start))
         inputs = [v.name for v in self.table.variables if v.causality == "input"]
         self._inputs = self.table.real_indices(inputs)
+        self._without = self.table.reals[self._inputs]  # what holds where an input is not available
         told = list(_reported())
         self._sources = np.array([place for *_, place, _ in told], np.int64)
         self._told = np.zeros(len(told))
@@ -145,6 +146,9 @@ class PlantUnit:
 
     def _evaluate(self, steps: int) -> None:
         values = self.table.reals[self._inputs]
+        missing = np.isnan(values)
+        if missing.any():
+            values[missing] = self._without[missing]
         self._u[: U.steering_wheel_rad + 1] = values[: U.steering_wheel_rad + 1]
         if (values[-3:] != self._scene.road[0, 1:]).any():
             road = road_table(DRY)

@@ -6,6 +6,7 @@ import signal
 import sys
 import zipfile
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 import pytest
@@ -65,30 +66,36 @@ def own_run(names, end_ms):
     for name, value in START.items():
         one.table.reals[one.table.references[name]] = value
     one.initialise()
-    rows = []
+    rows, began = [], perf_counter()
     for block in range(end_ms // BLOCK_MS):
         for name, value in inputs(block).items():
             one.table.reals[one.table.references[name]] = value
-        one.advance_to((block + 1) * BLOCK_MS * 1e-3)
+        for time_ms in range(block * BLOCK_MS, (block + 1) * BLOCK_MS, 10):
+            one.advance_to((time_ms + 10) * 1e-3)
         rows.append([one.table[name] for name in names])
-    return np.array(rows)
+    return np.array(rows), (perf_counter() - began) * 1e6 / (end_ms / 10)
 
 
-@pytest.mark.parametrize("step_ms", [1, 10, 32])
-def test_the_plant_in_fmpy_is_our_own_run_at_every_step(fmus, step_ms):
+def test_the_plant_in_fmpy_is_our_own_run_at_every_step(fmus, capsys):
     end_ms = 3 * BLOCK_MS
     with instance(fmus / "plant.fmu") as one:
         names = one.names("output")
-        one.start(START)
-        rows = []
-        for time_ms in range(0, end_ms, step_ms):
-            if time_ms % BLOCK_MS == 0:
-                one.set(inputs(time_ms // BLOCK_MS))
-            one.step(time_ms * 1e-3, step_ms * 1e-3)
-            if (time_ms + step_ms) % BLOCK_MS == 0:
-                rows.append(one.get(names))
-    assert len(names) == 50
-    np.testing.assert_allclose(np.array(rows), own_run(names, end_ms), rtol=1e-9, atol=1e-9)
+        assert len(names) == 50
+        expected, own_us = own_run(names, end_ms)
+        for step_ms in (1, 10, 32):
+            one.fmu.reset()
+            one.start(START)
+            rows, began = [], perf_counter()
+            for time_ms in range(0, end_ms, step_ms):
+                if time_ms % BLOCK_MS == 0:
+                    one.set(inputs(time_ms // BLOCK_MS))
+                one.step(time_ms * 1e-3, step_ms * 1e-3)
+                if (time_ms + step_ms) % BLOCK_MS == 0:
+                    rows.append(one.get(names))
+            us = (perf_counter() - began) * 1e6 / (end_ms / step_ms)
+            with capsys.disabled():
+                print(f"\nplant, steps of {step_ms} ms: {us:.0f} us in FMPy; ours of 10 ms {own_us:.0f} us")
+            np.testing.assert_allclose(np.array(rows), expected, rtol=1e-9, atol=1e-9)
 
 
 def test_fmpys_own_run_over_ten_seconds_with_the_step_it_chooses(fmus):
@@ -207,8 +214,7 @@ def test_plant_and_controller_together_stop_the_car(fmus):
             ecu.set(dict(zip(both, car.get(both), strict=True)) | (pedal if tick > 150 else {}))
             states = car.fmu.getInt32([car.references[name] for name in whole])
             ecu.fmu.setInt32([ecu.references[name] for name in whole], states)
-            asked = dict(zip(demands, ecu.get(demands), strict=True))
-            car.set({name: 0.0 if np.isnan(value) else value for name, value in asked.items()})
+            car.set(dict(zip(demands, ecu.get(demands), strict=True)))
             car.step(tick * 0.01, 0.01)
             ecu.step(tick * 0.01, 0.01)
         assert ecu.fmu.getInt32([ecu.references["BRAKE_STATUS.MODE"]]) == [1]

@@ -118,6 +118,15 @@ def test_parameters_and_start_take_effect():
     assert (one.table.reals == other.table.reals).all()
 
 
+def test_a_demand_that_is_not_available_is_none_and_a_road_that_is_not_is_dry():
+    one, other = unit(), unit()
+    for name in ("EHB_DEMAND_FRONT.PRESSURE_DEMAND_FL", "STIMULUS_ROAD.FRICTION_LEFT"):
+        one.table.reals[one.table.references[name]] = np.nan
+    one.advance_to(0.1)
+    other.advance_to(0.1)
+    assert one.table["TRUTH_MOTION.SPEED"] == other.table["TRUTH_MOTION.SPEED"]
+
+
 def test_the_road_is_an_input():
     one = unit()
     one.table.reals[one.table.references["STIMULUS_ROAD.GRADE"]] = 0.1
