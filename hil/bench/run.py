@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from dbc.contract import contract
 from dbc.frame import BusName
@@ -33,6 +33,9 @@ from hil.report.text import print_text
 from hil.rt.clock import wall_time_ns
 from hil.rt.process import Child, StopSignal
 from hil.scenario.scenario import Scenario, load_scenario
+
+if TYPE_CHECKING:
+    from hil.fmu.foreign_plant import OpenPlant
 
 EXPECTED = "Expected: "
 _FILES = {"log": "recording.log", "signals": "signals.parquet", "figure": "figure.png", "page": "report.html"}
@@ -89,12 +92,14 @@ def run_scenario(
     virtual: bool = False,
     without: Sequence[str] = (),
     transmit: bool = False,
+    plant: "OpenPlant | None" = None,
 ) -> Outcome:
     """Run one scenario in real or in virtual time and measure it.
 
     Parameters
     ----------
     name : of the library, a path, or a scenario that was read already (in virtual time alone: nodes read a file).
+    plant : in virtual time, somebody else's FMU in the place of our car.
 
     Raises
     ------
@@ -111,7 +116,8 @@ def run_scenario(
         if virtual:
             bit_rate = contract(BusName.VEHICLE).bit_rate
             line = open_line(bus, bit_rate, seed) if is_timed(bus) else None
-            bench_run = VirtualBench(scenario, folder, seed, say, stop, line=line)
+            node = None if plant is None else plant.node(scenario)
+            bench_run = VirtualBench(scenario, folder, seed, say, stop, node, line=line)
         else:
             bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without, transmit)
         with bench_run:
@@ -125,6 +131,8 @@ def run_scenario(
         say(explained(bench_run))
     say("measuring")
     provenance = {"realtime asked for": realtime, "command line": command_line, "started": started_ns // 1_000_000_000}
+    if plant is not None:
+        provenance["plant"] = str(plant)
     return finish(bench_run, seed, provenance)
 
 

@@ -46,6 +46,7 @@ COMMANDS = (
     "sensitivities",
     "faults",
     "campaign",
+    "fmu",
 )
 """Subcommands in the order of the help; each is a module of this package."""
 

@@ -1,6 +1,7 @@
 """``brakebench run``: ECU and plant on one bus, one scenario, recorded and measured."""
 
 import argparse
+import contextlib
 import sys
 from pathlib import Path
 
@@ -26,6 +27,13 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="do not start this node: it is somebody else's, on the same bus",
     )
     parser.add_argument("--extend", type=Path, metavar="FILE", help="extension that `explain` wrote: the car it taught")
+    parser.add_argument(
+        "--plant",
+        type=Path,
+        metavar="FMU",
+        help="somebody else's FMU in the place of the car, in virtual time; see docs/fmu.md",
+    )
+    parser.add_argument("--map", type=Path, metavar="MAP.toml", help="which signal is which variable of --plant")
     parser.add_argument("--out", metavar="DIR", help="folder for log, signals, figure and report (default: runs/...)")
     add_transmit(parser)
     add_seed(parser)
@@ -48,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
         )
     if timed and not args.virtual:
         raise BrakebenchError(f"--bus {args.bus}: a timed bus is in virtual time; add --virtual")
+    if (args.plant is None) != (args.map is None) or (args.plant is not None and not args.virtual):
+        raise BrakebenchError("--plant FMU: give it with --map MAP.toml and --virtual")
     scenario, out = args.scenario, args.out
     if args.extend is not None:
         from hil.bench.run import new_folder
@@ -59,18 +69,26 @@ def run(args: argparse.Namespace) -> int:
         for remark in effects_after_end(extended):
             print(remark, file=sys.stderr)
         scenario, out = str(extended), str(folder)
-    outcome = run_scenario(
-        scenario,
-        args.bus,
-        out=out,
-        seed=args.seed,
-        realtime=args.realtime,
-        transmit=args.transmit,
-        virtual=args.virtual,
-        without=args.without,
-        command_line=" ".join(sys.argv[1:]),
-        say=lambda line: print(line, file=sys.stderr, flush=True),
-    )
+    foreign = None
+    if args.plant is not None:
+        from hil.fmu.foreign_plant import open_plant
+
+        foreign = open_plant(args.plant, args.map, args.seed)
+        print(f"plant {foreign}", file=sys.stderr, flush=True)
+    with foreign or contextlib.nullcontext():
+        outcome = run_scenario(
+            scenario,
+            args.bus,
+            out=out,
+            seed=args.seed,
+            realtime=args.realtime,
+            transmit=args.transmit,
+            virtual=args.virtual,
+            without=args.without,
+            command_line=" ".join(sys.argv[1:]),
+            say=lambda line: print(line, file=sys.stderr, flush=True),
+            plant=foreign,
+        )
     if args.json:
         print(outcome.json_text())
     else:

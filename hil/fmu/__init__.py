@@ -1,0 +1,1 @@
+"""FMUs: plant and controller for other people's benches, and their plants in ours."""
