@@ -230,6 +230,10 @@ def _panel_filler(panel: Panel, timeline: Sequence[Lane], span: tuple[float, flo
         for trace, stroke in zip(panel.traces, strokes(panel.traces), strict=True):
             _stroke(axes, trace.t_s, shown(trace.y, panel.unit), stroke)
         axes.set_xlim(*span)
+        if panel.names:
+            axes.set_yticks(range(len(panel.names)), [_cut(clean(name), _MOST_LETTERS) for name in panel.names])
+            for label in axes.get_yticklabels():
+                label.set_parse_math(False)
         for t_s, colour in _marks(timeline):
             axes.axvline(t_s, color=colour, linewidth=0.8, alpha=0.55, zorder=0.5)
         axes.set_xlabel("Time in s", fontsize=7.5, color=_SOFT, labelpad=1)
@@ -251,7 +255,8 @@ def _stroke(axes: "Axes", x: Floats, y: Floats, stroke: Stroke, size: float = 3.
             x, y, linestyle="none", marker="o", markersize=size, color=stroke.colour, alpha=0.75, markeredgewidth=0
         )
     else:
-        axes.plot(x, y, color=stroke.colour, linewidth=width, linestyle=dash)
+        drawstyle = "steps-post" if stroke.steps else "default"
+        axes.plot(x, y, color=stroke.colour, linewidth=width, linestyle=dash, drawstyle=drawstyle)
 
 
 def _fill_timeline(axes: "Axes", rows: Sequence[Lane], span: tuple[float, float]) -> None:

@@ -18,12 +18,13 @@ _ESTIMATE_DASH: Dash = (3, 2)
 
 @dataclass(frozen=True)
 class Stroke:
-    """How one trace is drawn: colour, line width in px, dash lengths in px (empty: solid), markers only."""
+    """How one trace is drawn: colour, line width and dash lengths in px (empty: solid), markers only, steps."""
 
     colour: str
     width: float
     dash: Dash = ()
     points: bool = False
+    steps: bool = False
 
 
 def strokes(traces: Sequence[Trace | Curve]) -> list[Stroke]:
@@ -52,4 +53,4 @@ def strokes(traces: Sequence[Trace | Curve]) -> list[Stroke]:
 def _coloured(colour: str, style: Style) -> Stroke:
     if style == "estimate":
         return Stroke(colour, 1.6, _ESTIMATE_DASH)
-    return Stroke(colour, 1.6, points=style == "points")
+    return Stroke(colour, 1.6, points=style == "points", steps=style == "steps")
