@@ -4,6 +4,7 @@ Tables and what was run are left to the page. The picture is drawn with matplotl
 """
 
 import math
+import textwrap
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -28,7 +29,8 @@ _SOFT, _RULE, _GRID = "#57636F", "#C9D1D9", "#E8ECF0"
 _VERDICT_COLOURS = {
     "passed": "#1D7A4F", "failed": "#B3261E", "inconclusive": "#9A6700", "incomplete": "#9A6700", "broken": "#B3261E",
 }  # fmt: skip
-_NUMBERS_A_ROW = 7
+_COLUMNS, _BETWEEN = 6, 0.15  # of the numbers, each of which takes one to three; in between them
+_LABEL_PT, _VALUE_PT, _TITLE_PT, _REASON_PT = 7.5, 10.5, 15.0, 10.0
 _ROW, _LETTER, _MOST_LETTERS = 0.16, 0.062, 36  # in: height of a named row, width of a letter of its name
 _DOT = 5.0  # points: marker of a named row
 _LETTERS = 84  # of 7 points that the narrowest timeline holds
@@ -75,8 +77,7 @@ def draw(report: Report) -> "Figure":
     inner = WIDTH_IN - 2 * _EDGE
     width = (inner - (columns - 1) * _GAP) / columns - _LEFT
     grids = [[cells[i : i + columns] for i in range(0, len(cells), columns)] for _, cells in blocks]
-    title_rows = math.ceil(len(report.numbers) / _NUMBERS_A_ROW)
-    height = 2 * _EDGE + 0.62 + 0.5 * title_rows
+    height = 2 * _EDGE + _head_height(report)
     height += sum(0.5 + sum(_row_height(row, width) for row in grid) for grid in grids if grid)
 
     figure = Figure(figsize=(WIDTH_IN, height))
@@ -108,29 +109,80 @@ def _row_height(row: Sequence[_Cell], width: float) -> float:
 def _header(figure: "Figure", report: Report, height: float) -> float:
     """Write title, verdict and numbers; return the height left, in."""
     top = height - _EDGE
-    _write(figure, _EDGE, top - 0.14, clean(report.title), size=15, weight="bold")
-    left = _EDGE
+    for line in _lines(report.title, _TITLE_PT, 0.0):
+        _write(figure, _EDGE, top - 0.14, line, size=_TITLE_PT, weight="bold")
+        top -= 0.31
+    left = _badge_width(report)
     if report.verdict is not None:
-        badge = _write(figure, _EDGE + 0.06, top - 0.45, report.verdict.value, size=9.5, weight="bold", colour="white")
+        badge = _write(figure, _EDGE + 0.06, top - 0.14, report.verdict.value, size=9.5, weight="bold", colour="white")
         badge.set_bbox({"boxstyle": "round,pad=0.35", "facecolor": _VERDICT_COLOURS[report.verdict], "linewidth": 0})
-        left += 0.085 * len(report.verdict.value) + 0.25
-    _write(figure, left, top - 0.45, clean(report.reason), size=10)
-    top -= 0.62
-    for index, number in enumerate(report.numbers):
-        row, column = divmod(index, _NUMBERS_A_ROW)
-        _number(figure, number, _EDGE + column * (WIDTH_IN - 2 * _EDGE) / _NUMBERS_A_ROW, top - 0.5 * row)
-    return top - 0.5 * math.ceil(len(report.numbers) / _NUMBERS_A_ROW)
+    for line in _lines(report.reason, _REASON_PT, left):
+        _write(figure, _EDGE + left, top - 0.14, line, size=_REASON_PT)
+        top -= 0.2
+    top -= 0.11
+    for number, (row, column, columns) in zip(report.numbers, _places(report.numbers), strict=True):
+        _number(figure, number, _EDGE + column * _COLUMN_IN, top - 0.5 * row, columns * _COLUMN_IN - _BETWEEN)
+    return height - _EDGE - _head_height(report)
 
 
-def _number(figure: "Figure", number: Number, left: float, top: float) -> None:
-    value, unit = number_text(number)
-    colour = {None: INK, True: _VERDICT_COLOURS["passed"], False: _VERDICT_COLOURS["failed"]}[number.met]
-    text = f"{value} {unit}".strip()
+def _head_height(report: Report) -> float:
+    """Return the height of title, verdict and numbers, in."""
+    lines = _lines(report.reason, _REASON_PT, _badge_width(report))
+    rows = 1 + max((row for row, _, _ in _places(report.numbers)), default=-1)
+    return 0.31 * len(_lines(report.title, _TITLE_PT, 0.0)) + 0.2 * len(lines) + 0.11 + 0.5 * rows
+
+
+def _badge_width(report: Report) -> float:
+    return 0.0 if report.verdict is None else 0.085 * len(report.verdict.value) + 0.25
+
+
+_COLUMN_IN = (WIDTH_IN - 2 * _EDGE) / _COLUMNS
+
+
+def _places(numbers: Sequence[Number]) -> list[tuple[int, int, int]]:
+    """Return row, column and columns of each number: as many as its texts need."""
+    places, row, column = [], 0, 0
+    for number in numbers:
+        needed = max(_wide(clean(number.label), _LABEL_PT), _wide(_value(number), _VALUE_PT)) + _BETWEEN
+        columns = max(1, min(3, math.ceil(needed / _COLUMN_IN)))
+        if column + columns > _COLUMNS:
+            row, column = row + 1, 0
+        places.append((row, column, columns))
+        column += columns
+    return places
+
+
+def _value(number: Number) -> str:
     limit = f"  ({clean(number.limit)})" if number.limit else ""
-    _write(figure, left, top - 0.14, _cut(clean(number.label), 24), size=7.5, colour=_SOFT)
-    shown = _cut(_cut(text, 20) + limit, 32)
-    size = 10.5 if len(shown) < 18 else 8.0 if len(shown) < 24 else 6.3
-    _write(figure, left, top - 0.34, shown, size=size, colour=colour)
+    return " ".join(filter(None, number_text(number))) + limit
+
+
+def _number(figure: "Figure", number: Number, left: float, top: float, room: float) -> None:
+    colour = {None: INK, True: _VERDICT_COLOURS["passed"], False: _VERDICT_COLOURS["failed"]}[number.met]
+    _write(figure, left, top - 0.14, _cut_to(clean(number.label), _LABEL_PT, room), size=_LABEL_PT, colour=_SOFT)
+    value = _value(number)
+    size = _VALUE_PT if _wide(value, _VALUE_PT) <= room else 8.0
+    _write(figure, left, top - 0.34, _cut_to(value, size, room), size=size, colour=colour)
+
+
+def _wide(text: str, points: float) -> float:
+    """Return about how wide ``text`` becomes in DejaVu Sans, in."""
+    ems = sum(0.33 if c in " .,:;|il'" else 0.70 if c.isupper() else 0.62 if ord(c) < 0x2E80 else 1.0 for c in text)
+    return ems * points / 72.0
+
+
+def _cut_to(text: str, points: float, room: float) -> str:
+    if _wide(text, points) <= room:
+        return text
+    while text and _wide(text + "…", points) > room:
+        text = text[:-1]
+    return text + "…"
+
+
+def _lines(text: str, points: float, left: float) -> list[str]:
+    """Return ``text`` in lines that fit the picture ``left`` of whose edge something stands; one at least."""
+    letters = int((WIDTH_IN - 2 * _EDGE - left) / _wide("n", points))
+    return textwrap.wrap(clean(text), letters, break_on_hyphens=False) or [""]
 
 
 def _write(

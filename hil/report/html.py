@@ -7,11 +7,12 @@ from pathlib import Path
 from hil.report.page import FOOT, HEAD, scripts, style
 from hil.report.palette import INK, Stroke, strokes
 from hil.report.plots import Pool, chart_figure, height_px, panel_figure
-from hil.report.report import Chart, Curve, Lane, Number, Panel, Report, Section, Table, Trace
+from hil.report.report import Cell, Chart, Curve, Lane, Number, Panel, Report, Section, Table, Trace
 from hil.report.thin import samples_per_trace
 from hil.report.units import symbol
 from hil.report.words import clean, number_text, outline, value_text
 
+_ONE_LINE = 20  # letters of a cell that are never broken: numbers with unit or interval, names
 _VERDICT_MARKS = {"passed": "✓", "failed": "✗", "inconclusive": "?", "incomplete": "!", "broken": "✗"}
 
 
@@ -161,15 +162,19 @@ def _table(table: Table) -> str:
         all(not isinstance(row[i], (str, bool)) for row in table.rows) and bool(table.rows)
         for i in range(len(table.columns))
     ]
-    kinds = [" class=n" if r else "" for r in right]
-    heads = "".join(f"<th{kind}>{_text(head)}</th>" for kind, head in zip(kinds, table.columns, strict=True))
+    heads = "".join(f"<th{' class=n' if r else ''}>{_text(h)}</th>" for r, h in zip(right, table.columns, strict=True))
     rows = "".join(
-        "<tr>" + "".join(f"<td{k}>{escape(value_text(c))}</td>" for k, c in zip(kinds, row, strict=True)) + "</tr>"
-        for row in table.rows
+        "<tr>" + "".join(_cell(cell, r) for cell, r in zip(row, right, strict=True)) + "</tr>" for row in table.rows
     )
     note = f'<p class="note">{_text(table.note)}</p>' if table.note else ""
     body = f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>"
-    return f'<div class="table">{title}<div class="scroll">{body}</div>{note}</div>'
+    return f'<div class="table">{title}<div class="scroll" tabindex="0">{body}</div>{note}</div>'
+
+
+def _cell(cell: Cell, right: bool) -> str:
+    text = value_text(cell)
+    kind = "n" if right else "s" if len(text) <= _ONE_LINE else "t"
+    return f"<td class={kind}>{escape(text)}</td>"
 
 
 def _provenance(report: Report) -> str:
