@@ -1,6 +1,8 @@
 """A report as one HTML file that needs no network: plots that zoom together, numbers, and what was run."""
 
+import re
 from collections.abc import Sequence
+from dataclasses import replace
 from html import escape
 from pathlib import Path
 
@@ -13,6 +15,8 @@ from hil.report.units import symbol
 from hil.report.words import clean, number_text, outline, value_text
 
 _ONE_LINE = 20  # letters of a cell that are never broken: numbers with unit or interval, names
+_TABLES_OPEN = 4  # of a section; more are folded
+_PAIR = re.compile(r"\d (?:(?:to|±|/|of) (?=[-+]?\d)|(?=%))")  # stays on one line: 0.2 to 0.3, 5 ± 1, 1 / 596, 18 %
 _VERDICT_MARKS = {"passed": "✓", "failed": "✗", "inconclusive": "?", "incomplete": "!", "broken": "✗"}
 
 
@@ -44,7 +48,7 @@ def _header(report: Report) -> str:
     verdict = ""
     if report.verdict is not None:
         verdict = f'<span class="badge {report.verdict}">{_VERDICT_MARKS[report.verdict]} {report.verdict}</span>'
-    reason = f"<p>{verdict} {_text(report.reason)}</p>" if verdict or report.reason else ""
+    reason = f"<p>{verdict} {_prose(report.reason)}</p>" if verdict or report.reason else ""
     cards = "".join(_card(number) for number in report.numbers)
     return f'<header><h1>{_text(report.title)}</h1>{reason}</header>\n<dl class="cards">{cards}</dl>'
 
@@ -54,7 +58,7 @@ def _card(number: Number) -> str:
     state = "" if number.met is None else " met" if number.met else " missed"
     mark = "" if number.met is None else "✓ " if number.met else "✗ "
     limit = f'<dd class="limit">{mark}{_text(number.limit)} {unit}</dd>' if number.limit or mark else ""
-    note = f'<dd class="note">{_text(number.note)}</dd>' if number.note else ""
+    note = f'<dd class="note">{_prose(number.note)}</dd>' if number.note else ""
     state += " long" if len(value) > 12 else ""
     shown = f'<dd class="value">{value} <small>{unit}</small></dd>'
     return f'<div class="card{state}"><dt>{_text(number.label)}</dt>{shown}{limit}{note}</div>'
@@ -63,7 +67,7 @@ def _card(number: Number) -> str:
 def _section(section: Section, pool: Pool) -> str:
     parts = [f"<section><h2>{_text(section.title)}</h2>"]
     if section.text:
-        parts.append(f"<p>{_text(section.text)}</p>")
+        parts.append(f"<p>{_prose(section.text)}</p>")
     span = section.time_range_s()
     if span is not None:
         start, end = span if span[1] > span[0] else (span[0] - 0.5, span[1] + 0.5)
@@ -76,7 +80,8 @@ def _section(section: Section, pool: Pool) -> str:
     if section.charts:
         charts = "".join(_chart(chart, pool) for chart in section.charts)
         parts.append(f'<div class="charts">{charts}</div>')
-    parts += [_table(table) for table in section.tables]
+    folded = len(section.tables) > _TABLES_OPEN
+    parts += [_folded(table) if folded else _table(table) for table in section.tables]
     return "\n".join([*parts, "</section>"])
 
 
@@ -156,6 +161,11 @@ def _chip(trace: Trace | Curve, stroke: Stroke) -> str:
     )
 
 
+def _folded(table: Table) -> str:
+    head = f"<summary>{_text(table.title)} ({len(table.rows)} rows)</summary>"
+    return f"<details>{head}{_table(replace(table, title=''))}</details>"
+
+
 def _table(table: Table) -> str:
     title = f"<h3>{_text(table.title)}</h3>" if table.title else ""
     right = [
@@ -174,7 +184,15 @@ def _table(table: Table) -> str:
 def _cell(cell: Cell, right: bool) -> str:
     text = value_text(cell)
     kind = "n" if right else "s" if len(text) <= _ONE_LINE else "t"
-    return f"<td class={kind}>{escape(text)}</td>"
+    return f"<td class={kind}>{_PAIR.sub(_together, escape(text))}</td>"
+
+
+def _prose(text: str) -> str:
+    return _PAIR.sub(_together, _text(text))
+
+
+def _together(pair: re.Match[str]) -> str:
+    return pair[0].replace(" ", "\u00a0")
 
 
 def _provenance(report: Report) -> str:
