@@ -18,7 +18,7 @@ from hil.report.units import BAR, DEG_C, KJ, KMH, PERCENT
 WHEELS = ("FL", "FR", "RL", "RR")
 _AXLE = {"FL": "FRONT", "FR": "FRONT", "RL": "REAR", "RR": "REAR"}
 FROM_S = -1.0  # nothing of the wait for the controller is shown but its last second
-_BORNE = f"inconclusive beyond {MOST_MISSED:.0%} of a node's frames"
+_BORNE = f"inconclusive beyond {100.0 * MOST_MISSED:g} % of a node's frames"
 _MODE_SEVERITY: dict[int, Severity] = {0: "info", 1: "ok", 2: "warning", 3: "error", 4: "error"}
 
 
@@ -46,7 +46,7 @@ def _numbers(result: RunResult) -> tuple[Number, ...]:
         Number("Energy recuperated", result.energy_recuperated_j, KJ),
         Number("Frames on the vehicle bus", result.frames_sent, ""),
         Number("Frames lost", result.frames_lost, "", _BORNE),
-        Number("Frames corrupt", result.frames_corrupt, "", _BORNE),
+        Number("Frames corrupt", result.frames_corrupt, "", "likewise"),
         Number("Link events", ", ".join(f"{name} {count}" for name, count in result.link_states.items()) or "none"),
         Number("Bus load", result.bus_load, PERCENT, "with worst-case stuff bits"),
         Number("Overruns", result.overruns, "", "ticks skipped by ECU and plant"),

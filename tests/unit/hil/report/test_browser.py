@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 from hil.report.html import render_html
-from hil.report.report import Chart, Curve, Event, Lane, Panel, Report, Section, Span, Trace
+from hil.report.report import Chart, Curve, Event, Lane, Panel, Report, Section, Span, Table, Trace
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 FLAGS = [
@@ -21,6 +22,7 @@ FLAGS = [
     "--disable-gpu",
     "--disable-quic",
     "--no-first-run",
+    "--hide-scrollbars",
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
@@ -218,6 +220,29 @@ def test_the_paper_follows_the_reader_while_open(full_report: Report, tmp_path: 
     outcome = run_in_browser(full_report, script, tmp_path, "--blink-settings=preferredColorScheme=0")
     assert outcome["open"] == outcome["again"] == {"bright": True, "dark": False, "paper": "rgb(18, 22, 27)"}
     assert outcome["printed"] == light | {"wide": 700}
+
+
+@pytest.mark.parametrize("width", [420, 1400])
+def test_no_number_is_broken_and_nothing_lies_beside_the_page(width: int, full_report: Report, tmp_path: Path) -> None:
+    wide = Table(
+        "Wide",
+        ("claim", "found (95 %)", "unit", *(f"number {k}" for k in range(12))),
+        (("a claim in many words that may well take two lines or more", "0.001 / 596", "m/s²", *[-0.8125e-3] * 12),)
+        * 2,
+    )
+    report = replace(full_report, sections=(*full_report.sections, Section("Tables", tables=(wide,))))
+    script = """
+      const lines = (cell) => {
+        const range = document.createRange();
+        range.selectNodeContents(cell);
+        return new Set([...range.getClientRects()].map((box) => Math.round(box.top))).size;
+      };
+      const broken = [...document.querySelectorAll("td.n, td.s")].filter((cell) => lines(cell) > 1);
+      done({ broken: broken.map((cell) => cell.textContent), page: document.documentElement.scrollWidth,
+             window: innerWidth, plots: plots.map((plot) => plot.u.width <= innerWidth) });
+    """
+    outcome = run_in_browser(report, script, tmp_path, f"--window-size={width},900")
+    assert outcome == {"broken": [], "page": width, "window": width, "plots": [True] * 4}
 
 
 def test_odd_values_are_drawn(tmp_path: Path) -> None:
