@@ -222,7 +222,7 @@ def test_the_paper_follows_the_reader_while_open(full_report: Report, tmp_path: 
     assert outcome["printed"] == light | {"wide": 700}
 
 
-@pytest.mark.parametrize("width", [420, 1400])
+@pytest.mark.parametrize("width", [500, 1400])  # no window of Chromium is narrower than 500 px
 def test_no_number_is_broken_and_nothing_lies_beside_the_page(width: int, full_report: Report, tmp_path: Path) -> None:
     wide = Table(
         "Wide",
