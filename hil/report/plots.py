@@ -17,7 +17,7 @@ from hil.report.words import clean
 Figure = dict[str, Any]
 _Y_DIGITS, _T_DECIMALS = 6, 6
 _LEVEL = 6  # of deflate: 9 takes four times as long for two percent
-_NAMES_PX = (24, 60, 460)  # CSS px: for each name at an axis, least and most of a plot with such an axis
+_NAME_PX, _TIGHT_PX, _MANY = 24, 16, 20  # CSS px for each name at an axis, and for each of more than twenty
 
 
 class Pool:
@@ -81,8 +81,7 @@ def panel_figure(panel: Panel, span_s: tuple[float, float], pool: Pool) -> Figur
 
 def height_px(names: int) -> int:
     """Return the height of a plot with ``names`` at its value axis, CSS px."""
-    each, least, most = _NAMES_PX
-    return max(least, min(most, each * names)) + 30
+    return max(60, (_NAME_PX if names <= _MANY else _TIGHT_PX) * names) + 30
 
 
 def _decimals(courses: list[NDArray[np.float64]]) -> int | None:

@@ -53,6 +53,7 @@ def test_a_page_has_units_names_and_gaps(log, tmp_path, capsys):
     page = out.read_text()
     assert "2023-11-14 22:13:20.000 UTC" in page
     assert "off <b>" not in page
+    assert "<td>brakebench " in page  # the command that draws it again
     assert "<h3>M <small>km/h</small></h3>" in page
     speeds, states, bits = figures_of(page)
     assert [trace["name"] for trace in speeds["traces"]] == ["S", "R"]
@@ -100,7 +101,7 @@ def test_many_values_are_thinned_and_the_peak_stays():
     y = rng.normal(size=500_000)
     y[123_456], y[400_000] = 50.0, -60.0
     course = Course("M.S", np.arange(500_000) / 100, y)
-    page = courses_page([Courses((course,), "bar")], "a.log", "1 signal")
+    page = courses_page([Courses((course,), "bar")], "a.log", "1 signal", {})
     trace = figures_of(page)[0]["traces"][0]
     assert len(trace["y"]) <= 20_000
     assert len(page) < 500_000
