@@ -4,7 +4,6 @@ Tables and what was run are left to the page. The picture is drawn with matplotl
 """
 
 import math
-import textwrap
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -12,25 +11,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hil.report.figure_head import EDGE_IN, SOFT, WIDTH_IN, head_height, write, write_head
 from hil.report.palette import INK, SEVERITY_COLOURS, Stroke, strokes
-from hil.report.report import Chart, Curve, Event, Floats, Lane, Number, Panel, Report, Section, Span
+from hil.report.report import Chart, Curve, Event, Floats, Lane, Panel, Report, Section, Span
 from hil.report.units import Unit, shown, symbol
-from hil.report.words import clean, number_text
+from hil.report.words import clean
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.text import Text
 
-WIDTH_IN = 11.0
-_EDGE, _LEFT, _GAP = 0.3, 0.55, 0.35  # in: page edge, room for tick labels, between columns
+_LEFT, _GAP = 0.55, 0.35  # in: room for tick labels, between columns
 _PLOT, _CHART, _LANE, _LINE = 1.25, 2.3, 0.34, 0.19  # in: heights of a plot, a chart, a lane, a line of text
-_SOFT, _RULE, _GRID = "#57636F", "#C9D1D9", "#E8ECF0"
-_VERDICT_COLOURS = {
-    "passed": "#1D7A4F", "failed": "#B3261E", "inconclusive": "#9A6700", "incomplete": "#9A6700", "broken": "#B3261E",
-}  # fmt: skip
-_COLUMNS, _BETWEEN = 6, 0.15  # of the numbers, each of which takes one to three; in between them
-_LABEL_PT, _VALUE_PT, _TITLE_PT, _REASON_PT = 7.5, 10.5, 15.0, 10.0
+_RULE, _GRID = "#C9D1D9", "#E8ECF0"
 _ROW, _LETTER, _MOST_LETTERS = 0.16, 0.062, 36  # in: height of a named row, width of a letter of its name
 _DOT = 5.0  # points: marker of a named row
 _LETTERS = 84  # of 7 points that the narrowest timeline holds
@@ -74,25 +67,25 @@ def draw(report: Report) -> "Figure":
 
     blocks = [(section, _cells(section)) for section in report.sections]
     columns = 2 if max((len(cells) for _, cells in blocks), default=0) > 3 else 1
-    inner = WIDTH_IN - 2 * _EDGE
+    inner = WIDTH_IN - 2 * EDGE_IN
     width = (inner - (columns - 1) * _GAP) / columns - _LEFT
     grids = [[cells[i : i + columns] for i in range(0, len(cells), columns)] for _, cells in blocks]
-    height = 2 * _EDGE + _head_height(report)
+    height = 2 * EDGE_IN + head_height(report)
     height += sum(0.5 + sum(_row_height(row, width) for row in grid) for grid in grids if grid)
 
     figure = Figure(figsize=(WIDTH_IN, height))
     FigureCanvasAgg(figure)
-    top = _header(figure, report, height)
+    top = write_head(figure, report, height)
     for (section, _), grid in zip(blocks, grids, strict=True):
         if not grid:
             continue
         top -= 0.28
-        _write(figure, _EDGE, top, clean(section.title), size=12, weight="bold")
+        write(figure, EDGE_IN, top, clean(section.title), size=12, weight="bold")
         top -= 0.22
         for row in grid:
             head, tall = max(cell.head(width) for cell in row), max(cell.height for cell in row)
             for column, cell in enumerate(row):
-                left = _EDGE + _LEFT + column * (width + _LEFT + _GAP) + cell.beside
+                left = EDGE_IN + _LEFT + column * (width + _LEFT + _GAP) + cell.beside
                 bottom, wide = top - head - tall, width - cell.beside
                 axes = figure.add_axes((left / WIDTH_IN, bottom / height, wide / WIDTH_IN, tall / height))
                 _prepare(axes)
@@ -104,94 +97,6 @@ def draw(report: Report) -> "Figure":
 
 def _row_height(row: Sequence[_Cell], width: float) -> float:
     return max(cell.head(width) for cell in row) + max(cell.height for cell in row) + 0.42
-
-
-def _header(figure: "Figure", report: Report, height: float) -> float:
-    """Write title, verdict and numbers; return the height left, in."""
-    top = height - _EDGE
-    for line in _lines(report.title, _TITLE_PT, 0.0):
-        _write(figure, _EDGE, top - 0.14, line, size=_TITLE_PT, weight="bold")
-        top -= 0.31
-    left = _badge_width(report)
-    if report.verdict is not None:
-        badge = _write(figure, _EDGE + 0.06, top - 0.14, report.verdict.value, size=9.5, weight="bold", colour="white")
-        badge.set_bbox({"boxstyle": "round,pad=0.35", "facecolor": _VERDICT_COLOURS[report.verdict], "linewidth": 0})
-    for line in _lines(report.reason, _REASON_PT, left):
-        _write(figure, _EDGE + left, top - 0.14, line, size=_REASON_PT)
-        top -= 0.2
-    top -= 0.11
-    for number, (row, column, columns) in zip(report.numbers, _places(report.numbers), strict=True):
-        _number(figure, number, _EDGE + column * _COLUMN_IN, top - 0.5 * row, columns * _COLUMN_IN - _BETWEEN)
-    return height - _EDGE - _head_height(report)
-
-
-def _head_height(report: Report) -> float:
-    """Return the height of title, verdict and numbers, in."""
-    lines = _lines(report.reason, _REASON_PT, _badge_width(report))
-    rows = 1 + max((row for row, _, _ in _places(report.numbers)), default=-1)
-    return 0.31 * len(_lines(report.title, _TITLE_PT, 0.0)) + 0.2 * len(lines) + 0.11 + 0.5 * rows
-
-
-def _badge_width(report: Report) -> float:
-    return 0.0 if report.verdict is None else 0.085 * len(report.verdict.value) + 0.25
-
-
-_COLUMN_IN = (WIDTH_IN - 2 * _EDGE) / _COLUMNS
-
-
-def _places(numbers: Sequence[Number]) -> list[tuple[int, int, int]]:
-    """Return row, column and columns of each number: as many as its texts need."""
-    places, row, column = [], 0, 0
-    for number in numbers:
-        needed = max(_wide(clean(number.label), _LABEL_PT), _wide(_value(number), _VALUE_PT)) + _BETWEEN
-        columns = max(1, min(3, math.ceil(needed / _COLUMN_IN)))
-        if column + columns > _COLUMNS:
-            row, column = row + 1, 0
-        places.append((row, column, columns))
-        column += columns
-    return places
-
-
-def _value(number: Number) -> str:
-    limit = f"  ({clean(number.limit)})" if number.limit else ""
-    return " ".join(filter(None, number_text(number))) + limit
-
-
-def _number(figure: "Figure", number: Number, left: float, top: float, room: float) -> None:
-    colour = {None: INK, True: _VERDICT_COLOURS["passed"], False: _VERDICT_COLOURS["failed"]}[number.met]
-    _write(figure, left, top - 0.14, _cut_to(clean(number.label), _LABEL_PT, room), size=_LABEL_PT, colour=_SOFT)
-    value = _value(number)
-    size = _VALUE_PT if _wide(value, _VALUE_PT) <= room else 8.0
-    _write(figure, left, top - 0.34, _cut_to(value, size, room), size=size, colour=colour)
-
-
-def _wide(text: str, points: float) -> float:
-    """Return about how wide ``text`` becomes in DejaVu Sans, in."""
-    ems = sum(0.33 if c in " .,:;|il'" else 0.70 if c.isupper() else 0.62 if ord(c) < 0x2E80 else 1.0 for c in text)
-    return ems * points / 72.0
-
-
-def _cut_to(text: str, points: float, room: float) -> str:
-    if _wide(text, points) <= room:
-        return text
-    while text and _wide(text + "…", points) > room:
-        text = text[:-1]
-    return text + "…"
-
-
-def _lines(text: str, points: float, left: float) -> list[str]:
-    """Return ``text`` in lines that fit the picture ``left`` of whose edge something stands; one at least."""
-    letters = int((WIDTH_IN - 2 * _EDGE - left) / _wide("n", points))
-    return textwrap.wrap(clean(text), letters, break_on_hyphens=False) or [""]
-
-
-def _write(
-    figure: "Figure", x: float, y: float, text: str, size: float, colour: str = INK, weight: str = "normal"
-) -> "Text":
-    """Write ``text`` at (x, y) inches from the lower left, vertically centred."""
-    width, height = figure.get_size_inches()
-    place = x / width, y / height
-    return figure.text(*place, text, fontsize=size, color=colour, weight=weight, va="center", parse_math=False)
 
 
 def _cut(text: str, most: int) -> str:
@@ -229,7 +134,7 @@ def _prepare(axes: "Axes") -> None:
     axes.grid(True, color=_GRID, linewidth=0.8)
     axes.set_axisbelow(True)
     axes.locator_params(axis="y", nbins=5)
-    axes.tick_params(labelsize=7.5, colors=_SOFT, length=3, width=0.8)
+    axes.tick_params(labelsize=7.5, colors=SOFT, length=3, width=0.8)
     for name, spine in axes.spines.items():
         spine.set_visible(name in {"left", "bottom"})
         spine.set_color(_RULE)
@@ -288,7 +193,7 @@ def _panel_filler(panel: Panel, timeline: Sequence[Lane], span: tuple[float, flo
                 label.set_parse_math(False)
         for t_s, colour in _marks(timeline):
             axes.axvline(t_s, color=colour, linewidth=0.8, alpha=0.55, zorder=0.5)
-        axes.set_xlabel("Time in s", fontsize=7.5, color=_SOFT, labelpad=1)
+        axes.set_xlabel("Time in s", fontsize=7.5, color=SOFT, labelpad=1)
 
     return fill
 
@@ -313,7 +218,7 @@ def _stroke(axes: "Axes", x: Floats, y: Floats, stroke: Stroke, size: float = 3.
 
 def _fill_timeline(axes: "Axes", rows: Sequence[Lane], span: tuple[float, float]) -> None:
     for place, row in enumerate(rows):
-        axes.text(span[0], place - 0.43, clean(row.name), fontsize=7, color=_SOFT, va="center", parse_math=False)
+        axes.text(span[0], place - 0.43, clean(row.name), fontsize=7, color=SOFT, va="center", parse_math=False)
         for part in row.spans:
             _draw_span(axes, part, place, span)
         _draw_events(axes, row.events, place, span)
@@ -322,7 +227,7 @@ def _fill_timeline(axes: "Axes", rows: Sequence[Lane], span: tuple[float, float]
     axes.set_ylim(len(rows) - 0.5, -0.62)
     axes.set_yticks([])
     axes.spines["left"].set_visible(False)
-    axes.set_xlabel("Time in s", fontsize=7.5, color=_SOFT, labelpad=1)
+    axes.set_xlabel("Time in s", fontsize=7.5, color=SOFT, labelpad=1)
 
 
 def _draw_events(axes: "Axes", events: Sequence[Event], row: int, span: tuple[float, float]) -> None:
@@ -356,8 +261,8 @@ def _chart_filler(chart: Chart) -> Callable[["Axes"], None]:
             _stroke(axes, shown(curve.x, chart.x_unit), shown(curve.y, chart.y_unit), stroke)
         for curve, stroke in zip(chart.curves, drawn, strict=True):  # after the lines, which the legend counts
             _interval(axes, chart, curve, stroke)
-        axes.set_xlabel(_titled(chart.x_label, chart.x_unit), fontsize=7.5, color=_SOFT, labelpad=1, parse_math=False)
-        axes.set_ylabel(_titled(chart.y_label, chart.y_unit), fontsize=7.5, color=_SOFT, labelpad=2, parse_math=False)
+        axes.set_xlabel(_titled(chart.x_label, chart.x_unit), fontsize=7.5, color=SOFT, labelpad=1, parse_math=False)
+        axes.set_ylabel(_titled(chart.y_label, chart.y_unit), fontsize=7.5, color=SOFT, labelpad=2, parse_math=False)
 
     return fill
 
@@ -374,7 +279,7 @@ def _row_filler(chart: Chart) -> Callable[["Axes"], None]:
         for label in axes.get_yticklabels():
             label.set_parse_math(False)
         axes.set_ylim(len(chart.rows) + 0.6, 0.4)
-        axes.set_xlabel(_titled(chart.y_label, chart.y_unit), fontsize=7.5, color=_SOFT, labelpad=1, parse_math=False)
+        axes.set_xlabel(_titled(chart.y_label, chart.y_unit), fontsize=7.5, color=SOFT, labelpad=1, parse_math=False)
 
     return fill
 

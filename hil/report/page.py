@@ -43,7 +43,7 @@ def style() -> str:
 @cache
 def scripts() -> tuple[str, str]:
     """Return uPlot with its licence, and the page's own script."""
-    own = [_text(_HERE / "client" / name) for name in ("plot.js", "page.js")]
+    own = [_text(_HERE / "client" / name) for name in ("draw.js", "plot.js", "page.js")]
     return f"/*\n{_text(_UPLOT / 'LICENSE')}*/\n{_text(_UPLOT / 'uPlot.iife.min.js')}", "\n".join(own)
 
 

@@ -1,5 +1,5 @@
 "use strict";
-// One plot: uPlot has canvas, axes, scales and the selection; lines, points and intervals are drawn by `draw`.
+// One plot: uPlot has canvas, axes, scales and the selection; lines, points and intervals are draw.js's.
 
 const INK = "#1B2733"; // drawn in the paper's ink
 const DOT = 2.7; // CSS px, radius of a point
@@ -246,7 +246,7 @@ class Plot {
 
   draw() {
     const { ctx, bbox } = this.u, ratio = uPlot.pxRatio;
-    const [X, Y] = this.places(true);
+    const [X, Y] = this.places(true), seen = this.timed ? this.x : null;
     ctx.save();
     ctx.beginPath();
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
@@ -257,94 +257,19 @@ class Plot {
       ctx.lineJoin = "round";
       ctx.lineWidth = 1.2 * ratio;
       ctx.setLineDash([]);
-      if (trace.low) (trace.points ? this.bars : this.band)(ctx, trace, X, Y, this.rows, ratio);
+      if (trace.low) (trace.points ? drawBars : drawBand)(ctx, trace, X, Y, this.rows, ratio);
       if (trace.points) {
         ctx.globalAlpha = 0.75;
-        this.dots(ctx, trace, X, Y, DOT * ratio, () => true);
+        drawDots(ctx, trace, X, Y, seen, DOT * ratio, () => true);
       } else {
         ctx.lineWidth = trace.width * ratio;
         ctx.setLineDash((trace.dash ?? []).map((length) => length * ratio));
-        this.line(ctx, trace, X, Y);
+        drawLine(ctx, trace, X, Y, seen);
         const { y } = trace; // no line shows a sample between two gaps
-        this.dots(ctx, trace, X, Y, 1.3 * ratio, (i) => !(y[i - 1] === y[i - 1]) && !(y[i + 1] === y[i + 1]));
+        drawDots(ctx, trace, X, Y, seen, 1.3 * ratio, (i) => !(y[i - 1] === y[i - 1]) && !(y[i + 1] === y[i + 1]));
       }
       ctx.globalAlpha = 1;
     }
     ctx.restore();
-  }
-
-  // Samples to draw: all of a curve, what is seen and one more on both sides of a course.
-  part({ x }) {
-    if (!this.timed || !x.length) return [0, x.length];
-    return [Math.max(0, latest(x, this.x[0]) - 1), Math.min(x.length, latest(x, this.x[1]) + 3)];
-  }
-
-  // A line; of many samples in one column of pixels it draws least, greatest and last.
-  line(ctx, trace, X, Y) {
-    const { x, y, steps } = trace, [begin, end] = this.part(trace);
-    let drawn = false, column = NaN, low = 0, high = 0, last = 0, count = 0;
-    const flush = () => {
-      if (count > 1) for (const v of [low, high, last]) ctx.lineTo(column + 0.5, v);
-      count = 0;
-    };
-    ctx.beginPath();
-    for (let i = begin; i < end; i++) {
-      const px = X(x[i]), py = Y(y[i]);
-      if (Number.isNaN(py) || Number.isNaN(px)) { flush(); drawn = false; continue; }
-      if (drawn && this.timed && Math.floor(px) === column) {
-        low = Math.min(low, py); high = Math.max(high, py); last = py; count++;
-        continue;
-      }
-      flush();
-      if (!drawn) ctx.moveTo(px, py);
-      else if (steps) ctx.lineTo(px, last);
-      if (drawn) ctx.lineTo(px, py);
-      drawn = true; column = Math.floor(px); low = high = last = py; count = 1;
-    }
-    flush();
-    ctx.stroke();
-  }
-
-  dots(ctx, trace, X, Y, radius, chosen) {
-    const { x, y } = trace, [begin, end] = this.part(trace);
-    ctx.beginPath();
-    for (let i = begin; i < end; i++) {
-      const px = X(x[i]), py = Y(y[i]);
-      if (Number.isNaN(px) || Number.isNaN(py) || !chosen(i)) continue;
-      ctx.moveTo(px + radius, py);
-      ctx.arc(px, py, radius, 0, 2 * Math.PI);
-    }
-    ctx.fill();
-  }
-
-  bars(ctx, { x, y, low, high }, X, Y, rows, ratio) {
-    const end = 3 * ratio;
-    ctx.beginPath();
-    for (let i = 0; i < x.length; i++) {
-      const [px, py] = [X(x[i]), Y(y[i])], [a, b] = [low[i], high[i]].map(rows ? X : Y);
-      if ([px, py, a, b].some(Number.isNaN)) continue;
-      const at = rows ? (along, across) => [along, py + across] : (along, across) => [px + across, along];
-      for (const [from, to] of [[at(a, 0), at(b, 0)], [at(a, -end), at(a, end)], [at(b, -end), at(b, end)]]) {
-        ctx.moveTo(...from);
-        ctx.lineTo(...to);
-      }
-    }
-    ctx.stroke();
-  }
-
-  band(ctx, { x, low, high }, X, Y) {
-    ctx.globalAlpha = 0.18;
-    const bad = (i) => Number.isNaN(low[i]) || Number.isNaN(high[i]) || Number.isNaN(x[i]);
-    for (let begin = 0; begin < x.length; begin++) {
-      if (bad(begin)) continue;
-      let end = begin;
-      while (end < x.length && !bad(end)) end++;
-      ctx.beginPath();
-      for (let i = begin; i < end; i++) ctx.lineTo(X(x[i]), Y(low[i]));
-      for (let i = end - 1; i >= begin; i--) ctx.lineTo(X(x[i]), Y(high[i]));
-      ctx.fill();
-      begin = end;
-    }
-    ctx.globalAlpha = 1;
   }
 }

@@ -222,6 +222,36 @@ def test_the_paper_follows_the_reader_while_open(full_report: Report, tmp_path: 
     assert outcome["printed"] == light | {"wide": 700}
 
 
+def test_a_gap_is_no_line_a_step_holds_and_a_lonely_sample_is_a_dot(tmp_path: Path) -> None:
+    t_s = np.arange(5.0)
+    gap = Trace("gap", t_s, np.array([1.0, 1.0, np.nan, 1.0, 1.0]))
+    lonely = Trace("lonely", t_s, np.array([np.nan, 1.0, np.nan, 1.0, 1.0]))
+    steps = Trace("steps", np.array([0.0, 4.0]), np.array([0.0, 1.0]), "steps")
+    line = Trace("line", np.array([0.0, 4.0]), np.array([0.0, 1.0]))
+    panels = tuple(Panel(trace.name, "", (trace,)) for trace in (gap, lonely, steps, line))
+    script = """
+      const drawn = (k, t, y) => {
+        const { u } = plots[k];
+        const at = [u.valToPos(t, "x", true), u.valToPos(y, "y", true)].map(Math.round);
+        const { data } = u.ctx.getImageData(at[0] - 1, at[1] - 2, 3, 5);
+        return Array.from({ length: 15 }, (_, i) => data.slice(4 * i, 4 * i + 3)).some((c) => c[2] > c[0] + 60);
+      };
+      done({
+        gap: [drawn(0, 0.5, 1), drawn(0, 1.5, 1), drawn(0, 2.5, 1), drawn(0, 3.5, 1)],
+        lonely: [drawn(1, 0.5, 1), drawn(1, 1, 1), drawn(1, 1.5, 1), drawn(1, 3.5, 1)],
+        steps: [drawn(2, 2, 0), drawn(2, 2, 0.5)],
+        line: [drawn(3, 2, 0), drawn(3, 2, 0.5)],
+      });
+    """
+    outcome = run_in_browser(Report("r", sections=(Section("s", panels),)), script, tmp_path)
+    assert outcome == {
+        "gap": [True, False, False, True],
+        "lonely": [False, True, False, True],
+        "steps": [True, False],
+        "line": [False, True],
+    }
+
+
 @pytest.mark.parametrize("width", [500, 1400])  # no window of Chromium is narrower than 500 px
 def test_no_number_is_broken_and_nothing_lies_beside_the_page(width: int, full_report: Report, tmp_path: Path) -> None:
     wide = Table(
