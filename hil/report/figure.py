@@ -26,7 +26,7 @@ _PLOT, _CHART, _LANE, _LINE = 1.25, 2.3, 0.34, 0.19  # in: heights of a plot, a 
 _RULE, _GRID = "#C9D1D9", "#E8ECF0"
 _ROW, _LETTER, _MOST_LETTERS = 0.16, 0.062, 36  # in: height of a named row, width of a letter of its name
 _DOT = 5.0  # points: marker of a named row
-_LETTERS = 84  # of 7 points that the narrowest timeline holds
+_LETTERS = 74  # of 7 points that the narrowest timeline holds
 
 
 def write_figure(report: Report, path: Path, dpi: int = 130) -> None:

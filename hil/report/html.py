@@ -153,7 +153,7 @@ def _plot(head: str, traces: Sequence[Trace | Curve], pool: Pool, kind: str, nam
 def _chip(trace: Trace | Curve, stroke: Stroke) -> str:
     dash = f' stroke-dasharray="{" ".join(f"{d:g}" for d in stroke.dash)}"' if stroke.dash else ""
     colour = "currentColor" if stroke.colour == INK else stroke.colour
-    line = f'<line x1="0" y1="5" x2="20" y2="5" stroke="{colour}" stroke-width="2.4"{dash}/>'
+    line = f'<line x1="0" y1="5" x2="20" y2="5" stroke="{colour}" stroke-width="{stroke.width + 0.8:g}"{dash}/>'
     sample = f'<circle cx="10" cy="5" r="3.5" fill="{colour}"/>' if stroke.points else line
     return (
         f'<button class="chip" aria-pressed="true" title="Show or hide">'

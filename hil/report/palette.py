@@ -7,6 +7,7 @@ from hil.report.report import Curve, Severity, Style, Trace
 
 WHEEL_COLOURS = {"fl": "#0072B2", "fr": "#D55E00", "rl": "#009E73", "rr": "#AA4499"}
 NEUTRAL = "#6E7781"
+PALE = "#A8B3BE"
 INK = "#1B2733"  # the page shows it as its ink, light on dark paper
 SERIES = ("#0072B2", "#D55E00", "#009E73", "#AA4499", "#B8860B", "#56A0D3", "#7A5C3E", "#C2577A")
 SEVERITY_COLOURS: dict[Severity, str] = {"info": "#6E7781", "ok": "#2F7FB8", "warning": "#C98A00", "error": "#C0392B"}
@@ -30,7 +31,7 @@ class Stroke:
 def strokes(traces: Sequence[Trace | Curve]) -> list[Stroke]:
     """Give every trace of a panel its stroke: demands neutral dashes, wheels their own colour, a group one colour.
 
-    Beside wheels, what belongs to the whole car is drawn in ink.
+    What was measured is broad and pale. Beside wheels, what belongs to the whole car is drawn in ink.
     """
     colours = dict(WHEEL_COLOURS)
     wheels = {WHEEL_COLOURS[t.group] for t in traces if t.group in WHEEL_COLOURS}
@@ -41,6 +42,9 @@ def strokes(traces: Sequence[Trace | Curve]) -> list[Stroke]:
         if trace.style == "demand":
             result.append(Stroke(NEUTRAL, 1.4, _DEMAND_DASHES[demands % len(_DEMAND_DASHES)]))
             demands += 1
+            continue
+        if trace.style == "measured":
+            result.append(Stroke(PALE, 4.5))
             continue
         key = trace.group or f"#{index}"
         if key not in colours:

@@ -31,7 +31,7 @@ from hil.errors import Verdict as Verdict
 from hil.report.units import Unit
 
 Floats = NDArray[np.float64]
-Style = Literal["line", "demand", "estimate", "points", "steps"]
+Style = Literal["line", "demand", "estimate", "points", "steps", "measured"]
 Severity = Literal["info", "ok", "warning", "error"]
 Cell = str | float | int | bool | None
 
@@ -68,7 +68,8 @@ class Trace:
     t_s : (n,) times that do not decrease, s.
     y : (n,) values in the panel's unit; NaN leaves a gap.
     style : ``line``; ``demand`` (dashed, neutral: demands, references); ``estimate`` (dotted, in the group's colour);
-        ``points``; ``steps`` (a value holds until the next).
+        ``points``; ``steps`` (a value holds until the next); ``measured`` (broad and pale: give it first, so that
+        what is to agree with it lies on it).
     group : traces of a group share a colour; the four wheel names have fixed ones.
     """
 

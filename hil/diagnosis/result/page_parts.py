@@ -27,7 +27,7 @@ def comparison_panels(
     traces = [Trace(name, t_s, values, group=groups[name]) for name, values in models.items()]
     residuals = [Trace(name, t_s, measured - values, group=groups[name]) for name, values in models.items()]
     return [
-        Panel(title, unit, (Trace("measured", t_s, measured, "demand"), *traces)),  # below what is to agree with it
+        Panel(title, unit, (Trace("measured", t_s, measured, "measured"), *traces)),
         Panel(f"{title.split(',')[0]}: residual", unit, tuple(residuals)),
     ]
 

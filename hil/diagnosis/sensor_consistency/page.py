@@ -132,7 +132,7 @@ def _details(answer: Consistency) -> list[Section]:
         for stop in sorted(model.stops, key=lambda s: -float(model.pressure[slice(*s)].max()))[:_STOPS_SHOWN]:
             rows = slice(*stop)
             curves = (
-                Curve("measured", motion.t_s[rows], error.measured[rows], style="demand"),
+                Curve("measured", motion.t_s[rows], error.measured[rows], style="measured"),
                 Curve("nominal", motion.t_s[rows], error.nominal[rows], group=NOMINAL),
                 Curve("extended", motion.t_s[rows], error.fitted[rows], group=EXTENDED),
             )

@@ -127,6 +127,13 @@ def test_uplot_is_the_published_one() -> None:
     assert {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in folder.iterdir()} == digests
 
 
+def test_what_was_measured_lies_broad_under_what_agrees_with_it() -> None:
+    t_s = np.array([0.0, 1.0])
+    panel = Panel("p", "", (Trace("measured", t_s, t_s, "measured"), Trace("extended", t_s, t_s, group="fl")))
+    measured, extended = page_of(Report("r", sections=(Section("s", (panel,)),))).figures[0]["traces"]
+    assert measured["width"] > 2 * extended["width"]
+
+
 def test_no_script_ends_within_itself() -> None:
     assert not [text for text in scripts() if re.search("</script|<!--", text, re.IGNORECASE)]
 
