@@ -20,6 +20,7 @@ from hil.cli.log_options import (
     unused,
     words_of,
 )
+from hil.cli.log_pages import add_page, check_page, decode_report, write_page
 from hil.cli.progress import Progress
 from hil.cli.summary_json import summary_values
 from hil.cli.summary_text import summary_lines
@@ -33,7 +34,7 @@ from hil.log.source import ReadOptions
 from hil.log.summary.contents import Contents
 from hil.log.summary.values import Summary
 
-_NOT_WITH = ("out", "messages", "signals", "resample", "names", "bitrate", "dbc", "e2e_legacy")  # --uds
+_NOT_WITH = ("out", "messages", "signals", "resample", "names", "bitrate", "dbc", "e2e_legacy", "page")  # --uds
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -63,6 +64,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--bitrate", metavar="[CHANNEL=]RATE[/DATA]", action="append", default=[], help="bit/s, for the bus load"
     )
+    add_page(parser)
     parser.add_argument("--limit-mb", metavar="N", type=float, help="read at most so much of each log (unpacked)")
     parser.add_argument("--e2e-legacy", action="store_true", help="check by the check value of older recordings")
     _add_uds(parser)
@@ -83,6 +85,7 @@ def run(args: argparse.Namespace) -> int:
     rates = bit_rates(args.bitrate)
     contents = Contents(databases_, wanted, rates, args.e2e_legacy)
     _check_out(args)
+    check_page(args.page, args.force)
     limit = _limit_bytes(args)
     warnings = (*databases_.warnings, *(w for one in databases_.all() for w in one.warnings))
     with (
@@ -105,8 +108,12 @@ def run(args: argparse.Namespace) -> int:
             progress.part(1, "writing")
             blocks = blocks_of(choice.frames(logs.tables(progress)), databases_.decoder(wanted))
             rows = _write(args, blocks, contents, summary, [*files, *(part.path for part in logs.parts)])
+    values = summary_values(logs, contents, summary, warnings) if args.json or args.page else {}
+    if args.page is not None and summary.frames:
+        whole = logs.whole and not contents.counts.rejected
+        read = [*files, *(part.path for part in logs.parts)]
+        write_page(decode_report(values, whole), args.page, args.force, read)
     if args.json:
-        values = summary_values(logs, contents, summary, warnings)
         say([json.dumps(values | {"out": args.out, "rows": rows}, allow_nan=False)])
     else:
         lines = summary_lines(logs, contents, summary, args.timezone, terminal_width(), warnings)

@@ -10,6 +10,7 @@ from typing import Any
 from dbc.database import Signal
 from hil.cli.columns import columns, say, terminal_width, wrapped
 from hil.cli.log_options import LOGS, add_databases, add_timezone, check_found, databases, words_of
+from hil.cli.log_pages import add_page, check_page, diff_courses, diff_report, differing, write_page
 from hil.cli.progress import Progress
 from hil.errors import BrakebenchError
 from hil.log.choice import Choice, matches
@@ -48,13 +49,15 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="of signals whose name matches, in their unit (repeatable; the last one that matches counts)",
     )
     add_timezone(parser)
+    add_page(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Compare and say what differs."""
-    databases_, _ = databases(args.dbc)
+    check_page(args.page, overwrite=False)
+    databases_, files = databases(args.dbc)
     choice = Choice(tuple(args.channel), messages=words_of(args.messages), signals=words_of(args.signals))
     tolerance = _tolerance(args.tolerance, databases_)
     options = ReadOptions(timezone=args.timezone)
@@ -70,6 +73,11 @@ def run(args: argparse.Namespace) -> int:
                 "databases; give the database of these logs with --dbc"
             )
         whole = [first.whole, second.whole]
+        if args.page is not None:
+            courses = diff_courses(found, first, second, databases_, choice, progress)
+            read = [*files, *(part.path for logs in (first, second) for part in logs.parts)]
+            names = str(args.first), str(args.second)
+            write_page(diff_report(found, names, courses, all(whole)), args.page, False, read)
     if args.json:
         say([json.dumps(_values(found, args, whole), allow_nan=False)])
     else:
@@ -102,7 +110,7 @@ def _tolerance(words: list[str], of: Databases) -> Tolerance:
 
 
 def _lines(found: LogDifference, args: argparse.Namespace, whole: list[bool], width: int) -> Iterator[str]:
-    different = sorted((one for one in found.signals if not one.equal), key=lambda one: one.first_s or 0.0)
+    different = differing(found)
     clock = "by their stamps" if found.same_clock else "from the first frame of each on (they do not overlap in time)"
     text = (
         f"A {args.first} and B {args.second}, {clock}: {len(found.signals)} signals of {len(found.messages)} messages "

@@ -77,11 +77,12 @@ def run(args: argparse.Namespace) -> int:
     else:
         report = build_report(answer, sources)
     if args.out is not None:
+        from hil.cli.origin import with_origin
         from hil.report.figure import write_figure
         from hil.report.html import write_html
 
         args.out.mkdir(parents=True, exist_ok=True)
-        write_html(report, args.out / "report.html")
+        write_html(with_origin(report), args.out / "report.html")
         write_figure(report, args.out / "report.png")
         (args.out / "result.json").write_text(json.dumps(answer.json, indent=2), encoding="utf-8")
     if args.json:

@@ -5,10 +5,12 @@ import json
 import os
 import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.cli.columns import columns, say, terminal_width, wrapped
 from hil.cli.options import add_json, add_seed
+from hil.errors import BrakebenchError
 
 if TYPE_CHECKING:
     from hil.validation.fault_campaign.campaign import Campaign
@@ -34,6 +36,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "may be given again"
     )  # fmt: skip
     parser.add_argument("--no-processes", action="store_true", help="leave out the faults of real processes")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="write report.html")
     add_seed(parser)
     add_json(parser)
     parser.set_defaults(run=run)
@@ -51,16 +54,31 @@ def run(args: argparse.Namespace) -> int:
     from hil.validation.fault_campaign.campaign import drive_campaign
     from hil.validation.fault_campaign.processes import drive_processes
 
+    if args.out is not None:
+        try:  # before anything is driven
+            args.out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise BrakebenchError(f"{args.out}: cannot be written ({error.strerror}); give another folder") from error
     with Progress() as progress:
         progress.part(0, "stops with faults")
         campaign = drive_campaign(args.instants, args.seed, os.cpu_count() or 1, progress, args.only)
     if not (args.no_processes or args.only):
         campaign = replace(campaign, processes=drive_processes(args.seed, _tell))
+    if args.out is not None:
+        _write(campaign, args.out)
     if args.json:
         say([json.dumps(campaign.as_json() | {"verdict": "passed" if campaign.passed else "failed"}, indent=2)])
     else:
         say(_lines(campaign, by_target=bool(args.only), width=max(terminal_width(), 100)))
     return 0 if campaign.passed else 1
+
+
+def _write(campaign: "Campaign", out: Path) -> None:
+    from hil.cli.origin import with_origin
+    from hil.report.html import write_html
+    from hil.validation.fault_campaign.page import build_report
+
+    write_html(with_origin(build_report(campaign)), out / "report.html")
 
 
 def _tell(text: str) -> None:

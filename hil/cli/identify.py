@@ -116,6 +116,7 @@ def _coverage(args: argparse.Namespace, brake: "Brake") -> int:
 
 
 def _write(args: argparse.Namespace, study: "Study", parameters: "FrictionBrakeParameters", report: "Report") -> None:
+    from hil.cli.origin import with_origin
     from hil.identify.files import as_json, pad_toml
     from hil.identify.summary import figures
     from hil.report.figure import write_figure
@@ -125,7 +126,7 @@ def _write(args: argparse.Namespace, study: "Study", parameters: "FrictionBrakeP
 
     try:
         args.out.mkdir(parents=True, exist_ok=True)
-        write_html(report, args.out / "report.html")
+        write_html(with_origin(report), args.out / "report.html")
         for name, figure in figures(study).items():
             write_figure(figure, args.out / name)
         (args.out / "result.json").write_text(json.dumps(as_json(study), indent=2, allow_nan=False), encoding="utf-8")

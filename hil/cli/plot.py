@@ -21,6 +21,7 @@ from hil.cli.log_options import (
     paths,
     words_of,
 )
+from hil.cli.origin import origin
 from hil.cli.progress import Progress
 from hil.errors import BrakebenchError
 from hil.log.atomic_write import atomic_write, check_folder
@@ -87,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
     subtitle = _subtitle(gathered, samples, args.timezone)
     with atomic_write(args.out, args.force, read) as temporary:
         if suffix == ".html":
-            temporary.write_text(courses_page(plots, Path(args.log).name, subtitle), encoding="utf-8")
+            temporary.write_text(courses_page(plots, Path(args.log).name, subtitle, origin()), encoding="utf-8")
         else:
             write_picture(plots, Path(args.log).name, subtitle, temporary)
     notes = [f"{args.out}: {len(gathered.signals)} signals, {samples:,} values"]

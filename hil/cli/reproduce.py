@@ -69,6 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write(out: Path, rows: "list[Row]") -> None:
+    from hil.cli.origin import with_origin
     from hil.report.figure import write_figure
     from hil.report.html import write_html
     from hil.validation.reproduce.figures import figures
@@ -77,7 +78,7 @@ def _write(out: Path, rows: "list[Row]") -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
         drawn = figures()
-        write_html(build_report(rows, drawn), out / "report.html")
+        write_html(with_origin(build_report(rows, drawn)), out / "report.html")
         for name, figure in drawn.items():
             write_figure(figure, out / name)
         (out / "result.json").write_text(

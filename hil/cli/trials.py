@@ -19,7 +19,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         description="Draws cases of a family from a car that shares no code with the plant, lets explain look at the "
         "logs alone, opens the sealed answer and scores it. Every finished case is appended to DIR/cases.jsonl; a "
         "second run goes on where the first one ended, and families may run side by side. DIR/table.json has scores "
-        "and misses of all families with this seed, DIR/confusion.png what was named for what was hidden. A case takes "
+        "and misses of all families with this seed, DIR/confusion.png what was named for what was hidden, "
+        "DIR/report.html all of it as a page. A case takes "
         "half a minute to three.",
         epilog="families: null, nothing hidden; single, one effect at signal-to-noise 15, 8, 5 and 3; two and three at "
         "once; onset, one that begins in the middle; unlisted, a law in no list; confounded, straight stops that leave "
@@ -65,7 +66,10 @@ def _positive(text: str) -> int:
 
 def run(args: argparse.Namespace) -> int:
     """Run the trials and print the table."""
+    from hil.cli.origin import with_origin
+    from hil.report.html import write_html
     from hil.validation.blind_trials.confusion import draw
+    from hil.validation.blind_trials.page import build_report
     from hil.validation.blind_trials.run import run_family
     from hil.validation.blind_trials.score import table_of
 
@@ -88,6 +92,8 @@ def run(args: argparse.Namespace) -> int:
         singles |= {(r["index"], r["size"]): r for r in records if r["family"] == "single"}
         _keep(args.out / "table.json", args.seed, scored)
     draw(list(singles.values()), args.out / "confusion.png")
+    table = json.loads((args.out / "table.json").read_text(encoding="utf-8"))
+    write_html(with_origin(build_report(args.seed, table["families"])), args.out / "report.html")
     if args.json:
         print(json.dumps({"seed": args.seed, "families": scored}, indent=2))
     else:

@@ -11,27 +11,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hil.report.figure_head import EDGE_IN, SOFT, WIDTH_IN, head_height, write, write_head
 from hil.report.palette import INK, SEVERITY_COLOURS, Stroke, strokes
-from hil.report.report import Chart, Curve, Event, Floats, Lane, Number, Panel, Report, Section, Span
+from hil.report.report import Chart, Curve, Event, Floats, Lane, Panel, Report, Section, Span
 from hil.report.units import Unit, shown, symbol
-from hil.report.words import clean, number_text
+from hil.report.words import clean
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.text import Text
 
-WIDTH_IN = 11.0
-_EDGE, _LEFT, _GAP = 0.3, 0.55, 0.35  # in: page edge, room for tick labels, between columns
+_LEFT, _GAP = 0.55, 0.35  # in: room for tick labels, between columns
 _PLOT, _CHART, _LANE, _LINE = 1.25, 2.3, 0.34, 0.19  # in: heights of a plot, a chart, a lane, a line of text
-_SOFT, _RULE, _GRID = "#57636F", "#C9D1D9", "#E8ECF0"
-_VERDICT_COLOURS = {
-    "passed": "#1D7A4F", "failed": "#B3261E", "inconclusive": "#9A6700", "incomplete": "#9A6700", "broken": "#B3261E",
-}  # fmt: skip
-_NUMBERS_A_ROW = 7
+_RULE, _GRID = "#C9D1D9", "#E8ECF0"
 _ROW, _LETTER, _MOST_LETTERS = 0.16, 0.062, 36  # in: height of a named row, width of a letter of its name
 _DOT = 5.0  # points: marker of a named row
-_LETTERS = 84  # of 7 points that the narrowest timeline holds
+_LETTERS = 74  # of 7 points that the narrowest timeline holds
 
 
 def write_figure(report: Report, path: Path, dpi: int = 130) -> None:
@@ -72,26 +67,25 @@ def draw(report: Report) -> "Figure":
 
     blocks = [(section, _cells(section)) for section in report.sections]
     columns = 2 if max((len(cells) for _, cells in blocks), default=0) > 3 else 1
-    inner = WIDTH_IN - 2 * _EDGE
+    inner = WIDTH_IN - 2 * EDGE_IN
     width = (inner - (columns - 1) * _GAP) / columns - _LEFT
     grids = [[cells[i : i + columns] for i in range(0, len(cells), columns)] for _, cells in blocks]
-    title_rows = math.ceil(len(report.numbers) / _NUMBERS_A_ROW)
-    height = 2 * _EDGE + 0.62 + 0.5 * title_rows
+    height = 2 * EDGE_IN + head_height(report)
     height += sum(0.5 + sum(_row_height(row, width) for row in grid) for grid in grids if grid)
 
     figure = Figure(figsize=(WIDTH_IN, height))
     FigureCanvasAgg(figure)
-    top = _header(figure, report, height)
+    top = write_head(figure, report, height)
     for (section, _), grid in zip(blocks, grids, strict=True):
         if not grid:
             continue
         top -= 0.28
-        _write(figure, _EDGE, top, clean(section.title), size=12, weight="bold")
+        write(figure, EDGE_IN, top, clean(section.title), size=12, weight="bold")
         top -= 0.22
         for row in grid:
             head, tall = max(cell.head(width) for cell in row), max(cell.height for cell in row)
             for column, cell in enumerate(row):
-                left = _EDGE + _LEFT + column * (width + _LEFT + _GAP) + cell.beside
+                left = EDGE_IN + _LEFT + column * (width + _LEFT + _GAP) + cell.beside
                 bottom, wide = top - head - tall, width - cell.beside
                 axes = figure.add_axes((left / WIDTH_IN, bottom / height, wide / WIDTH_IN, tall / height))
                 _prepare(axes)
@@ -103,43 +97,6 @@ def draw(report: Report) -> "Figure":
 
 def _row_height(row: Sequence[_Cell], width: float) -> float:
     return max(cell.head(width) for cell in row) + max(cell.height for cell in row) + 0.42
-
-
-def _header(figure: "Figure", report: Report, height: float) -> float:
-    """Write title, verdict and numbers; return the height left, in."""
-    top = height - _EDGE
-    _write(figure, _EDGE, top - 0.14, clean(report.title), size=15, weight="bold")
-    left = _EDGE
-    if report.verdict is not None:
-        badge = _write(figure, _EDGE + 0.06, top - 0.45, report.verdict.value, size=9.5, weight="bold", colour="white")
-        badge.set_bbox({"boxstyle": "round,pad=0.35", "facecolor": _VERDICT_COLOURS[report.verdict], "linewidth": 0})
-        left += 0.085 * len(report.verdict.value) + 0.25
-    _write(figure, left, top - 0.45, clean(report.reason), size=10)
-    top -= 0.62
-    for index, number in enumerate(report.numbers):
-        row, column = divmod(index, _NUMBERS_A_ROW)
-        _number(figure, number, _EDGE + column * (WIDTH_IN - 2 * _EDGE) / _NUMBERS_A_ROW, top - 0.5 * row)
-    return top - 0.5 * math.ceil(len(report.numbers) / _NUMBERS_A_ROW)
-
-
-def _number(figure: "Figure", number: Number, left: float, top: float) -> None:
-    value, unit = number_text(number)
-    colour = {None: INK, True: _VERDICT_COLOURS["passed"], False: _VERDICT_COLOURS["failed"]}[number.met]
-    text = f"{value} {unit}".strip()
-    limit = f"  ({clean(number.limit)})" if number.limit else ""
-    _write(figure, left, top - 0.14, _cut(clean(number.label), 24), size=7.5, colour=_SOFT)
-    shown = _cut(_cut(text, 20) + limit, 32)
-    size = 10.5 if len(shown) < 18 else 8.0 if len(shown) < 24 else 6.3
-    _write(figure, left, top - 0.34, shown, size=size, colour=colour)
-
-
-def _write(
-    figure: "Figure", x: float, y: float, text: str, size: float, colour: str = INK, weight: str = "normal"
-) -> "Text":
-    """Write ``text`` at (x, y) inches from the lower left, vertically centred."""
-    width, height = figure.get_size_inches()
-    place = x / width, y / height
-    return figure.text(*place, text, fontsize=size, color=colour, weight=weight, va="center", parse_math=False)
 
 
 def _cut(text: str, most: int) -> str:
@@ -177,7 +134,7 @@ def _prepare(axes: "Axes") -> None:
     axes.grid(True, color=_GRID, linewidth=0.8)
     axes.set_axisbelow(True)
     axes.locator_params(axis="y", nbins=5)
-    axes.tick_params(labelsize=7.5, colors=_SOFT, length=3, width=0.8)
+    axes.tick_params(labelsize=7.5, colors=SOFT, length=3, width=0.8)
     for name, spine in axes.spines.items():
         spine.set_visible(name in {"left", "bottom"})
         spine.set_color(_RULE)
@@ -230,9 +187,13 @@ def _panel_filler(panel: Panel, timeline: Sequence[Lane], span: tuple[float, flo
         for trace, stroke in zip(panel.traces, strokes(panel.traces), strict=True):
             _stroke(axes, trace.t_s, shown(trace.y, panel.unit), stroke)
         axes.set_xlim(*span)
+        if panel.names:
+            axes.set_yticks(range(len(panel.names)), [_cut(clean(name), _MOST_LETTERS) for name in panel.names])
+            for label in axes.get_yticklabels():
+                label.set_parse_math(False)
         for t_s, colour in _marks(timeline):
             axes.axvline(t_s, color=colour, linewidth=0.8, alpha=0.55, zorder=0.5)
-        axes.set_xlabel("Time in s", fontsize=7.5, color=_SOFT, labelpad=1)
+        axes.set_xlabel("Time in s", fontsize=7.5, color=SOFT, labelpad=1)
 
     return fill
 
@@ -251,12 +212,13 @@ def _stroke(axes: "Axes", x: Floats, y: Floats, stroke: Stroke, size: float = 3.
             x, y, linestyle="none", marker="o", markersize=size, color=stroke.colour, alpha=0.75, markeredgewidth=0
         )
     else:
-        axes.plot(x, y, color=stroke.colour, linewidth=width, linestyle=dash)
+        drawstyle = "steps-post" if stroke.steps else "default"
+        axes.plot(x, y, color=stroke.colour, linewidth=width, linestyle=dash, drawstyle=drawstyle)
 
 
 def _fill_timeline(axes: "Axes", rows: Sequence[Lane], span: tuple[float, float]) -> None:
     for place, row in enumerate(rows):
-        axes.text(span[0], place - 0.43, clean(row.name), fontsize=7, color=_SOFT, va="center", parse_math=False)
+        axes.text(span[0], place - 0.43, clean(row.name), fontsize=7, color=SOFT, va="center", parse_math=False)
         for part in row.spans:
             _draw_span(axes, part, place, span)
         _draw_events(axes, row.events, place, span)
@@ -265,7 +227,7 @@ def _fill_timeline(axes: "Axes", rows: Sequence[Lane], span: tuple[float, float]
     axes.set_ylim(len(rows) - 0.5, -0.62)
     axes.set_yticks([])
     axes.spines["left"].set_visible(False)
-    axes.set_xlabel("Time in s", fontsize=7.5, color=_SOFT, labelpad=1)
+    axes.set_xlabel("Time in s", fontsize=7.5, color=SOFT, labelpad=1)
 
 
 def _draw_events(axes: "Axes", events: Sequence[Event], row: int, span: tuple[float, float]) -> None:
@@ -299,8 +261,8 @@ def _chart_filler(chart: Chart) -> Callable[["Axes"], None]:
             _stroke(axes, shown(curve.x, chart.x_unit), shown(curve.y, chart.y_unit), stroke)
         for curve, stroke in zip(chart.curves, drawn, strict=True):  # after the lines, which the legend counts
             _interval(axes, chart, curve, stroke)
-        axes.set_xlabel(_titled(chart.x_label, chart.x_unit), fontsize=7.5, color=_SOFT, labelpad=1, parse_math=False)
-        axes.set_ylabel(_titled(chart.y_label, chart.y_unit), fontsize=7.5, color=_SOFT, labelpad=2, parse_math=False)
+        axes.set_xlabel(_titled(chart.x_label, chart.x_unit), fontsize=7.5, color=SOFT, labelpad=1, parse_math=False)
+        axes.set_ylabel(_titled(chart.y_label, chart.y_unit), fontsize=7.5, color=SOFT, labelpad=2, parse_math=False)
 
     return fill
 
@@ -317,7 +279,7 @@ def _row_filler(chart: Chart) -> Callable[["Axes"], None]:
         for label in axes.get_yticklabels():
             label.set_parse_math(False)
         axes.set_ylim(len(chart.rows) + 0.6, 0.4)
-        axes.set_xlabel(_titled(chart.y_label, chart.y_unit), fontsize=7.5, color=_SOFT, labelpad=1, parse_math=False)
+        axes.set_xlabel(_titled(chart.y_label, chart.y_unit), fontsize=7.5, color=SOFT, labelpad=1, parse_math=False)
 
     return fill
 

@@ -1,18 +1,22 @@
 """A report as one HTML file that needs no network: plots that zoom together, numbers, and what was run."""
 
-import json
+import re
+from collections.abc import Sequence
+from dataclasses import replace
 from html import escape
 from pathlib import Path
-from typing import Any
 
-from hil.report.page import FOOT, HEAD, SCRIPT, STYLE
-from hil.report.palette import INK, SEVERITY_COLOURS, Stroke, strokes
-from hil.report.plots import MARGIN_LEFT, MARGIN_RIGHT, Pool, chart_figure, panel_figure
-from hil.report.report import Chart, Curve, Lane, Number, Panel, Report, Section, Table, Trace
+from hil.report.page import FOOT, HEAD, scripts, style
+from hil.report.palette import INK, Stroke, strokes
+from hil.report.plots import Pool, chart_figure, height_px, panel_figure
+from hil.report.report import Cell, Chart, Curve, Lane, Number, Panel, Report, Section, Table, Trace
 from hil.report.thin import samples_per_trace
 from hil.report.units import symbol
 from hil.report.words import clean, number_text, outline, value_text
 
+_ONE_LINE = 20  # letters of a cell that are never broken: numbers with unit or interval, names
+_TABLES_OPEN = 4  # of a section; more are folded
+_PAIR = re.compile(r"\d (?:(?:to|±|/|of) (?=[-+]?\d)|(?=%))")  # stays on one line: 0.2 to 0.3, 5 ± 1, 1 / 596, 18 %
 _VERDICT_MARKS = {"passed": "✓", "failed": "✗", "inconclusive": "?", "incomplete": "!", "broken": "✗"}
 
 
@@ -22,28 +26,18 @@ def write_html(report: Report, path: Path) -> None:
 
 
 def render_html(report: Report) -> str:
-    """Return the report as one HTML document; plotly's script is in it once, and nothing is loaded from elsewhere."""
+    """Return the report as one HTML document with all that it needs in it; nothing is loaded from elsewhere."""
     pool = Pool(samples_per_trace(report))
-    figures: list[dict[str, Any]] = []
-    body = [_header(report), *(_section(section, pool, figures) for section in report.sections)]
+    body = [_header(report), *(_section(section, pool) for section in report.sections)]
     if report.provenance:
         body.append(_provenance(report))
     if pool.thinned:
         body.append(_thinned(pool))
-    data = json.dumps({"times": pool.lists, "figures": figures}, separators=(",", ":"), allow_nan=False)
-    data = data.replace("<", "\\u003c")  # cannot end the script, nor open a comment in it
-    margins = f":root {{ --left: {MARGIN_LEFT}px; --right: {MARGIN_RIGHT}px; }}"
-    severities = "\n".join(f".{name} {{ --mark: {colour}; }}" for name, colour in SEVERITY_COLOURS.items())
-    parts = [
-        HEAD.format(title=_text(report.title), style=f"{margins}\n{severities}\n{STYLE}"),
-        *body,
-        f'<script type="application/json" id="data">{data}</script>',
-    ]
-    if figures:
-        from plotly.offline import get_plotlyjs  # 5 MB of text, only where a page is written
-
-        parts.append(f"<script>{get_plotlyjs()}</script>")
-    return "\n".join([*parts, f"<script>{SCRIPT}</script>", FOOT])
+    uplot, own = scripts()
+    data = f'<script type="text/plain" id="data">{pool.packed()}</script>'
+    head = HEAD.format(title=_text(report.title), style=style())
+    parts = [uplot, own] if pool.figures else [own]
+    return "\n".join([head, *body, data, *(f"<script>{part}</script>" for part in parts), FOOT])
 
 
 def _text(text: str) -> str:
@@ -54,7 +48,7 @@ def _header(report: Report) -> str:
     verdict = ""
     if report.verdict is not None:
         verdict = f'<span class="badge {report.verdict}">{_VERDICT_MARKS[report.verdict]} {report.verdict}</span>'
-    reason = f"<p>{verdict} {_text(report.reason)}</p>" if verdict or report.reason else ""
+    reason = f"<p>{verdict} {_prose(report.reason)}</p>" if verdict or report.reason else ""
     cards = "".join(_card(number) for number in report.numbers)
     return f'<header><h1>{_text(report.title)}</h1>{reason}</header>\n<dl class="cards">{cards}</dl>'
 
@@ -64,16 +58,16 @@ def _card(number: Number) -> str:
     state = "" if number.met is None else " met" if number.met else " missed"
     mark = "" if number.met is None else "✓ " if number.met else "✗ "
     limit = f'<dd class="limit">{mark}{_text(number.limit)} {unit}</dd>' if number.limit or mark else ""
-    note = f'<dd class="note">{_text(number.note)}</dd>' if number.note else ""
+    note = f'<dd class="note">{_prose(number.note)}</dd>' if number.note else ""
     state += " long" if len(value) > 12 else ""
     shown = f'<dd class="value">{value} <small>{unit}</small></dd>'
     return f'<div class="card{state}"><dt>{_text(number.label)}</dt>{shown}{limit}{note}</div>'
 
 
-def _section(section: Section, pool: Pool, figures: list[dict[str, Any]]) -> str:
+def _section(section: Section, pool: Pool) -> str:
     parts = [f"<section><h2>{_text(section.title)}</h2>"]
     if section.text:
-        parts.append(f"<p>{_text(section.text)}</p>")
+        parts.append(f"<p>{_prose(section.text)}</p>")
     span = section.time_range_s()
     if span is not None:
         start, end = span if span[1] > span[0] else (span[0] - 0.5, span[1] + 0.5)
@@ -81,12 +75,13 @@ def _section(section: Section, pool: Pool, figures: list[dict[str, Any]]) -> str
         if section.timeline:
             lanes = "".join(_lane(lane, start, end) for lane in section.rows())
             parts.append(f'<div class="timeline">{lanes}<div class="cursor"></div></div>')
-        parts += [_panel(panel, (start, end), pool, figures) for panel in section.panels]
+        parts += [_panel(panel, (start, end), pool) for panel in section.panels]
         parts.append(f'<p class="axis">Time in s</p>{_happenings(section)}</div>')
     if section.charts:
-        charts = "".join(_chart(chart, pool, figures) for chart in section.charts)
+        charts = "".join(_chart(chart, pool) for chart in section.charts)
         parts.append(f'<div class="charts">{charts}</div>')
-    parts += [_table(table) for table in section.tables]
+    folded = len(section.tables) > _TABLES_OPEN
+    parts += [_folded(table) if folded else _table(table) for table in section.tables]
     return "\n".join([*parts, "</section>"])
 
 
@@ -134,36 +129,41 @@ def _happenings(section: Section) -> str:
     )
 
 
-def _panel(panel: Panel, span: tuple[float, float], pool: Pool, figures: list[dict[str, Any]]) -> str:
-    figures.append(panel_figure(panel, span, pool))
+def _panel(panel: Panel, span: tuple[float, float], pool: Pool) -> str:
+    pool.figures.append(panel_figure(panel, span, pool))
     unit = f" <small>{_text(symbol(panel.unit))}</small>" if symbol(panel.unit) else ""
-    chips = [_chip(t, s, i) for i, (t, s) in enumerate(zip(panel.traces, strokes(panel.traces), strict=True))]
-    return _plot(f"{_text(panel.title)}{unit}", chips, len(figures) - 1, "panel")
+    return _plot(f"{_text(panel.title)}{unit}", panel.traces, pool, "panel", len(panel.names))
 
 
-def _chart(chart: Chart, pool: Pool, figures: list[dict[str, Any]]) -> str:
-    figures.append(figure := chart_figure(chart, pool))
-    places = [i for i, data in enumerate(figure["data"]) if "name" in data]  # the others are bands
-    pairs = zip(chart.curves, strokes(chart.curves), places, strict=True)
-    return _plot(_text(chart.title), [_chip(*pair) for pair in pairs], len(figures) - 1, "chart")
+def _chart(chart: Chart, pool: Pool) -> str:
+    pool.figures.append(chart_figure(chart, pool))
+    return _plot(_text(chart.title), chart.curves, pool, "chart", len(chart.rows))
 
 
-def _plot(head: str, chips: list[str], index: int, kind: str) -> str:
+def _plot(head: str, traces: Sequence[Trace | Curve], pool: Pool, kind: str, names: int) -> str:
+    chips = "".join(_chip(trace, stroke) for trace, stroke in zip(traces, strokes(traces), strict=True))
+    height = f' style="height:{height_px(names)}px"' if names else ""
     return (
-        f'<figure class="{kind}"><figcaption><h3>{head}</h3>{"".join(chips)}</figcaption>'
-        f'<div class="holder"><div class="plot" data-figure="{index}"></div><div class="cursor"></div></div></figure>'
+        f'<figure class="{kind}"><figcaption><h3>{head}</h3>{chips}</figcaption><div class="holder">'
+        f'<div class="plot" data-figure="{len(pool.figures) - 1}"{height}></div><div class="cursor"></div></div>'
+        "</figure>"
     )
 
 
-def _chip(trace: Trace | Curve, stroke: Stroke, place: int) -> str:
+def _chip(trace: Trace | Curve, stroke: Stroke) -> str:
     dash = f' stroke-dasharray="{" ".join(f"{d:g}" for d in stroke.dash)}"' if stroke.dash else ""
     colour = "currentColor" if stroke.colour == INK else stroke.colour
-    line = f'<line x1="0" y1="5" x2="20" y2="5" stroke="{colour}" stroke-width="2.4"{dash}/>'
+    line = f'<line x1="0" y1="5" x2="20" y2="5" stroke="{colour}" stroke-width="{stroke.width + 0.8:g}"{dash}/>'
     sample = f'<circle cx="10" cy="5" r="3.5" fill="{colour}"/>' if stroke.points else line
     return (
-        f'<button class="chip" data-trace="{place}" aria-pressed="true" title="Show or hide">'
+        f'<button class="chip" aria-pressed="true" title="Show or hide">'
         f'<svg width="20" height="10" aria-hidden="true">{sample}</svg>{_text(trace.name)}<output></output></button>'
     )
+
+
+def _folded(table: Table) -> str:
+    head = f"<summary>{_text(table.title)} ({len(table.rows)} rows)</summary>"
+    return f"<details>{head}{_table(replace(table, title=''))}</details>"
 
 
 def _table(table: Table) -> str:
@@ -172,15 +172,27 @@ def _table(table: Table) -> str:
         all(not isinstance(row[i], (str, bool)) for row in table.rows) and bool(table.rows)
         for i in range(len(table.columns))
     ]
-    kinds = [" class=n" if r else "" for r in right]
-    heads = "".join(f"<th{kind}>{_text(head)}</th>" for kind, head in zip(kinds, table.columns, strict=True))
+    heads = "".join(f"<th{' class=n' if r else ''}>{_text(h)}</th>" for r, h in zip(right, table.columns, strict=True))
     rows = "".join(
-        "<tr>" + "".join(f"<td{k}>{escape(value_text(c))}</td>" for k, c in zip(kinds, row, strict=True)) + "</tr>"
-        for row in table.rows
+        "<tr>" + "".join(_cell(cell, r) for cell, r in zip(row, right, strict=True)) + "</tr>" for row in table.rows
     )
     note = f'<p class="note">{_text(table.note)}</p>' if table.note else ""
     body = f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>"
-    return f'<div class="table">{title}<div class="scroll">{body}</div>{note}</div>'
+    return f'<div class="table">{title}<div class="scroll" tabindex="0">{body}</div>{note}</div>'
+
+
+def _cell(cell: Cell, right: bool) -> str:
+    text = value_text(cell)
+    kind = "n" if right else "s" if len(text) <= _ONE_LINE else "t"
+    return f"<td class={kind}>{_PAIR.sub(_together, escape(text))}</td>"
+
+
+def _prose(text: str) -> str:
+    return _PAIR.sub(_together, _text(text))
+
+
+def _together(pair: re.Match[str]) -> str:
+    return pair[0].replace(" ", "\u00a0")
 
 
 def _provenance(report: Report) -> str:

@@ -7,6 +7,7 @@ from hil.report.report import Curve, Severity, Style, Trace
 
 WHEEL_COLOURS = {"fl": "#0072B2", "fr": "#D55E00", "rl": "#009E73", "rr": "#AA4499"}
 NEUTRAL = "#6E7781"
+PALE = "#A8B3BE"
 INK = "#1B2733"  # the page shows it as its ink, light on dark paper
 SERIES = ("#0072B2", "#D55E00", "#009E73", "#AA4499", "#B8860B", "#56A0D3", "#7A5C3E", "#C2577A")
 SEVERITY_COLOURS: dict[Severity, str] = {"info": "#6E7781", "ok": "#2F7FB8", "warning": "#C98A00", "error": "#C0392B"}
@@ -18,18 +19,19 @@ _ESTIMATE_DASH: Dash = (3, 2)
 
 @dataclass(frozen=True)
 class Stroke:
-    """How one trace is drawn: colour, line width in px, dash lengths in px (empty: solid), markers only."""
+    """How one trace is drawn: colour, line width and dash lengths in px (empty: solid), markers only, steps."""
 
     colour: str
     width: float
     dash: Dash = ()
     points: bool = False
+    steps: bool = False
 
 
 def strokes(traces: Sequence[Trace | Curve]) -> list[Stroke]:
     """Give every trace of a panel its stroke: demands neutral dashes, wheels their own colour, a group one colour.
 
-    Beside wheels, what belongs to the whole car is drawn in ink.
+    What was measured is broad and pale. Beside wheels, what belongs to the whole car is drawn in ink.
     """
     colours = dict(WHEEL_COLOURS)
     wheels = {WHEEL_COLOURS[t.group] for t in traces if t.group in WHEEL_COLOURS}
@@ -40,6 +42,9 @@ def strokes(traces: Sequence[Trace | Curve]) -> list[Stroke]:
         if trace.style == "demand":
             result.append(Stroke(NEUTRAL, 1.4, _DEMAND_DASHES[demands % len(_DEMAND_DASHES)]))
             demands += 1
+            continue
+        if trace.style == "measured":
+            result.append(Stroke(PALE, 4.5))
             continue
         key = trace.group or f"#{index}"
         if key not in colours:
@@ -52,4 +57,4 @@ def strokes(traces: Sequence[Trace | Curve]) -> list[Stroke]:
 def _coloured(colour: str, style: Style) -> Stroke:
     if style == "estimate":
         return Stroke(colour, 1.6, _ESTIMATE_DASH)
-    return Stroke(colour, 1.6, points=style == "points")
+    return Stroke(colour, 1.6, points=style == "points", steps=style == "steps")

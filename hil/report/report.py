@@ -31,7 +31,7 @@ from hil.errors import Verdict as Verdict
 from hil.report.units import Unit
 
 Floats = NDArray[np.float64]
-Style = Literal["line", "demand", "estimate", "points"]
+Style = Literal["line", "demand", "estimate", "points", "steps", "measured"]
 Severity = Literal["info", "ok", "warning", "error"]
 Cell = str | float | int | bool | None
 
@@ -67,7 +67,9 @@ class Trace:
     name : as listed in the legend.
     t_s : (n,) times that do not decrease, s.
     y : (n,) values in the panel's unit; NaN leaves a gap.
-    style : ``line``; ``demand`` (dashed, neutral: demands, references); ``estimate`` (dotted, in the group's colour).
+    style : ``line``; ``demand`` (dashed, neutral: demands, references); ``estimate`` (dotted, in the group's colour);
+        ``points``; ``steps`` (a value holds until the next); ``measured`` (broad and pale: give it first, so that
+        what is to agree with it lies on it).
     group : traces of a group share a colour; the four wheel names have fixed ones.
     """
 
@@ -91,11 +93,15 @@ class Trace:
 
 @dataclass(frozen=True)
 class Panel:
-    """Traces on one y axis; all panels of a section share the time axis."""
+    """Traces on one y axis; all panels of a section share the time axis.
+
+    ``names`` stand at the axis in place of the numbers 0, 1, ..., which are then the values.
+    """
 
     title: str
     unit: Unit
     traces: tuple[Trace, ...] = ()
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

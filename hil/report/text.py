@@ -88,8 +88,8 @@ def _numbers(report: Report, width: int, paint: Paint) -> Iterator[str]:
         label, value, unit, limit, mark, note = row
         tint = "32" if number.met else "1;31"
         if isinstance(number.value, str):
-            tail = f"  {limit} {mark}".rstrip()
-            first, *rest = _wrap(f"  {_fit(label, label_width)}  {value}{tail}", width, label_width + 4)
+            told = " ".join(filter(None, (value, unit))) + f"  {limit} {mark}".rstrip()
+            first, *rest = _wrap(f"  {_fit(label, label_width)}  {told}", width, label_width + 4)
             yield from (first, *rest)
         else:
             cells = (

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from hil.report.report import Report
 
-PAGE_SAMPLES = 240_000  # of all traces together
+PAGE_SAMPLES = 160_000  # of all traces together: below 1 MB even where they are noise
 TRACE_SAMPLES = 20_000  # what a browser draws fluently
 
 

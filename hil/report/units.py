@@ -37,9 +37,12 @@ KJ = Display("kJ", 1e-3)  # from J
 KN = Display("kN", 1e-3)  # from N
 
 
+_PRINTED = {"1": "", "m/s2": "m/s²"}
+
+
 def symbol(unit: Unit) -> str:
     """Return the unit's printed symbol."""
-    return unit.symbol if isinstance(unit, Display) else unit
+    return unit.symbol if isinstance(unit, Display) else _PRINTED.get(unit, unit)
 
 
 def shown(values: NDArray[np.float64], unit: Unit) -> NDArray[np.float64]:

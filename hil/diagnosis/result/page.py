@@ -14,10 +14,10 @@ from hil.diagnosis.manoeuvres import stops
 from hil.diagnosis.result.answer import Answer
 from hil.diagnosis.result.channels_table import channels_section
 from hil.diagnosis.result.cross_validation import probabilities
-from hil.diagnosis.result.page_parts import EXTENDED, NOMINAL, binned_curve, comparison_panels, limits
+from hil.diagnosis.result.page_parts import EXTENDED, NOMINAL, binned_curve, comparison_panels, limits, log_lane
 from hil.diagnosis.result.page_tables import goodness_of_fit, held_out, moved, numbers, scaled
 from hil.diagnosis.result.phrases import place
-from hil.report.report import Chart, Curve, Panel, Report, Section, Table, Verdict
+from hil.report.report import Chart, Curve, Lane, Panel, Report, Section, Table, Verdict
 from hil.report.units import BAR, Display, Unit
 from plant.injection_points import INJECTION_POINTS
 
@@ -92,9 +92,14 @@ def _comparison(answer: Answer) -> Section:
         }
         panels += comparison_panels(title, unit, t, np.where(shown, known, np.nan), simulated)
     return Section(
-        "Measured against simulated", panels=tuple(panels),
+        "Measured against simulated", panels=tuple(panels), timeline=(_logs(answer, t, gaps),),
         text="All logs, one after the other, simulated open loop from measured inputs; a segment restarts the speed.",
     )  # fmt: skip
+
+
+def _logs(answer: Answer, t: Floats, gaps: Floats) -> Lane:
+    names = [recording.log.name for recording in answer.diagnosis.dataset.recordings]
+    return log_lane(names, t[gaps].tolist(), float(t[-1]))
 
 
 def _models(answer: Answer) -> list[tuple[str, Model]]:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
-from hil.report.report import Cell, Curve, Panel, Section, Table, Trace
+from hil.report.report import Cell, Curve, Lane, Panel, Section, Span, Table, Trace
 from hil.report.units import Unit
 
 NOMINAL, EXTENDED = "rl", "fl"
@@ -27,9 +27,16 @@ def comparison_panels(
     traces = [Trace(name, t_s, values, group=groups[name]) for name, values in models.items()]
     residuals = [Trace(name, t_s, measured - values, group=groups[name]) for name, values in models.items()]
     return [
-        Panel(title, unit, (*traces, Trace("measured", t_s, measured, "demand"))),
+        Panel(title, unit, (Trace("measured", t_s, measured, "measured"), *traces)),
         Panel(f"{title.split(',')[0]}: residual", unit, tuple(residuals)),
     ]
+
+
+def log_lane(names: Sequence[str], begins_s: Sequence[float], end_s: float) -> Lane:
+    """Which file lies where, of logs that stand one after the other."""
+    ends_s = [*begins_s[1:], end_s]
+    spans = (Span(begin, end, name) for name, begin, end in zip(names, begins_s, ends_s, strict=True))
+    return Lane("log", tuple(spans))
 
 
 def binned_curve(

@@ -9,7 +9,7 @@ from hil.diagnosis.result.cross_validation import HeldOutError
 from hil.diagnosis.result.headline import short_text, value_text
 from hil.diagnosis.result.moved_numbers import MovedNumber, shown_numbers
 from hil.diagnosis.result.page_parts import rounded
-from hil.diagnosis.result.phrases import onset, place, shown_unit
+from hil.diagnosis.result.phrases import number_sentence, onset, place, shown_unit
 from hil.diagnosis.result.residual_patterns import UNITS, WORDS
 from hil.report.report import Cell, Chart, Curve, Number, Section, Table
 
@@ -25,7 +25,7 @@ def numbers(answer: Answer) -> list[Number]:
             factor, unit = shown_unit(entry["unit"])
             low, high = (factor * bound for bound in entry["ci95"])
             which = f": {name.replace('_', ' ')}" if len(cause["parameters"]) > 1 else ""
-            note = f"95 %: {low:.4g} to {high:.4g}{onset(cause)}"
+            note = (number_sentence(cause, name) or f"95 %: {low:.4g} to {high:.4g}") + onset(cause)
             listed.append(Number(f"{cause['title']}{where}{which}", factor * entry["value"], unit, note=note))
         listed.append(Number("its probability", 100.0 * cause["probability"], "%"))
     best = _best_reduced(answer.held_out)

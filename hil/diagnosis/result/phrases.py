@@ -48,6 +48,13 @@ def sentence(cause: Mapping[str, Any], interval: bool = True) -> str:
     return text + onset(cause)
 
 
+def number_sentence(cause: Mapping[str, Any], name: str) -> str:
+    """One number of a cause in words, with its 95 % interval; empty for what only shapes the cause, and for curves."""
+    if cause["curve"] or _is_shape(cause["effect"], name):
+        return ""
+    return _strength(cause, name, cause["parameters"][name], cause["parameters"], interval=True)
+
+
 def onset(cause: Mapping[str, Any]) -> str:
     """From when on a cause acts; empty where it always does."""
     at = cause["onset"]

@@ -8,7 +8,15 @@ from hil.diagnosis.data.log import Floats
 from hil.diagnosis.manoeuvres import stops
 from hil.diagnosis.manoeuvres.coast_down_page import coast_section
 from hil.diagnosis.result.channels_table import channels_section
-from hil.diagnosis.result.page_parts import EXTENDED, NOMINAL, binned_curve, comparison_panels, limits, rounded
+from hil.diagnosis.result.page_parts import (
+    EXTENDED,
+    NOMINAL,
+    binned_curve,
+    comparison_panels,
+    limits,
+    log_lane,
+    rounded,
+)
 from hil.diagnosis.sensor_consistency.braking import APPLIED_PA, BrakingModel
 from hil.diagnosis.sensor_consistency.check import Consistency
 from hil.diagnosis.sensor_consistency.held_out import HeldOutError
@@ -96,8 +104,12 @@ def _overview(answer: Consistency) -> Section:
     for error in answer.errors:
         if error.channel != "speed_in_stops":
             panels += _panels(error, t_s, rows)
+    motion = answer.motion
+    begins = t_s[motion.log_start > 0.5].tolist()
+    names = [log.name for log in motion.logs]
     return Section(
         "Measured against predicted", panels=tuple(panels),
+        timeline=(log_lane(names, begins, float(t_s[-1])),),
         text="Each sensor predicted from the wheels' motion alone on a flat road, with nominal and with fitted "
         "parameters. The residual of the extended model is the road's slope and noise.",
     )  # fmt: skip
@@ -120,12 +132,13 @@ def _details(answer: Consistency) -> list[Section]:
         for stop in sorted(model.stops, key=lambda s: -float(model.pressure[slice(*s)].max()))[:_STOPS_SHOWN]:
             rows = slice(*stop)
             curves = (
-                Curve("measured", t_s[rows], error.measured[rows]),
-                Curve("nominal", t_s[rows], error.nominal[rows], group=NOMINAL),
-                Curve("extended", t_s[rows], error.fitted[rows], group=EXTENDED),
+                Curve("measured", motion.t_s[rows], error.measured[rows], style="measured"),
+                Curve("nominal", motion.t_s[rows], error.nominal[rows], group=NOMINAL),
+                Curve("extended", motion.t_s[rows], error.fitted[rows], group=EXTENDED),
             )
-            title = f"Stop at {t_s[stop[0]]:.0f} s, {float(model.pressure[rows].max()) * 1e-5:.1f} bar"
-            charts.append(Chart(title, "time", "s", "speed", _UNIT["m/s"], curves))
+            name, begin_s = motion.logs[int(motion.log_id[stop[0]])].name, motion.t_s[stop[0]]
+            title = f"{name}, stop at {begin_s:.0f} s, {float(model.pressure[rows].max()) * 1e-5:.1f} bar"
+            charts.append(Chart(title, "time in the log", "s", "speed", _UNIT["m/s"], curves))
         text = "Each stop is simulated open loop from its measured initial speed."
         sections.append(Section("Stops: measured, nominal and extended", charts=tuple(charts), text=text))
     return sections

@@ -43,6 +43,16 @@ def log(tmp_path):
     return path
 
 
+def test_a_page_holds_channels_identifiers_and_signals(log, tmp_path, capsys):
+    (tmp_path / "a.dbc").write_text(DBC)
+    assert run(log, "--dbc", tmp_path / "a.dbc", "--page", tmp_path / "a.html") == 1
+    page = (tmp_path / "a.html").read_text()
+    for cell in ("incomplete", "can0", "<td class=s>001</td>", "M.S", "km/h", "can0 0x7ff: 1"):
+        assert cell in page
+    with pytest.raises(BrakebenchError, match="exists already"):
+        run(log, "--page", tmp_path / "a.html")
+
+
 @pytest.fixture
 def whole(tmp_path):
     path = tmp_path / "whole.log"

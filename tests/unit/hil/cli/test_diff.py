@@ -1,5 +1,8 @@
 import argparse
+import base64
 import json
+import re
+import zlib
 
 import numpy as np
 import pytest
@@ -52,6 +55,26 @@ def compare(tmp_path, capsys):
 
 
 SAME = [(100 + k, 1, 0, 1.5) for k in range(50)]
+
+
+def test_a_page_draws_what_differs(tmp_path, capsys):
+    (tmp_path / "a.dbc").write_text(DBC)
+    (tmp_path / "a.log").write_text("".join(lines(SAME)))
+    other = [(s + 40 * (k == 20), t, b, f) for k, (s, t, b, f) in enumerate(SAME)]
+    (tmp_path / "b.log").write_text("".join(lines(other, start=2000.0)))
+    words = (tmp_path / "a.log", tmp_path / "b.log", "--dbc", tmp_path / "a.dbc", "--page", tmp_path / "a.html")
+    assert run(*words) == 1
+    page = (tmp_path / "a.html").read_text()
+    assert "<h3>M.S <small>km/h</small></h3>" in page
+    assert "M.T" not in page
+    data = re.search(r'id="data">(.*?)</script>', page)[1]
+    first, second = json.loads(zlib.decompress(base64.b64decode(data)))["figures"][0]["traces"]
+    assert [k for k in range(50) if first["y"][k] != second["y"][k]] == [20]
+    assert first["x"] == second["x"]  # each from its own first frame on
+    with pytest.raises(BrakebenchError, match="exists already"):
+        run(*words)
+    with pytest.raises(BrakebenchError, match=r"ends in \.html"):
+        run(*words[:-1], tmp_path / "a.png")
 
 
 def test_a_log_equals_itself(compare):

@@ -1,16 +1,17 @@
 import argparse
+import base64
 import json
 import re
+import zlib
 
 import numpy as np
-import plotly.graph_objects
 import pytest
 from matplotlib.image import imread
 
 from hil.cli import plot
 from hil.errors import BrakebenchError
 from hil.report.courses import Course, Courses
-from hil.report.courses_page import courses_figure
+from hil.report.courses_page import courses_page
 
 DBC = """VERSION ""
 BU_: A
@@ -40,8 +41,9 @@ def log(tmp_path):
     return path
 
 
-def figure_of(page):
-    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)[1])
+def figures_of(page):
+    packed = re.search(r'<script type="text/plain" id="data">(.*?)</script>', page, re.DOTALL)[1]
+    return json.loads(zlib.decompress(base64.b64decode(packed)))["figures"]
 
 
 def test_a_page_has_units_names_and_gaps(log, tmp_path, capsys):
@@ -51,17 +53,16 @@ def test_a_page_has_units_names_and_gaps(log, tmp_path, capsys):
     page = out.read_text()
     assert "2023-11-14 22:13:20.000 UTC" in page
     assert "off <b>" not in page
-    figure = figure_of(page)
-    plotly.graph_objects.Figure(figure)  # plotly knows every key of it
-    speed, other, state, bit = figure["data"]
-    assert speed["yaxis"] == other["yaxis"] == "y"
-    assert figure["layout"]["yaxis"]["title"]["text"] == "km/h"
-    assert None in speed["y"]  # 5 s of silence are no line
-    assert state["line"]["shape"] == "hv"
-    assert figure["layout"]["yaxis2"]["ticktext"] == ["off &lt;b&gt;  0", "on  1", "failed  9"]
-    assert set(state["y"]) == {0, 1, 2}
-    assert figure["layout"]["yaxis3"]["ticktext"] == ["0", "1"]
-    assert set(bit["y"]) == {0}
+    assert "<td>brakebench " in page  # the command that draws it again
+    assert "<h3>M <small>km/h</small></h3>" in page
+    speeds, states, bits = figures_of(page)
+    assert [trace["name"] for trace in speeds["traces"]] == ["S", "R"]
+    assert None in speeds["traces"][0]["y"]  # 5 s of silence are no line
+    assert states["traces"][0]["steps"]
+    assert states["y"]["names"] == ["off <b>  0", "on  1", "failed  9"]
+    assert set(states["traces"][0]["y"]) == {0, 1, 2}
+    assert bits["y"]["names"] == ["0", "1"]
+    assert set(bits["traces"][0]["y"]) == {0}
 
 
 def test_a_picture(log, tmp_path):
@@ -100,8 +101,10 @@ def test_many_values_are_thinned_and_the_peak_stays():
     y = rng.normal(size=500_000)
     y[123_456], y[400_000] = 50.0, -60.0
     course = Course("M.S", np.arange(500_000) / 100, y)
-    (trace,) = courses_figure([Courses((course,), "bar")])["data"]
-    assert len(trace["y"]) <= 40_000
+    page = courses_page([Courses((course,), "bar")], "a.log", "1 signal", {})
+    trace = figures_of(page)[0]["traces"][0]
+    assert len(trace["y"]) <= 20_000
+    assert len(page) < 500_000
     assert (max(trace["y"]), min(trace["y"])) == (50.0, -60.0)
 
 

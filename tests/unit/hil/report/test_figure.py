@@ -35,6 +35,30 @@ def test_the_picture_shows_names_and_numbers(full_report: Report) -> None:
     assert {"#0072B2", "#009E73", "#6E7781"} <= lines
 
 
+def test_no_number_is_cut_and_none_lies_on_another() -> None:
+    numbers = (
+        Number("Mean fully developed deceleration", 3.198, "m/s²"),
+        Number("Wheel speed to demand p50 / p99 / max", "5.029 / 8.030 / 10.213", "ms"),
+        Number("Expected: TRUTH_MOTION.SPEED from 0 s to the end", "6.376 to 13.9", limit="4 to 14.5", met=True),
+        *(Number(f"n{k}", float(k)) for k in range(9)),
+    )
+    reason = (
+        "Front pads bite less than they should; these logs cannot tell that from a pressure measured too high. " * 3
+    )
+    figure = draw(Report("A stop", Verdict.INCONCLUSIVE, reason, numbers))
+    texts = [text for text in figure.findobj(Text) if text.get_text()]  # type: ignore[union-attr]
+    shown = " ".join(text.get_text() for text in texts)
+    for number in numbers:
+        assert number.label in shown
+    assert "5.029 / 8.030 / 10.213 ms" in shown
+    assert "6.376 to 13.9  (4 to 14.5)" in shown
+    assert shown.count("pressure measured too high.") == 3
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    boxes = [text.get_window_extent(renderer) for text in texts]
+    assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y0 >= 0 and box.y1 <= figure.bbox.y1 for box in boxes)
+    assert not [(i, k) for k, box in enumerate(boxes) for i in range(k) if box.overlaps(boxes[i])]
+
+
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_it_is_written_in_the_format_of_the_suffix(full_report: Report, tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"report.{suffix}"

@@ -81,6 +81,11 @@ def test_a_gap_is_blank_and_a_course_follows_the_panel_scale() -> None:
     assert set(next(line for line in lines if "half" in line).split()[-1]) == {"▅"}
 
 
+def test_several_values_in_one_have_their_unit() -> None:
+    text = render_text(Report("r", numbers=(Number("Lateness p50 / max", "0.047 / 3.060", "ms", "worse node"),)))
+    assert "Lateness p50 / max  0.047 / 3.060 ms" in text
+
+
 def test_empty_and_odd_reports_print() -> None:
     assert render_text(Report("")) == "\n"
     one = Trace("instant", np.array([3.0]), np.array([1.0]))

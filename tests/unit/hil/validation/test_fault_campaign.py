@@ -243,8 +243,11 @@ def test_bounds_are_told_once_for_all_rows():
 
 
 @pytest.mark.slow
-def test_the_command_prints_a_table_and_one_json_object(capsys):
-    assert main(["faults", "--instants", "2", "--only", "motor_dead", "--json"]) == 0
+def test_the_command_prints_a_table_and_one_json_object_and_writes_a_page(capsys, tmp_path):
+    assert main(["faults", "--instants", "2", "--only", "motor_dead", "--json", "--out", str(tmp_path / "out")]) == 0
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "motor_dead fl" in page
+    assert "Longest stop beyond the one without the fault" in page
     found = json.loads(capsys.readouterr().out)
     (row,) = found["rows"]
     assert (row["fault"], row["runs"], row["budgets_missed"]) == ("motor_dead", 7, 0)
