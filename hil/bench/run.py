@@ -249,6 +249,12 @@ def expected(scenario: Scenario, result: RunResult, signals: Signals) -> Iterato
         yield Number(f"{EXPECTED}{x.name}", shown, limit=f"{x.minimum:g} to {x.maximum:g}", met=met)
 
 
+def missed(number: Number) -> str:
+    """What was expected and what came instead, in a sentence."""
+    got = f"{number.value:.6g}" if isinstance(number.value, float) else number.value
+    return f"{number.label.removeprefix(EXPECTED)}: expected {number.limit}, got {got}"
+
+
 def judge(findings: Sequence[Finding]) -> tuple[Verdict, str]:
     """The worst finding and how many there are beside it; *passed* where there is none."""
     if not findings:
@@ -271,8 +277,7 @@ def _judgements(bench_run: BenchRun, expected: Sequence[Number], failure: str) -
     else:
         for number in expected:
             if not number.met:
-                label = number.label.removeprefix(EXPECTED)
-                yield Finding(Verdict.FAILED, f"{label}: expected {number.limit}, got {number.value}")
+                yield Finding(Verdict.FAILED, missed(number))
         yield from bench_run.watch.findings()
 
 

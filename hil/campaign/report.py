@@ -72,6 +72,12 @@ def unit_of(figure: str) -> str:
     return _UNITS.get(figure.rpartition("_")[2], "1")
 
 
+def _title(figure: str) -> str:
+    """A figure in words, without its unit."""
+    name, _, unit = figure.rpartition("_")
+    return (name if unit in _UNITS else figure).replace("_", " ")
+
+
 def command(plan: Plan, number: int) -> str:
     """What repeats a run, with its recording and report."""
     return f"brakebench campaign {plan.source} --repeat {number}"
@@ -117,7 +123,7 @@ def _distribution(name: str, values: np.ndarray) -> Chart:
     order = np.sort(values)
     keep = np.unique(np.linspace(0, n - 1, min(n, 500)).astype(np.intp))
     curve = Curve("share of the runs below", order[keep], 100.0 * (keep + 0.5) / n)
-    return Chart(name, name, unit_of(name), "share of the runs", "%", (curve,))
+    return Chart(_title(name), _title(name), unit_of(name), "share of the runs", "%", (curve,))
 
 
 def _sensitivities(plan: Plan, table: pa.Table) -> Iterator[Section]:
@@ -139,7 +145,7 @@ def _sensitivities(plan: Plan, table: pa.Table) -> Iterator[Section]:
                 for i, label in enumerate(labels)
             ]
             if name not in _COUNTS:
-                charts.append(_indices(f"{name} of {scenario}", labels, found))
+                charts.append(_indices(f"{_title(name)} of {scenario}", labels, found))
     note = (
         "S1: share of the variance that goes with this input alone; ST: with its interactions (Saltelli 2010). "
         "Half-widths of 95 %, by resampling."

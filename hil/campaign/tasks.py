@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.bench.result import MEASURED, Signals, measure
-from hil.bench.run import expected
+from hil.bench.run import EXPECTED, expected, missed
 from hil.bench.virtual import simulate
 from hil.errors import BrakebenchError, Verdict
 from hil.log.write import write_log
@@ -114,10 +114,9 @@ def _measured(scenario: Scenario, signals: Signals) -> Row:
     row: Row = {name: math.nan if value is None else float(value) for name, value in numbers.items()}
     misses = []
     for number in expected(scenario, result, signals):
-        label = number.label.partition(": ")[2]
-        row[f"met.{label}"] = bool(number.met)
+        row[f"met.{number.label.removeprefix(EXPECTED)}"] = bool(number.met)
         if not number.met:
-            misses.append(f"{label}: expected {number.limit}, got {number.value}")
+            misses.append(missed(number))
     verdict = Verdict.FAILED if misses else Verdict.PASSED
     return row | {"verdict": verdict.value, "reason": "; ".join(misses)}
 

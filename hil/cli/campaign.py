@@ -44,6 +44,7 @@ def run(args: argparse.Namespace) -> int:
     from hil.campaign.plan import load_plan
     from hil.campaign.report import build_report
     from hil.campaign.store import Store
+    from hil.cli.origin import with_origin
     from hil.errors import INTERRUPTED_EXIT_CODE, Verdict
     from hil.report.html import write_html
     from hil.report.text import print_text
@@ -59,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
         table = store.table()
         report = build_report(plan, table, rate)
         if not stop.asked:
-            write_html(report, store.folder / "report.html")
+            write_html(with_origin(report), store.folder / "report.html")
     if args.json:
         print(json.dumps(_values(report, store, rate), indent=2))
     else:
