@@ -46,14 +46,15 @@ def figures_of(page):
     return json.loads(zlib.decompress(base64.b64decode(packed)))["figures"]
 
 
-def test_a_page_has_units_names_and_gaps(log, tmp_path, capsys):
+def test_a_page_has_units_names_and_gaps(log, tmp_path, capsys, monkeypatch):
     out = tmp_path / "a.html"
+    monkeypatch.setattr("sys.argv", ["brakebench", "plot", str(log)])
     assert run(log, "S", "M.R", "T", "B", "--dbc", tmp_path / "a.dbc", "--out", out) == 0
     assert "4 signals, 1,600 values" in capsys.readouterr().out
     page = out.read_text()
     assert "2023-11-14 22:13:20.000 UTC" in page
     assert "off <b>" not in page
-    assert "<td>brakebench " in page  # the command that draws it again
+    assert f"<td>brakebench plot {log}</td>" in page  # the command that draws it again
     assert "<h3>M <small>km/h</small></h3>" in page
     speeds, states, bits = figures_of(page)
     assert [trace["name"] for trace in speeds["traces"]] == ["S", "R"]

@@ -9,22 +9,9 @@ from hil.validation.reproduce.conditions import CONDITIONS
 from hil.validation.reproduce.store import Store, sources
 
 
-class Pool:
-    """Runs here what a pool of workers would."""
-
-    def __init__(self, stopped):
-        self.stopped = stopped
-
-    def shutdown(self, *, wait, cancel_futures):
-        self.stopped.append((wait, cancel_futures))
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
-
-    map = staticmethod(map)
+def here(batches, function, workers):
+    """What an engine does, in this process."""
+    return ((batch, [function(item) for item in batch]) for batch in batches)
 
 
 def test_a_stopped_measurement_goes_on_where_it_was(tmp_path, monkeypatch):
@@ -37,14 +24,12 @@ def test_a_stopped_measurement_goes_on_where_it_was(tmp_path, monkeypatch):
         driven.append(what)
         return dict.fromkeys(keys, float(what[2]))
 
-    stopped = []
-    monkeypatch.setattr(study, "worker_pool", lambda _: Pool(stopped))
+    monkeypatch.setattr(study, "work", here)
     monkeypatch.setattr(study, "job", job)
     path = tmp_path / "numbers.jsonl"
     with pytest.raises(KeyboardInterrupt):
         study.measure(2, 1, lambda _: None, Store(path))
     assert len(Store(path).numbers) == 5
-    assert stopped == [(False, True)]  # what nobody will see is not driven
     path.write_text(path.read_text() + '["estim', encoding="utf-8")  # killed while writing
     monkeypatch.setattr(
         study, "job", lambda what, extension: driven.append(what) or dict.fromkeys(keys, float(what[2]))
