@@ -40,6 +40,7 @@ COMMANDS = (
     "doctor",
     "perf",
     "hide",
+    "prepare",
     "explain",
     "trials",
     "effects",

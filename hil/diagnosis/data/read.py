@@ -2,7 +2,7 @@
 
 import tomllib
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +99,53 @@ def read_one(
     if database is not None:
         raise UnusableError(f"{path.name}: another car's DBC needs --map CHANNELS.toml, its signals by channel")
     return _brakebench_log(path.name, decoded, torque_constant_nm_a)
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """All signals of one file as they came: times, s, and values by name, units as stated; ``time`` of a table."""
+
+    name: str
+    series: Mapping[str, tuple[Floats, Floats]]
+    units: Mapping[str, str]
+    time: str | None = None
+
+
+def read_samples(path: Path, database: Database | None = None) -> Samples:
+    """Every signal of a file, whatever it is called.
+
+    Raises
+    ------
+    UnusableError
+        A table without times; a CAN log of another car without ``database``, or one that it does not describe.
+    """
+    columns = None if database is not None else _table_columns(path, NAMES)
+    if columns is not None:
+        time, t_s, _ = times_s(path.name, columns, _time_of(columns))
+        own = {
+            key: (t_s, one.values) if one.own_t_s is None or one.own_values is None else (one.own_t_s, one.own_values)
+            for key, one in columns.items()
+            if key != time
+        }
+        return Samples(path.name, own, {key: one.unit for key, one in columns.items()}, None if time in NAMES else time)
+    decoded = decode_log(read_log(path), database)
+    if database is None and own_channels(decoded, 1.0):
+        raise UnusableError(f"{path.name}: a recording of brakebench's own bus: `explain` takes it without a map")
+    if not decoded.columns:
+        how = "none of its messages is in the DBC" if database is not None else "another car's frames need its --dbc"
+        raise UnusableError(f"{path.name}: no signal in it: {how}")
+    units = {name: column.signal.unit or "" for name, column in decoded.columns.items()}
+    return Samples(path.name, {name: decoded.series(name) for name in decoded.columns}, units)
+
+
+def _time_of(columns: Mapping[str, Column]) -> str | None:
+    """The time column where it has none of the usual names: the first whose name begins so and whose values grow."""
+    if any(key in columns for key in NAMES):
+        return None
+    named = [key for key in columns if key.lower().startswith(("time", "zeit", "t_", "stamp")) or key.lower() == "t"]
+    return next(
+        (key for key in named if len(columns[key].values) > 1 and np.diff(columns[key].values).min() >= 0), None
+    )
 
 
 def _brakebench_log(name: str, decoded: DecodedLog, torque_constant_nm_a: float) -> Log:

@@ -60,6 +60,13 @@ def stated_keys(table: Mapping[str, Any]) -> dict[str, str]:
     return stated
 
 
+def missing_keys(table: Mapping[str, Any]) -> list[str]:
+    """Keys of the set's list ``required`` that neither they nor another key for the same number state."""
+    required = table.get("required", [])
+    stated = stated_keys({key: value for key, value in table.items() if key != "required"})
+    return [key for key in map(str, required) if (_flat(key) or key) not in stated]
+
+
 def _flat(stem: str) -> str:
     """Flat name that a key states; empty where it is no number of the plant."""
     if stem in DERIVED:

@@ -1,0 +1,169 @@
+"""Which signals are brake pressures, motor torques and pedals, and what one of their units does to the car."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from hil.diagnosis.data.log import WHEELS, Floats
+from hil.diagnosis.data.trial.motion import STEP_S, filtered
+from hil.diagnosis.data.units import OF_CHANNEL
+from hil.diagnosis.draft.compare import Evidence, compared
+from hil.diagnosis.draft.names import kinds, known_unit, quantity, wheel_of, words
+from hil.diagnosis.draft.signals import Signal
+
+_APPLIED = 0.1
+"""Share of its highest value above which a pressure counts as applied."""
+_LEAST_S = 2.0
+_NO_BRAKE = frozenset({
+    "boost", "tyre", "tire", "tpms", "oil", "fuel", "manifold", "map", "intake", "ambient", "baro", "coolant", "clutch",
+    "engine", "turbo", "exhaust", "hvac", "ac", "rail",
+})  # fmt: skip
+"""Words of pressures that brake nothing."""
+_PER_BAR = (0.02, 0.30)
+"""Deceleration per pressure, m/s2 per bar: 1 g at 33 to 500 bar. Road cars have 0.06 to 0.14; the AV-21, of half their
+mass, 0.2 to 0.3."""
+_SHOWS = 0.6
+
+
+@dataclass(frozen=True, eq=False)
+class Brakes:
+    """Pressures: one signal a wheel, or one for all; ``demand`` where the name says that it is asked for.
+
+    ``evidence`` compares the deceleration with the pressure while it is applied; ``per_unit`` is m/s2 for one of the
+    signal's unit (mean over the wheels), with its interval; ``units`` are those in which that is a road car's.
+    """
+
+    signals: Mapping[str, Signal]
+    demand: bool
+    stated: str
+    evidence: Evidence | None
+    per_unit: float
+    per_unit_ci: tuple[float, float]
+    units: tuple[str, ...]
+    others: tuple[str, ...] = ()
+
+
+def four_of(
+    signals: Mapping[str, Signal], kind: str, stem: str, demand: bool
+) -> tuple[dict[str, Signal], list[Signal]]:
+    """Signals of a kind by wheel, and those without a wheel; ``stem`` as of `names.quantity`."""
+    by_wheel: dict[str, Signal] = {}
+    single = []
+    for name, one in signals.items():
+        said, of = kinds(name, one.unit), quantity(one.unit)
+        if of not in ("", stem) or not (kind in said or of == stem) or said & {"steer"}:
+            continue
+        if ("demand" in said) != demand or (kind == "pressure" and ("torque" in said or _NO_BRAKE & set(words(name)))):
+            continue
+        wheel = wheel_of(name)
+        if wheel:
+            by_wheel.setdefault(wheel, one)
+        else:
+            single.append(one)
+    return by_wheel, single
+
+
+def find_brakes(signals: Mapping[str, Signal], accel: Floats, speed: Floats, demand: bool) -> Brakes | None:
+    """The brake pressures; ``accel`` (rows,) m/s2 by the wheels, ``speed`` (rows,) m/s."""
+    by_wheel, single = four_of(signals, "pressure", "pressure", demand)
+    if len(by_wheel) == len(WHEELS):
+        mean = np.asarray(np.mean([by_wheel[wheel].values for wheel in WHEELS], axis=0))
+        return _brakes(by_wheel, mean, demand, accel, speed, tuple(one.name for one in single))
+    rated = []
+    for one in [*single, *by_wheel.values()]:
+        found = _brakes(dict.fromkeys(WHEELS, one), one.values, demand, accel, speed, ())
+        if "pressure" not in kinds(one.name, one.unit) and not (
+            found.evidence and found.evidence.correlation < -_SHOWS
+        ):
+            continue  # its unit alone makes it no brake's
+        rated.append((-abs(found.evidence.correlation) if found.evidence else 0.0, one.name, found))
+    if not rated:
+        return None
+    rated.sort(key=lambda item: item[:2])
+    best = rated[0][2]
+    return Brakes(
+        best.signals, demand, best.stated, best.evidence, best.per_unit, best.per_unit_ci, best.units,
+        tuple(item[1] for item in rated[1:]),
+    )  # fmt: skip
+
+
+def _brakes(
+    by_wheel: Mapping[str, Signal], mean: Floats, demand: bool, accel: Floats, speed: Floats, others: tuple[str, ...]
+) -> Brakes:
+    stated = known_unit(next(iter(by_wheel.values())).unit)
+    top = float(np.nanpercentile(np.abs(mean), 99.0))
+    seen, slope, interval = None, 0.0, (0.0, 0.0)
+    smooth = filtered(mean)
+    applied = (np.abs(smooth) > _APPLIED * top) & (np.abs(speed) > 2.0) & np.isfinite(accel) & (top > 0.0)
+    if applied.sum() * STEP_S >= _LEAST_S:
+        wide = np.convolve(applied, np.ones(51), mode="same") > 0.5  # the way up and down shows the lag
+        seen = compared(accel, smooth, "the acceleration", np.where(wide & (np.abs(speed) > 2.0), 1.0, 0.0), 0.5)
+        slope, interval = _per_unit(smooth, accel, speed, wide)
+    units: tuple[str, ...] = ()
+    if seen is not None and abs(seen.correlation) > _SHOWS and slope != 0.0:
+        per_bar = {unit: abs(slope) * 1e5 / factor for unit, factor in OF_CHANNEL["pressure"].items()}
+        units = tuple(unit for unit, size in per_bar.items() if _PER_BAR[0] <= size <= _PER_BAR[1])
+    return Brakes(by_wheel, demand, stated, seen, slope, interval, units, others)
+
+
+def _per_unit(pressure: Floats, accel: Floats, speed: Floats, within: Floats) -> tuple[float, tuple[float, float]]:
+    """Regression of the acceleration on pressure, speed and a constant: m/s2 per unit with 95 % over ten stretches."""
+    rows = np.asarray(within, bool) & np.isfinite(accel) & np.isfinite(pressure) & (np.abs(speed) > 2.0)
+    x = np.column_stack([pressure[rows], np.ones(int(rows.sum())), speed[rows]])
+    y = accel[rows]
+    block = np.arange(len(y)) * 10 // max(len(y), 1)
+    whole = float(np.linalg.lstsq(x, y, rcond=None)[0][0])
+    parts = [float(np.linalg.lstsq(x[block != k], y[block != k], rcond=None)[0][0]) for k in range(10)]
+    half = 2.262 * float(np.std(parts)) * 3.0  # jackknife over ten: sqrt(9); Student's t of nine
+    return whole, (whole - half, whole + half)
+
+
+@dataclass(frozen=True, eq=False)
+class Motors:
+    """Motor torques by wheel; ``evidence`` compares their sum with the acceleration."""
+
+    signals: Mapping[str, Signal]
+    demand: bool
+    stated: str
+    evidence: Evidence | None
+
+
+def find_motors(signals: Mapping[str, Signal], accel: Floats, moving: Floats, demand: bool) -> Motors | None:
+    """Motor torques of four wheels, or of the wheels of one axle."""
+    by_wheel, _ = four_of(
+        {n: s for n, s in signals.items() if "torque" in kinds(n, s.unit)}, "torque", "motor_torque", demand
+    )
+    axles = [axle for axle in "fr" if {f"{axle}l", f"{axle}r"} <= by_wheel.keys()]
+    chosen = {wheel: by_wheel[wheel] for wheel in WHEELS if wheel[0] in axles}
+    if not chosen:
+        return None
+    total = np.asarray(np.sum([one.values for one in chosen.values()], axis=0))
+    seen = compared(accel, filtered(total), "the acceleration", moving, 0.5)
+    return Motors(chosen, demand, known_unit(next(iter(chosen.values())).unit), seen)
+
+
+def find_share(
+    signals: Mapping[str, Signal], kind: str, accel: Floats, moving: Floats
+) -> tuple[Signal, Evidence | None, tuple[str, ...]] | None:
+    """A pedal, the throttle or the state of charge, by its name; that which goes best with the acceleration."""
+    wanted = {"pedal": {"pedal"}, "throttle": {"throttle"}, "soc": {"soc"}}[kind]
+    rated = []
+    for name, one in signals.items():
+        said, of = kinds(name, one.unit), quantity(one.unit)
+        if not wanted & said or of not in ("", "pedal") or wheel_of(name) or "pressure" in said:
+            continue
+        if (kind == "pedal" and "throttle" in said) or (one.unit and known_unit(one.unit) not in ("", "%")):
+            continue
+        seen = compared(accel, filtered(one.values), "the acceleration", moving, 0.5) if kind != "soc" else None
+        rated.append((-abs(seen.correlation) if seen else 0.0, name, one, seen))
+    if not rated:
+        return None
+    rated.sort(key=lambda item: item[:2])
+    return rated[0][2], rated[0][3], tuple(item[1] for item in rated[1:])
+
+
+def share_unit(signal: Signal) -> str:
+    """``%`` where the values go beyond one, else the share itself."""
+    stated = known_unit(signal.unit)
+    return stated or ("%" if float(np.nanmax(np.abs(signal.values))) > 1.5 else "")
