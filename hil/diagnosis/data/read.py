@@ -20,6 +20,8 @@ from hil.diagnosis.data.time_column import NAMES, times_s
 from hil.log import DecodedLog, decode_log, log_format, read_log
 
 _GRID_S = 0.01
+_MOTION, _SLOW_S = ("ax_mps2", "ay_mps2", "yaw_rate_rad_s", "speed_mps"), 0.04
+"""Channels of the motion, and the time between two samples from which on one is slow: the cells of a comparison."""
 _TABLES = (".csv", ".parquet", ".mf4", ".mdf", ".mat")
 _CSV_FRAMES = ("csv", "python_can_csv", "gvret")
 """Formats of frames with the suffix of a table; rows of numbers between tabs look like other logs of frames."""
@@ -95,7 +97,8 @@ def read_one(
         units = {target: channel_map.entries[target].unit for target in targets}
         signals = {target: channel_map.entries[target].signal for target in targets}
         converted = {target: channel_map.convert(target, series) for target in targets}
-        return replace(_gridded(path.name, converted, signals, units, tuple(decoded.columns)), another_car=True)
+        gridded = _gridded(path.name, converted, signals, units, tuple(decoded.columns), sparse=True)
+        return replace(gridded, another_car=True)
     if database is not None:
         raise UnusableError(f"{path.name}: another car's DBC needs --map CHANNELS.toml, its signals by channel")
     return _brakebench_log(path.name, decoded, torque_constant_nm_a)
@@ -158,11 +161,12 @@ def _brakebench_log(name: str, decoded: DecodedLog, torque_constant_nm_a: float)
 
 def _gridded(
     name: str, series: Mapping[str, tuple[Floats, Floats]], signals: Mapping[str, str], units: Mapping[str, str],
-    columns: Sequence[str],
+    columns: Sequence[str], sparse: bool = False,
 ) -> Log:  # fmt: skip
     """Channels with their own time stamps on one grid: linear interpolation, NaN over gaps of 0.25 s.
 
-    ``signals`` and ``units`` are what each channel was made of, ``columns`` the names of all signals.
+    ``signals`` and ``units`` are what each channel was made of, ``columns`` the names of all signals. ``sparse`` leaves
+    a slow channel of the motion empty between its samples: what is drawn between them is no measurement, and smooth.
     """
     if not series:
         raise UnusableError(f"{name}: none of the mapped signals is in the log; {expected_instead(columns, CHANNELS)}")
@@ -175,6 +179,10 @@ def _gridded(
         nearest = np.clip(np.searchsorted(t, grid), 1, len(t) - 1) if len(t) > 1 else np.zeros(len(grid), int)
         gap = t[nearest] - t[nearest - 1] if len(t) > 1 else np.full(len(grid), np.inf)
         values[gap > GAP_S] = np.nan
+        if sparse and channel in _MOTION and len(t) > 1 and float(np.median(np.diff(t))) > _SLOW_S:
+            between = np.ones(len(grid), bool)
+            between[np.clip(np.round((t - begin) / _GRID_S).astype(int), 0, len(grid) - 1)] = False
+            values[between] = np.nan
         values_of[channel] = values
     origins = {channel: Origin(signals[channel], units[channel], t, v) for channel, (t, v) in series.items()}
     return make_log(name, grid - begin, values_of, origins=origins, columns=columns)
