@@ -1,15 +1,17 @@
 """Two signals compared: correlation, ratio with its interval, and lag."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.data.trial.agreement import LONGEST_S, agreement
+from hil.diagnosis.data.trial.agreement import LONGEST_S
 from hil.diagnosis.data.trial.motion import STEP_S
 
 _BLOCKS = 10
+_LEAST_SAMPLES = 100  # 2 s
 _STUDENT_95 = 2.262
 """Student's t of nine degrees of freedom, two-sided 95 %."""
 
@@ -18,7 +20,7 @@ _STUDENT_95 = 2.262
 class Evidence:
     """How a signal goes with what it ought to be.
 
-    ``ratio`` is signal per reference with its 95 % interval (a jackknife over ten stretches of the time), ``lag_s`` how
+    ``ratio`` is signal per reference with its 95 % interval (a jackknife over ten stretches), ``lag_s`` how
     late the signal is, ``against`` the reference in words, ``seconds`` how long both were there.
     """
 
@@ -54,26 +56,54 @@ def compared(
 
     ``within`` (rows,) is above 0 in the rows of the reference that count.
     """
-    seen = agreement(reference, values, longest_s, within)
-    if not seen.samples or seen.factor == 0.0 or not np.isfinite(seen.factor):
+    known = np.isfinite(reference) if within is None else np.isfinite(reference) & (within > 0.0)
+    lag = _best_lag(reference, values, known, longest_s)
+    if lag is None:
         return None
-    late = _earlier(values, round(seen.lag_s / STEP_S))
-    both = np.isfinite(reference) & np.isfinite(late)
-    if within is not None:
-        both &= within > 0.0
+    late = _earlier(values, round(lag))
+    both = known & np.isfinite(late)
     x, y = reference[both], late[both]
-    ratios = [_ratio(x[keep], y[keep]) for keep in _left_out(len(x))]
-    spread = float(np.std(ratios)) * np.sqrt(_BLOCKS - 1.0)  # of a jackknife
-    half = _STUDENT_95 * spread
-    return Evidence(
-        seen.correlation,
-        seen.factor,
-        seen.factor - half,
-        seen.factor + half,
-        seen.lag_s,
-        against,
-        seen.samples * STEP_S,
-    )
+    if min(float(np.std(x)), float(np.std(y))) <= 0.0:
+        return None
+    correlation, ratio = float(np.corrcoef(x, y)[0, 1]), _ratio(x, y)
+    half = half_width([_ratio(x[keep], y[keep]) for keep in left_out(x)])
+    return Evidence(correlation, ratio, ratio - half, ratio + half, lag * STEP_S, against, len(x) * STEP_S)
+
+
+def _best_lag(x: Floats, y: Floats, known: Floats, longest_s: float) -> float | None:
+    """Rows by which y is later than x, where the size of their correlation is largest; None without 2 s of both.
+
+    The correlation at each lag is that of the rows that both have there (Padfield 2012, masked normalised
+    cross-correlation): a product without that is largest where the masks overlap best.
+    """
+    known_y = np.isfinite(y)
+    if min(known.sum(), known_y.sum()) < _LEAST_SAMPLES:
+        return None
+    a = np.where(known, x - np.mean(x[known]), 0.0)
+    b = np.where(known_y, y - np.mean(y[known_y]), 0.0)
+    count = 1 << int(np.ceil(np.log2(2 * len(x))))
+    most = round(longest_s / STEP_S)
+    lags = np.arange(-most, most + 1)
+    of_x = [np.conj(np.fft.rfft(part, count)) for part in (known.astype(float), a, a * a)]
+    of_y = [np.fft.rfft(part, count) for part in (known_y.astype(float), b, b * b)]
+
+    def at_lags(first: Floats, second: Floats) -> Floats:
+        return np.asarray(np.fft.irfft(first * second, count)[lags % count])
+
+    n, sum_x, sum_xx = (at_lags(part, of_y[0]) for part in of_x)
+    sum_y, sum_yy, sum_xy = at_lags(of_x[0], of_y[1]), at_lags(of_x[0], of_y[2]), at_lags(of_x[1], of_y[1])
+    spread = (n * sum_xx - sum_x**2) * (n * sum_yy - sum_y**2)
+    good = (n > _LEAST_SAMPLES - 0.5) & (spread > 1e-12 * float(np.max(spread, initial=0.0)))
+    size = np.zeros(len(lags))
+    size[good] = np.abs(n[good] * sum_xy[good] - sum_x[good] * sum_y[good]) / np.sqrt(spread[good])
+    best = int(np.argmax(size))
+    if not good[best]:
+        return None
+    if not 0 < best < len(size) - 1:
+        return float(lags[best])
+    before, here, after = size[best - 1 : best + 2]
+    bend = before - 2.0 * here + after
+    return float(lags[best] + (0.5 * (before - after) / bend if bend < 0.0 else 0.0))
 
 
 def _earlier(values: Floats, rows: int) -> Floats:
@@ -86,10 +116,16 @@ def _earlier(values: Floats, rows: int) -> Floats:
     return out
 
 
-def _left_out(count: int) -> list[Floats]:
-    """Rows that stay when each of ten stretches is left out."""
-    at = np.arange(count) * _BLOCKS // max(count, 1)
+def left_out(x: Floats) -> list[Floats]:
+    """Rows that stay when each of ten stretches is left out, in which ``x`` (rows,) moves alike much."""
+    energy = np.cumsum((x - x.mean()) ** 2) if len(x) else np.empty(0)
+    at = np.minimum((energy * _BLOCKS / max(float(energy[-1]), 1e-300)).astype(int), _BLOCKS - 1)
     return [at != block for block in range(_BLOCKS)]
+
+
+def half_width(parts: Sequence[float]) -> float:
+    """Half of the 95 % interval of an estimate, from those with each of ten stretches left out (jackknife)."""
+    return _STUDENT_95 * float(np.std(parts)) * float(np.sqrt(_BLOCKS - 1.0))
 
 
 def _ratio(x: Floats, y: Floats) -> float:

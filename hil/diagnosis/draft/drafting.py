@@ -9,6 +9,7 @@ from hil.diagnosis.data.trial.motion import STEP_S, slope
 from hil.diagnosis.data.units import OF_CHANNEL
 from hil.diagnosis.draft.compare import Evidence, compared
 from hil.diagnosis.draft.force_guesses import brake_guesses, motor_guesses, share_guesses
+from hil.diagnosis.draft.forces import Forced, motor_sums
 from hil.diagnosis.draft.guess import Draft, Guess, SetNumber
 from hil.diagnosis.draft.names import kinds, known_unit, quantity
 from hil.diagnosis.draft.signals import Signal, Signals, rejected
@@ -57,7 +58,7 @@ def draft(signals: Signals) -> Draft:
     guesses = [*_speed_guesses(speeds, units, choices, scales), *_ax_guess(speeds, units)]
     turns, numbers, remarks = turn_guesses(rest, speeds, units, speed)
     guesses += turns
-    brakes, products = brake_guesses(rest, accel, speed)
+    brakes, products = brake_guesses(rest, Forced(accel, speed, motor_sums(rest)))
     guesses += [*brakes, *motor_guesses(rest, accel, speeds.moving), *share_guesses(rest, accel, speeds.moving)]
     numbers = [*_radius(speeds, units, scales), *numbers, *products]
     mapped = {one.channel for one in guesses if one.complete}

@@ -6,7 +6,7 @@ import numpy as np
 
 from hil.diagnosis.data.log import MOTOR_DEMAND, MOTOR_TORQUE, PRESSURE, PRESSURE_DEMAND, WHEELS, Floats
 from hil.diagnosis.data.units import OF_CHANNEL, written
-from hil.diagnosis.draft.forces import Brakes, find_brakes, find_motors, find_share, share_unit
+from hil.diagnosis.draft.forces import Brakes, Forced, find_brakes, find_motors, find_share, share_unit
 from hil.diagnosis.draft.guess import Guess, SetNumber
 from hil.diagnosis.draft.signals import Signal
 
@@ -16,12 +16,12 @@ _TORQUES = ("torques are those at the wheels, gear ratio counted; driving is pos
 _GAIN = "brake_gain_front_nm_pa"
 
 
-def brake_guesses(signals: Mapping[str, Signal], accel: Floats, speed: Floats) -> tuple[list[Guess], list[SetNumber]]:
+def brake_guesses(signals: Mapping[str, Signal], motion: Forced) -> tuple[list[Guess], list[SetNumber]]:
     """Guesses of the pressures, measured and demanded, and the product that the stops give."""
     guesses: list[Guess] = []
     numbers: list[SetNumber] = []
     for demand, channels in ((False, PRESSURE), (True, PRESSURE_DEMAND)):
-        found = find_brakes(signals, accel, speed, demand)
+        found = find_brakes(signals, motion, demand)
         if found is None:
             continue
         unit, complete, unknown = _unit(found)

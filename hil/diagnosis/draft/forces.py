@@ -8,13 +8,13 @@ import numpy as np
 from hil.diagnosis.data.log import WHEELS, Floats
 from hil.diagnosis.data.trial.motion import STEP_S, filtered
 from hil.diagnosis.data.units import OF_CHANNEL
-from hil.diagnosis.draft.compare import Evidence, compared
+from hil.diagnosis.draft.compare import Evidence, compared, half_width, left_out
 from hil.diagnosis.draft.names import kinds, known_unit, quantity, wheel_of, words
 from hil.diagnosis.draft.signals import Signal
 
 _APPLIED = 0.1
 """Share of its highest value above which a pressure counts as applied."""
-_LEAST_S = 2.0
+_LEAST_S, _SLOW_MPS = 2.0, 2.0
 _NO_BRAKE = frozenset({
     "boost", "tyre", "tire", "tpms", "oil", "fuel", "manifold", "map", "intake", "ambient", "baro", "coolant", "clutch",
     "engine", "turbo", "exhaust", "hvac", "ac", "rail",
@@ -24,6 +24,15 @@ _PER_BAR = (0.02, 0.30)
 """Deceleration per pressure, m/s2 per bar: 1 g at 33 to 500 bar. Road cars have 0.06 to 0.14; the AV-21, of half their
 mass, 0.2 to 0.3."""
 _SHOWS = 0.6
+
+
+@dataclass(frozen=True, eq=False)
+class Forced:
+    """The motion that forces make: acceleration, m/s2, speed, m/s, and filtered sums of other forces; all (rows,)."""
+
+    accel: Floats
+    speed: Floats
+    others: tuple[Floats, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,15 +73,15 @@ def four_of(
     return by_wheel, single
 
 
-def find_brakes(signals: Mapping[str, Signal], accel: Floats, speed: Floats, demand: bool) -> Brakes | None:
-    """The brake pressures; ``accel`` (rows,) m/s2 by the wheels, ``speed`` (rows,) m/s."""
+def find_brakes(signals: Mapping[str, Signal], motion: Forced, demand: bool) -> Brakes | None:
+    """The brake pressures, measured or demanded."""
     by_wheel, single = four_of(signals, "pressure", "pressure", demand)
     if len(by_wheel) == len(WHEELS):
         mean = np.asarray(np.mean([by_wheel[wheel].values for wheel in WHEELS], axis=0))
-        return _brakes(by_wheel, mean, demand, accel, speed, tuple(one.name for one in single))
+        return _brakes(by_wheel, mean, demand, motion, tuple(one.name for one in single))
     rated = []
     for one in [*single, *by_wheel.values()]:
-        found = _brakes(dict.fromkeys(WHEELS, one), one.values, demand, accel, speed, ())
+        found = _brakes(dict.fromkeys(WHEELS, one), one.values, demand, motion, ())
         if "pressure" not in kinds(one.name, one.unit) and not (
             found.evidence and found.evidence.correlation < -_SHOWS
         ):
@@ -89,17 +98,18 @@ def find_brakes(signals: Mapping[str, Signal], accel: Floats, speed: Floats, dem
 
 
 def _brakes(
-    by_wheel: Mapping[str, Signal], mean: Floats, demand: bool, accel: Floats, speed: Floats, others: tuple[str, ...]
+    by_wheel: Mapping[str, Signal], mean: Floats, demand: bool, motion: Forced, others: tuple[str, ...]
 ) -> Brakes:
     stated = known_unit(next(iter(by_wheel.values())).unit)
     top = float(np.nanpercentile(np.abs(mean), 99.0))
+    accel, speed = motion.accel, motion.speed
     seen, slope, interval = None, 0.0, (0.0, 0.0)
     smooth = filtered(mean)
-    applied = (np.abs(smooth) > _APPLIED * top) & (np.abs(speed) > 2.0) & np.isfinite(accel) & (top > 0.0)
+    applied = (np.abs(smooth) > _APPLIED * top) & (np.abs(speed) > _SLOW_MPS) & np.isfinite(accel) & (top > 0.0)
     if applied.sum() * STEP_S >= _LEAST_S:
         wide = np.convolve(applied, np.ones(51), mode="same") > 0.5  # the way up and down shows the lag
-        seen = compared(accel, smooth, "the acceleration", np.where(wide & (np.abs(speed) > 2.0), 1.0, 0.0), 0.5)
-        slope, interval = _per_unit(smooth, accel, speed, wide)
+        seen = compared(accel, smooth, "the acceleration", np.where(wide & (np.abs(speed) > _SLOW_MPS), 1.0, 0.0), 0.5)
+        slope, interval = _per_unit(smooth, motion, wide)
     units: tuple[str, ...] = ()
     if seen is not None and abs(seen.correlation) > _SHOWS and slope != 0.0:
         per_bar = {unit: abs(slope) * 1e5 / factor for unit, factor in OF_CHANNEL["pressure"].items()}
@@ -107,15 +117,18 @@ def _brakes(
     return Brakes(by_wheel, demand, stated, seen, slope, interval, units, others)
 
 
-def _per_unit(pressure: Floats, accel: Floats, speed: Floats, within: Floats) -> tuple[float, tuple[float, float]]:
-    """Regression of the acceleration on pressure, speed and a constant: m/s2 per unit with 95 % over ten stretches."""
-    rows = np.asarray(within, bool) & np.isfinite(accel) & np.isfinite(pressure) & (np.abs(speed) > 2.0)
-    x = np.column_stack([pressure[rows], np.ones(int(rows.sum())), speed[rows]])
-    y = accel[rows]
-    block = np.arange(len(y)) * 10 // max(len(y), 1)
-    whole = float(np.linalg.lstsq(x, y, rcond=None)[0][0])
-    parts = [float(np.linalg.lstsq(x[block != k], y[block != k], rcond=None)[0][0]) for k in range(10)]
-    half = 2.262 * float(np.std(parts)) * 3.0  # jackknife over ten: sqrt(9); Student's t of nine
+def _per_unit(pressure: Floats, motion: "Forced", within: Floats) -> tuple[float, tuple[float, float]]:
+    """Regression of the acceleration on pressure, motors, speed and a constant: m/s2 per unit with 95 %."""
+    rows = np.asarray(within, bool) & (np.abs(motion.speed) > _SLOW_MPS)
+    columns = [pressure, np.ones(len(pressure)), motion.speed, *motion.others]
+    rows &= np.all(np.isfinite([motion.accel, *columns]), axis=0)
+    x, y = np.column_stack([column[rows] for column in columns]), motion.accel[rows]
+
+    def fitted(keep: Floats) -> float:
+        return float(np.linalg.lstsq(x[keep], y[keep], rcond=None)[0][0])
+
+    whole = fitted(np.ones(len(y), bool))
+    half = half_width([fitted(keep) for keep in left_out(x[:, 0])])
     return whole, (whole - half, whole + half)
 
 
@@ -141,6 +154,17 @@ def find_motors(signals: Mapping[str, Signal], accel: Floats, moving: Floats, de
     total = np.asarray(np.sum([one.values for one in chosen.values()], axis=0))
     seen = compared(accel, filtered(total), "the acceleration", moving, 0.5)
     return Motors(chosen, demand, known_unit(next(iter(chosen.values())).unit), seen)
+
+
+def motor_sums(signals: Mapping[str, Signal]) -> tuple[Floats, ...]:
+    """The filtered sum of the motor torques (rows,), measured, else demanded; none without motors."""
+    for demand in (False, True):
+        by_wheel, _ = four_of(
+            {n: s for n, s in signals.items() if "torque" in kinds(n, s.unit)}, "torque", "motor_torque", demand
+        )
+        if len(by_wheel) >= 2:
+            return (filtered(np.sum([one.values for one in by_wheel.values()], axis=0)),)
+    return ()
 
 
 def find_share(

@@ -16,6 +16,8 @@ from hil.diagnosis.draft.unit_choice import UnitChoice
 
 _TRACK_M = 1.55
 _POSITIVE = "a turn to the left must read positive"
+_STRAIGHT_RAD = 0.02
+"""Angle straight ahead, rad, that explain estimates by itself (`hil.diagnosis.vehicle.priors`, two deviations)."""
 _SHARE = 0.05
 """Half-width of a length, as a share, up to which the set takes it."""
 
@@ -102,7 +104,7 @@ def _steer(turn: Turn) -> Guess:
     if not turn.known:
         unknown.append("sign and scale: no bend shows them")
     complete = bool(unit)
-    if unit and abs(turn.offset * OF_CHANNEL["steer"][unit]) > 0.01:
+    if unit and turn.known and abs(turn.offset * OF_CHANNEL["steer"][unit]) > _STRAIGHT_RAD:
         offset = -sign * turn.offset * OF_CHANNEL["steer"][unit]
         measured.append("taken off with offset, in rad")
     return Guess(

@@ -8,7 +8,7 @@ import numpy as np
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.data.trial.motion import filtered
 from hil.diagnosis.data.units import OF_CHANNEL
-from hil.diagnosis.draft.compare import Evidence, compared
+from hil.diagnosis.draft.compare import Evidence, compared, half_width, left_out
 from hil.diagnosis.draft.names import kinds, known_unit, quantity
 from hil.diagnosis.draft.signals import Signal
 
@@ -20,10 +20,6 @@ _TRACK_M, _TRACK_LOG_SD = 1.55, 0.12
 """Track of road cars: 1.2 to 2 m."""
 _NEAR_S = 0.5
 _LEAST_MPS = 1.0
-_CALM = 0.15
-"""Share of the range of a steering signal within which the wheels are about straight ahead."""
-_AMBIGUOUS = 2.0
-"""Factor between two units' ratios below which the data do not tell them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +103,7 @@ def find_steering(signals: Mapping[str, Signal], yaw: Floats, speed: Floats, mov
     curvature = np.where(np.abs(speed) > _LEAST_MPS, yaw, np.nan)
     seen_by: list[tuple[float, Signal, Evidence | None, float]] = []
     for one in tried.values():
-        straight = _straight(one.values, yaw, moving)
+        straight = _straight(one.values, yaw, speed, moving)
         seen = compared(
             curvature, filtered((one.values - straight) * speed), "the yaw rate (steering times speed)", moving, _NEAR_S
         )
@@ -124,15 +120,21 @@ def find_steering(signals: Mapping[str, Signal], yaw: Floats, speed: Floats, mov
     return Turn(signal, seen, stated, 1 if seen.ratio > 0.0 else -1, True, straight, abs(seen.ratio) * factor, others)
 
 
-def _straight(values: Floats, yaw: Floats, moving: Floats) -> float:
-    """Value of a steering signal while the car goes straight: the median where the yaw rate is smallest."""
-    size = np.abs(yaw)
-    known = np.isfinite(size) & np.isfinite(values) & (moving > 0.0)
+def _straight(values: Floats, yaw: Floats, speed: Floats, moving: Floats) -> float:
+    """Value of a steering signal straight ahead: the intercept of its regression on the curvature; 0 within chance."""
+    known = np.isfinite(yaw) & np.isfinite(values) & np.isfinite(speed) & (moving > 0.0) & (np.abs(speed) > _LEAST_MPS)
     if known.sum() < 100:
         finite = values[np.isfinite(values)]
         return float(np.median(finite)) if len(finite) else 0.0
-    calm = known & (size <= np.quantile(size[known], 0.3))
-    return float(np.median(values[calm]))
+    curvature, own = yaw[known] / speed[known], values[known]
+
+    def intercept(keep: Floats) -> float:
+        slope, at_zero = np.polyfit(curvature[keep], own[keep], 1)
+        return float(at_zero) if np.isfinite(slope) else 0.0
+
+    whole = intercept(np.ones(len(own), bool))
+    half = half_width([intercept(keep) for keep in left_out(own)])
+    return whole if abs(whole) > half else 0.0
 
 
 def _best(
