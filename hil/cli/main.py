@@ -42,6 +42,7 @@ COMMANDS = (
     "hide",
     "prepare",
     "explain",
+    "calibrate",
     "trials",
     "effects",
     "sensitivities",

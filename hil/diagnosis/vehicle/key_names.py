@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from hil.diagnosis.data.log import Floats
 from hil.diagnosis.vehicle.keys import ALIASES, DERIVED, LINE, SPECIAL
 from hil.diagnosis.vehicle.priors import BRAKE_K, CONSTANT_EPSILON_W, Nuisance, NuisanceKind
 from hil.diagnosis.vehicle.quantity_words import DERIVED_UNITS, IN_THETA, LATENCIES, OTHERS, PARAMETERS
@@ -22,6 +23,7 @@ from plant.vectors import PARAMETER
 AXLES = ("front", "rear")
 _OF_PLANT = (NuisanceKind.VEHICLE, NuisanceKind.SIGNED)
 _AREA, _RADIUS, _COG = "friction_brake_piston_area_m2", "friction_brake_effective_radius_m", "vehicle_cog_to_axle_m"
+_GAINS = ("brake_gain_front", "brake_gain_rear")
 _ROW_S = 0.01
 _COG_KEYS = ("cog_to_front_axle_m", "cog_to_rear_axle_m", "front_weight_share")
 _PLACES = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
@@ -74,6 +76,34 @@ def _flat(stem: str) -> str:
         return f"{name}_{AXLES[member]}" if member is not None and PARAMETER.sizes[name] == len(AXLES) else name
     name = ALIASES.get(stem, stem)
     return _COG if name in _COG_KEYS else name if name in SPECIAL or name in PARAMETER.sizes else ""
+
+
+def indices_of(key: str) -> frozenset[int]:
+    """Indices of the plant's parameters that a key of a set states a value of; none for other keys."""
+    if key in DERIVED:
+        name, member, _ = DERIVED[key]
+        own = PARAMETER.slice(name)
+        return frozenset() if member is None else frozenset({min(own.start + member, own.stop - 1)})
+    name = ALIASES.get(key, key)
+    if name in _GAINS:
+        return frozenset({PARAMETER.slice(_AREA).start + _GAINS.index(name)})
+    name = _COG if name in _COG_KEYS else name
+    return frozenset(range(*PARAMETER.slice(name).indices(PARAMETER.size))) if name in PARAMETER.sizes else frozenset()
+
+
+def value_of(key: str, p: Floats, vehicle: Vehicle) -> float | list[float]:
+    """Value of a key of which `indices_of` are some, in its own unit, in parameters ``p`` of the plant."""
+    name = ALIASES.get(key, key)
+    front, rear = p[PARAMETER.slice(_COG)]
+    if name in _COG_KEYS:
+        return float({"cog_to_front_axle_m": front, "cog_to_rear_axle_m": rear}.get(name, rear / (front + rear)))
+    factor = 1.0
+    if key in DERIVED:
+        factor = 1.0 / DERIVED[key][2]
+    elif name in _GAINS:
+        factor = _brake_gain_per_area(vehicle, _GAINS.index(name))
+    values = [factor * float(p[at]) for at in sorted(indices_of(key))]
+    return values[0] if all(value == values[0] for value in values) else values
 
 
 def stated_key(nuisance: Nuisance, quantity: Quantity, stated: Mapping[str, str]) -> str:

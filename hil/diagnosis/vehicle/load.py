@@ -121,9 +121,7 @@ def load_vehicle(source: Path | Mapping[str, Any] | None) -> Vehicle:
     if source is None:
         return paper_car()
     where = str(source) if isinstance(source, Path) else "vehicle"
-    table = _read(source) if isinstance(source, Path) else dict(source)
-    if "vehicle" in table and isinstance(table["vehicle"], Mapping) and "mass_kg" in table["vehicle"]:
-        table = dict(table["vehicle"])
+    table = read_set(source) if isinstance(source, Path) else _flattened(source)
     missing = missing_keys(table)
     table.pop("required", None)
     if missing:
@@ -134,13 +132,26 @@ def load_vehicle(source: Path | Mapping[str, Any] | None) -> Vehicle:
     return replace(_from_flat(table, where), stated=stated_keys(table))
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_set(path: Path) -> dict[str, Any]:
+    """A vehicle set as written.
+
+    Raises
+    ------
+    UnusableError
+        Not TOML, or a draft with a question mark.
+    """
     try:
         text = path.read_text(encoding="utf-8")
         refuse_question_marks(path, text)
-        return tomllib.loads(text)
+        return _flattened(tomllib.loads(text))
     except (OSError, ValueError) as error:
         raise UnusableError(f"{path}: not a vehicle set: {error}") from error
+
+
+def _flattened(table: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of a set, whether they stand in a table ``[vehicle]`` or not."""
+    inner = table.get("vehicle")
+    return dict(inner if isinstance(inner, Mapping) and "mass_kg" in inner else table)
 
 
 @cache

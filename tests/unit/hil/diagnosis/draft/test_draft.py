@@ -74,8 +74,8 @@ def test_what_was_measured_is_the_truth_within_its_interval(usual: Draft) -> Non
     ("channel", "head", "factor", "unit"),
     [
         ("ax_mps2", "accel_long", 1.0 / 9.80665, "g"), ("ax_mps2", "accel_long", 1.0, "m/s2"),
-        ("yaw_rate_rad_s", "yaw", 180.0 / np.pi, "deg/s"), 
-        ("speed_mps", "v_vehicle", 3.6, "km/h"), 
+        ("yaw_rate_rad_s", "yaw", 180.0 / np.pi, "deg/s"),
+        ("speed_mps", "v_vehicle", 3.6, "km/h"),
         ("ay_mps2", "acc_y", 1.0 / 9.80665, "g"), ("steer_rad", "swa", 180.0 / np.pi, "deg"),
         ("ax_mps2", "AX [m/s2]", 1.0 / 9.80665, "g"), ("yaw_rate_rad_s", "yaw [rad/s]", 180.0 / np.pi, "deg/s"),
     ],
