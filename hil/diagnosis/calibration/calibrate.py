@@ -96,7 +96,7 @@ def calibrate(
     fit = Fit(fitter.base, fitter.nuisances, np.asarray(model.z), standard_deviations(diagnosis))
     numbers, others = fitted_numbers(fit, car, table)
     new = with_numbers(table, numbers)
-    _refuse_impossible(new)
+    refuse_impossible(new)
     remarks = [*car.remarks, *(f"{one.log.name}: {text}" for one in dataset.recordings for text in one.log.remarks)]
     if others:
         remarks.append(f"moved, and no key of a set states it, so fitted anew each time: {', '.join(others)}")
@@ -153,7 +153,14 @@ def with_numbers(table: Mapping[str, Any], numbers: Sequence[FittedNumber]) -> d
     return ordered
 
 
-def _refuse_impossible(table: Mapping[str, Any]) -> None:
+def refuse_impossible(table: Mapping[str, Any]) -> None:
+    """Refuse a set with a number beyond the bounds of road vehicles or of the plant.
+
+    Raises
+    ------
+    UnusableError
+        With the key and its bounds.
+    """
     try:
         load_vehicle(table)
     except UnusableError as error:

@@ -75,39 +75,39 @@ def fitted_numbers(fit: Fit, vehicle: Vehicle, table: Mapping[str, Any]) -> tupl
 
     ``table`` is the set as written.
     """
-    stated = {key for key, value in table.items() if not key.endswith("_tolerance") and not isinstance(value, str)}
+    stated = [key for key, value in table.items() if not key.endswith("_tolerance") and not isinstance(value, str)]
     by_key: dict[str, list[int]] = {}
     others = []
     for k, nuisance in enumerate(fit.nuisances):
         if fit.sd[k] > _LEARNED:
             continue
-        key = _key(nuisance, vehicle, stated)
-        if key:
+        keys = _keys(nuisance, vehicle, stated)
+        for key in keys:
             by_key.setdefault(key, []).append(k)
-        elif abs(fit.z[k]) > 1.0:
+        if not keys and abs(fit.z[k]) > 1.0:
             others.append(f"{nuisance.name} by {HALF_WIDTH_TO_SIGMA * fit.z[k]:+.1f} tolerances")
     numbers = [_number(fit, vehicle, key, at, key in stated) for key, at in by_key.items()]
     found = [one for one in numbers if one is not None]
     return sorted(found, key=lambda one: -abs(one.moved)), others
 
 
-def _key(nuisance: Nuisance, vehicle: Vehicle, stated: set[str]) -> str:
-    """The key that states a nuisance: that of the set, else a new one; empty where none may.
+def _keys(nuisance: Nuisance, vehicle: Vehicle, stated: Sequence[str]) -> list[str]:
+    """Keys that state what a nuisance moves: those of the set, else a new one; none where none may.
 
     A first key of a section that the set leaves out would make the section count as stated, all of its limits with it.
     """
     if nuisance.kind is NuisanceKind.LATENCY:
-        return key_of(LATENCY_NODES[nuisance.at[0]])
+        return [key_of(LATENCY_NODES[nuisance.at[0]])]
     if nuisance.kind not in (NuisanceKind.VEHICLE, NuisanceKind.SIGNED):
-        return ""
-    for key in stated:
-        if not indices_of(key).isdisjoint(nuisance.at):
-            return key
+        return []
+    keys = [key for key in stated if not indices_of(key).isdisjoint(nuisance.at)]
+    if keys:
+        return keys
     what = quantity(nuisance, vehicle)
     name = next(n for n in PARAMETER.sizes if PARAMETER.slice(n).start <= nuisance.at[0] < PARAMETER.slice(n).stop)
-    section = "" if name.startswith("vehicle") else split_name(name)[0]
+    section, _ = split_name(name)
     closed = section == "pad" or section in vehicle.unstated
-    return what.key if not closed and set(nuisance.at) <= indices_of(what.key) else ""
+    return [what.key] if not closed and not indices_of(what.key).isdisjoint(nuisance.at) else []
 
 
 def _number(fit: Fit, vehicle: Vehicle, key: str, at: Sequence[int], stated: bool) -> FittedNumber | None:

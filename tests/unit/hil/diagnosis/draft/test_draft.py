@@ -200,10 +200,8 @@ def test_units_are_chosen_together() -> None:
 @pytest.mark.slow
 def test_our_own_bus_in_strangers_names_goes_all_the_way(tmp_path, capsys) -> None:
     """A recording, written as somebody else would, drafted, filled in with the sheet's numbers, and explained."""
-    recorded = []
-    for scenario in ("brake_in_turn", "regeneration_pulses"):
-        assert main(["run", scenario, "--virtual", "--out", str(tmp_path / scenario), "--json"]) == 0
-        recorded += read_logs([tmp_path / scenario / "recording.log"])
+    assert main(["run", "brake_in_turn", "--virtual", "--out", str(tmp_path / "run"), "--json"]) == 0
+    recorded = read_logs([tmp_path / "run" / "recording.log"])
     shipped = load_vehicle(None).parameters
     radius = float(shipped.wheel.rolling_radius_m)
     heads = {name: head for name, head in strange.HEADS.items() if name != "speed_mps"}
@@ -229,5 +227,6 @@ def test_our_own_bus_in_strangers_names_goes_all_the_way(tmp_path, capsys) -> No
     options = ["--map", str(tmp_path / "CHANNELS.toml"), "--vehicle", str(tmp_path / "SET.toml"), "--json"]
     assert main(["explain", *files, *options]) == 0
     answer = json.loads(capsys.readouterr().out)
-    assert answer["verdict"] in ("none", "not_testable", "named", "cannot_tell_apart")
-    assert answer["goodness_of_fit"]["channels"]
+    assert answer["verdict"] not in ("unusable", "model_does_not_describe")  # pads that fade are told as one gain
+    assert {one["column"] for one in answer["channels_read"]} >= {"WhlSpd_FL", "Acc_X", "GyroYaw", "pBrakeFL"}
+    assert answer["held_out_error"]["wheel_speed"]["after"] < answer["held_out_error"]["wheel_speed"]["before"]
