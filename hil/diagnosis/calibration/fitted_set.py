@@ -114,7 +114,7 @@ def _number(fit: Fit, vehicle: Vehicle, key: str, at: Sequence[int], stated: boo
     """A key and the nuisances ``at`` that move it."""
 
     def read(z: Floats) -> Value:
-        return _value(key, fit.at(z), vehicle)
+        return _value(key, fit.at(z))
 
     zero = np.zeros(len(fit.z))
     z = zero.copy()
@@ -140,8 +140,8 @@ def _half_width(read: Callable[[Floats], Value], z: Floats, k: int, sd: float) -
     return float(np.max(np.abs(np.subtract(read(z + step), read(z - step))))) / 2.0
 
 
-def _value(key: str, parameters: ParameterSet, vehicle: Vehicle) -> Value:
+def _value(key: str, parameters: ParameterSet) -> Value:
     for node, late in zip(LATENCY_NODES, parameters.latency_s, strict=True):
         if key == key_of(node):
             return late
-    return value_of(key, parameters.p, vehicle)
+    return value_of(key, parameters.p)

@@ -16,9 +16,10 @@ from hil.diagnosis.data.log import Floats
 from hil.diagnosis.vehicle.keys import ALIASES, DERIVED, LINE, SPECIAL
 from hil.diagnosis.vehicle.priors import BRAKE_K, CONSTANT_EPSILON_W, Nuisance, NuisanceKind
 from hil.diagnosis.vehicle.quantity_words import DERIVED_UNITS, IN_THETA, LATENCIES, OTHERS, PARAMETERS
-from hil.diagnosis.vehicle.spec import Vehicle, rest_friction
+from hil.diagnosis.vehicle.spec import Vehicle
+from plant.friction import mu_equilibrium
 from plant.injection.theta import THETA
-from plant.vectors import PARAMETER
+from plant.vectors import PARAMETER, P
 
 AXLES = ("front", "rear")
 _OF_PLANT = (NuisanceKind.VEHICLE, NuisanceKind.SIGNED)
@@ -91,7 +92,7 @@ def indices_of(key: str) -> frozenset[int]:
     return frozenset(range(*PARAMETER.slice(name).indices(PARAMETER.size))) if name in PARAMETER.sizes else frozenset()
 
 
-def value_of(key: str, p: Floats, vehicle: Vehicle) -> float | list[float]:
+def value_of(key: str, p: Floats) -> float | list[float]:
     """Value of a key of which `indices_of` are some, in its own unit, in parameters ``p`` of the plant."""
     name = ALIASES.get(key, key)
     front, rear = p[PARAMETER.slice(_COG)]
@@ -101,7 +102,7 @@ def value_of(key: str, p: Floats, vehicle: Vehicle) -> float | list[float]:
     if key in DERIVED:
         factor = 1.0 / DERIVED[key][2]
     elif name in _GAINS:
-        factor = _brake_gain_per_area(vehicle, _GAINS.index(name))
+        factor = _brake_gain_per_area(p, _GAINS.index(name))
     values = [factor * float(p[at]) for at in sorted(indices_of(key))]
     return values[0] if all(value == values[0] for value in values) else values
 
@@ -143,7 +144,7 @@ def _of_plant(nuisance: Nuisance, vehicle: Vehicle) -> Quantity:
     pair = own.stop - own.start == len(AXLES)
     axle = AXLES[nuisance.at[0] - own.start] if pair and len(nuisance.at) == 1 else ""
     if name == _AREA:
-        factor = _brake_gain_per_area(vehicle, AXLES.index(axle))
+        factor = _brake_gain_per_area(vehicle.p, AXLES.index(axle))
         what = PARAMETERS["brake_gain"]
         return Quantity(f"brake_gain_{axle}_nm_pa", what, "N m/Pa", axle, lambda area: factor * area)
     if name == _COG:
@@ -174,12 +175,12 @@ def _of_theta(nuisance: Nuisance) -> Quantity:
     return Quantity(nuisance.name if has_key else "", what, unit, location, _same, False)
 
 
-def _brake_gain_per_area(vehicle: Vehicle, axle: int) -> float:
+def _brake_gain_per_area(p: Floats, axle: int) -> float:
     """Brake gain at the temperature it is stated at (`hil.diagnosis.vehicle.spec.with_gains`) per piston area."""
-    brake = vehicle.parameters.friction_brake
-    is_constant = vehicle.parameters.pad.epsilon_w >= CONSTANT_EPSILON_W
-    mu = rest_friction(vehicle.parameters, brake.ambient_k if is_constant else BRAKE_K)
-    return float(2.0 * mu * brake.efficiency * brake.effective_radius_m[axle])
+    epsilon = float(p[P.pad_epsilon_w])
+    temperature = float(p[P.friction_brake_ambient_k]) if epsilon >= CONSTANT_EPSILON_W else BRAKE_K
+    mu = mu_equilibrium(0.0, temperature, float(p[P.pad_a_1_ks]), float(p[P.pad_b_1_j]), epsilon)
+    return float(2.0 * mu * p[P.friction_brake_efficiency] * p[PARAMETER.slice(_RADIUS)][axle])
 
 
 def _same(value: float) -> float:

@@ -45,8 +45,8 @@ def _fit(table: dict, moved: dict[str, float], sd: float = 0.3) -> tuple[Fit, ob
 def test_every_key_reads_back_as_it_was_stated(more: dict) -> None:
     table = TABLE | more
     car = load_vehicle(table)
-    read = {key: value_of(key, car.p, car) for key in table if indices_of(key)}
-    assert len(read) == 7 + len(more.keys() - TABLE.keys())
+    read = {key: value_of(key, car.p) for key in table if indices_of(key)}
+    assert len(read) == 8 + len(more.keys() - TABLE.keys())
     for key, value in read.items():
         assert value == pytest.approx(table[key]), key
 
