@@ -65,9 +65,9 @@ def _unit(found: Brakes) -> tuple[str, bool, list[str]]:
     """Unit, whether the map can have it, and what is open."""
     fitting = ", ".join(written(unit) for unit in found.units)
     if found.stated:
-        doubt = _shown(found) and found.stated not in found.units
+        unusual = _shown(found) and found.stated not in found.units
         said = f"the unit stated is {written(found.stated)}; a road car's brakes say: {fitting or 'none'}"
-        return found.stated, True, [said] if doubt else []
+        return found.stated, True, [said] if unusual else []
     if not _shown(found):
         return "", False, ["its unit and scale: too little braking shows in the motion"]
     usual = [unit for unit in found.units if unit in _USUAL]

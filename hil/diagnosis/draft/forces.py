@@ -37,7 +37,7 @@ class Forced:
 
 @dataclass(frozen=True, eq=False)
 class Brakes:
-    """Pressures: one signal a wheel, or one for all; ``demand`` where the name says that it is asked for.
+    """Pressures: one signal a wheel, or one for all; ``demand`` where its name is that of a demand.
 
     ``evidence`` compares the deceleration with the pressure while it is applied; ``per_unit`` is m/s2 for one of the
     signal's unit (mean over the wheels), with its interval; ``units`` are those in which that is a road car's.
