@@ -106,6 +106,17 @@ def _best_lag(x: Floats, y: Floats, known: Floats, longest_s: float) -> float | 
     return float(lags[best] + (0.5 * (before - after) / bend if bend < 0.0 else 0.0))
 
 
+def without(values: Floats, others: Sequence[Floats]) -> Floats:
+    """What is left of values (rows,) after a regression on others, (rows,) each, and a constant; NaN where one is."""
+    known = np.all(np.isfinite([values, *others]), axis=0)
+    if not others or known.sum() < _LEAST_SAMPLES:
+        return values
+    x = np.column_stack([np.ones(int(known.sum())), *(other[known] for other in others)])
+    out = np.full(len(values), np.nan)
+    out[known] = values[known] - x @ np.linalg.lstsq(x, values[known], rcond=None)[0]
+    return out
+
+
 def _earlier(values: Floats, rows: int) -> Floats:
     """Values ``rows`` earlier, NaN beyond the ends."""
     out = np.full(len(values), np.nan)

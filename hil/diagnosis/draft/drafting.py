@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from hil.diagnosis.data.log import UnusableError, four
 from hil.diagnosis.draft.force_guesses import brake_guesses, motor_guesses, share_guesses
-from hil.diagnosis.draft.forces import Forced, motor_sums
+from hil.diagnosis.draft.forces import Forced, motor_sums, pressure_sums
 from hil.diagnosis.draft.guess import Draft, Guess
 from hil.diagnosis.draft.motion_guesses import (
     ax_guess,
@@ -55,7 +55,11 @@ def draft(signals: Signals) -> Draft:
     turns, numbers, remarks = turn_guesses(rest, speeds, units, speed)
     guesses += turns
     brakes, products = brake_guesses(rest, Forced(accel, speed, motor_sums(rest)))
-    guesses += [*brakes, *motor_guesses(rest, accel, speeds.moving), *share_guesses(rest, accel, speeds.moving)]
+    guesses += [
+        *brakes,
+        *motor_guesses(rest, Forced(accel, speed, pressure_sums(rest)), speeds.moving),
+        *share_guesses(rest, accel, speeds.moving),
+    ]
     numbers = [*rolling_radius(speeds, units, scales), *numbers, *products]
     mapped = {one.channel for one in guesses if one.complete}
     braked = any(name.startswith("pressure") for name in mapped)

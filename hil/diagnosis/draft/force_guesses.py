@@ -12,6 +12,8 @@ from hil.diagnosis.draft.signals import Signal
 
 _SHOWS = 0.6
 _USUAL = ("bar", "mpa", "kpa", "pa")
+_AFTER_S = 0.2
+"""Lag behind the deceleration that is no filter's: motors that brake first leave up to 0.15 s beside it."""
 _TORQUES = ("torques are those at the wheels, gear ratio counted; driving is positive",)
 _GAIN = "brake_gain_front_nm_pa"
 
@@ -25,13 +27,15 @@ def brake_guesses(signals: Mapping[str, Signal], motion: Forced) -> tuple[list[G
         if found is None:
             continue
         unit, complete, unknown = _unit(found)
-        sign = 1 if found.evidence is None or found.evidence.ratio < 0.0 or not _shown(found) else -1
+        sign = -1 if _shown(found) and found.per_unit > 0.0 else 1
         one_for_all = len({one.name for one in found.signals.values()}) == 1
         if one_for_all:
             unknown.append(
                 "whose pressure it is: one signal for four wheels (master cylinder, a circuit, or a request)"
             )
         check: tuple[str, ...] = ("pressures are positive",)
+        if _shown(found) and found.evidence is not None and found.evidence.lag_s > _AFTER_S:
+            check = (*check, "its stamps: the car slows before it, which no brake does")
         if not complete:
             check = (*check, "with a scale here, add both brake gains to `required` in the vehicle set")
         measured = []
@@ -96,11 +100,11 @@ def _product(found: Brakes, unit: str) -> list[SetNumber]:
     return [SetNumber(_GAIN, text)]
 
 
-def motor_guesses(signals: Mapping[str, Signal], accel: Floats, moving: Floats) -> list[Guess]:
+def motor_guesses(signals: Mapping[str, Signal], motion: Forced, moving: Floats) -> list[Guess]:
     """Guesses of the motor torques, measured and demanded."""
     guesses = []
     for demand, channels in ((False, MOTOR_TORQUE), (True, MOTOR_DEMAND)):
-        found = find_motors(signals, accel, moving, demand)
+        found = find_motors(signals, motion, moving, demand)
         if found is None:
             continue
         seen = found.evidence

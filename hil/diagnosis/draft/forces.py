@@ -8,7 +8,7 @@ import numpy as np
 from hil.diagnosis.data.log import WHEELS, Floats
 from hil.diagnosis.data.trial.motion import STEP_S, filtered
 from hil.diagnosis.data.units import OF_CHANNEL
-from hil.diagnosis.draft.compare import Evidence, compared, half_width, left_out
+from hil.diagnosis.draft.compare import Evidence, compared, half_width, left_out, without
 from hil.diagnosis.draft.names import kinds, known_unit, quantity, wheel_of, words
 from hil.diagnosis.draft.signals import Signal
 
@@ -108,7 +108,9 @@ def _brakes(
     applied = (np.abs(smooth) > _APPLIED * top) & (np.abs(speed) > _SLOW_MPS) & np.isfinite(accel) & (top > 0.0)
     if applied.sum() * STEP_S >= _LEAST_S:
         wide = np.convolve(applied, np.ones(51), mode="same") > 0.5  # the way up and down shows the lag
-        seen = compared(accel, smooth, "the acceleration", np.where(wide & (np.abs(speed) > _SLOW_MPS), 1.0, 0.0), 0.5)
+        against = "the acceleration without what the motors make" if motion.others else "the acceleration"
+        left = [without(np.where(wide, values, np.nan), motion.others) for values in (accel, smooth)]
+        seen = compared(left[0], left[1], against, np.where(np.abs(speed) > _SLOW_MPS, 1.0, 0.0), 0.5)
         slope, interval = _per_unit(smooth, motion, wide)
     units: tuple[str, ...] = ()
     if seen is not None and abs(seen.correlation) > _SHOWS and slope != 0.0:
@@ -142,8 +144,8 @@ class Motors:
     evidence: Evidence | None
 
 
-def find_motors(signals: Mapping[str, Signal], accel: Floats, moving: Floats, demand: bool) -> Motors | None:
-    """Motor torques of four wheels, or of the wheels of one axle."""
+def find_motors(signals: Mapping[str, Signal], motion: Forced, moving: Floats, demand: bool) -> Motors | None:
+    """Motor torques of four wheels, or of the wheels of one axle; ``motion.others`` are pressures, taken off."""
     by_wheel, _ = four_of(
         {n: s for n, s in signals.items() if "torque" in kinds(n, s.unit)}, "torque", "motor_torque", demand
     )
@@ -151,8 +153,9 @@ def find_motors(signals: Mapping[str, Signal], accel: Floats, moving: Floats, de
     chosen = {wheel: by_wheel[wheel] for wheel in WHEELS if wheel[0] in axles}
     if not chosen:
         return None
-    total = np.asarray(np.sum([one.values for one in chosen.values()], axis=0))
-    seen = compared(accel, filtered(total), "the acceleration", moving, 0.5)
+    total = filtered(np.sum([one.values for one in chosen.values()], axis=0))
+    against = "the acceleration without what the brakes make" if motion.others else "the acceleration"
+    seen = compared(without(motion.accel, motion.others), without(total, motion.others), against, moving, 0.5)
     return Motors(chosen, demand, known_unit(next(iter(chosen.values())).unit), seen)
 
 
@@ -163,6 +166,15 @@ def motor_sums(signals: Mapping[str, Signal]) -> tuple[Floats, ...]:
             {n: s for n, s in signals.items() if "torque" in kinds(n, s.unit)}, "torque", "motor_torque", demand
         )
         if len(by_wheel) >= 2:
+            return (filtered(np.sum([one.values for one in by_wheel.values()], axis=0)),)
+    return ()
+
+
+def pressure_sums(signals: Mapping[str, Signal]) -> tuple[Floats, ...]:
+    """The filtered sum of the pressures (rows,), measured, else demanded; none without pressures."""
+    for demand in (False, True):
+        by_wheel, _ = four_of(signals, "pressure", "pressure", demand)
+        if by_wheel:
             return (filtered(np.sum([one.values for one in by_wheel.values()], axis=0)),)
     return ()
 

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import outsider
 import pytest
 import strange_logs as strange
 
@@ -195,6 +196,29 @@ def test_units_are_chosen_together() -> None:
     assert stated.radius_m == pytest.approx(0.32, abs=0.01)
     with_ground = unit_choices(Scales("", "m/s", (), 0.31, (), 90.0, 10.0))[0]
     assert (with_ground.wheel, with_ground.ground) == ("rad/s", "m/s")
+
+
+def test_a_car_that_somebody_else_wrote(tmp_path) -> None:
+    """Four motors and four brakes in anybody's names: torques by wheel, demands apart from what was measured."""
+    log = outsider.drive("mixed", 11, lambda v, p: np.ones(4))
+    heads = {"t_s": ("t_s", 1.0), "speed_mps": ("vGround [km/h]", 3.6), "ax_mps2": ("along [mg]", 1e3 / 9.80665)}
+    for wheel, place in zip(strange.WHEELS, ("VL", "VR", "HL", "HR"), strict=True):
+        heads |= {
+            f"wheel_speed_{wheel}_rad_s": (f"Raddrehzahl_{place} [1/min]", 30.0 / np.pi),
+            f"pressure_{wheel}_pa": (f"Bremsdruck_{place} [MPa]", 1e-6),
+            f"pressure_demand_{wheel}_pa": (f"Bremsdruck_Soll_{place} [MPa]", 1e-6),
+            f"motor_torque_{wheel}_nm": (f"Moment_{place} [Nm]", -1.0),
+            f"motor_torque_demand_{wheel}_nm": (f"Moment_Soll_{place} [Nm]", -1.0),
+        }
+    found = _drafted(tmp_path, log, heads)
+    guesses = _guesses(found)
+    assert len(guesses) == 4 * 5 + 2
+    for channel, guess in guesses.items():
+        assert heads[channel][0].startswith(f"{guess.signal} [")
+        assert guess.sign == (-1 if channel.startswith("motor") else 1)
+    assert {guesses[name].unit for name in (WHEEL_SPEED[0], "ax_mps2", PRESSURE[0])} == {"rpm", "mg", "mpa"}
+    radius = next(one for one in found.numbers if one.key == "rolling_radius_m")
+    assert radius.value == pytest.approx(outsider.VEHICLE["rolling_radius_m"], rel=0.01)
 
 
 @pytest.mark.slow
