@@ -43,13 +43,14 @@ def read_logs(
     UnusableError, hil.log.frames.LogError
         A file that cannot be used: the message says why.
     """
-    files = [file for path in paths for file in _files(path)]
+    files = [file for path in paths for file in files_of(path)]
     if not files:
         raise UnusableError(f"no log in {', '.join(map(str, paths))}; give log files or a folder of them")
     return [_with_log_facts(read_one(file, database, channel_map, torque_constant_nm_a), file, about) for file in files]
 
 
-def _files(path: Path) -> list[Path]:
+def files_of(path: Path) -> list[Path]:
+    """The logs in a folder; a file itself."""
     if not path.is_dir():
         return [path]
     suffixes = {*_TABLES, ".log", ".asc", ".blf", ".trc", ".pcap", ".pcapng", ".gz"}

@@ -9,7 +9,7 @@ import numpy as np
 from dbc.database import Database
 from hil.diagnosis.data.channels_read import GAP_S
 from hil.diagnosis.data.log import Floats, UnusableError
-from hil.diagnosis.data.read import read_samples
+from hil.diagnosis.data.read import files_of, read_samples
 from hil.diagnosis.data.trial.motion import STEP_S
 
 _MOST_S = 1200.0
@@ -69,9 +69,9 @@ def read_signals(paths: Sequence[Path], database: Database | None) -> Signals:
     UnusableError
         No log, or one without a signal; a CAN log without a database.
     """
-    files = [read_samples(path, database) for path in paths]
+    files = [read_samples(file, database) for path in paths for file in files_of(path)]
     if not files:
-        raise UnusableError("no log; give at least one")
+        raise UnusableError(f"no log in {', '.join(map(str, paths))}; give log files or a folder of them")
     spans = [_span(one.series) for one in files]
     counts = [max(int((end - begin) / STEP_S), 1) for begin, end in spans]
     rows = sum(counts) + _BETWEEN_ROWS * (len(counts) - 1)
