@@ -19,10 +19,10 @@ _BETWEEN_ROWS = 150
 _LEAST_SAMPLES = 50
 _STATES = 3
 """Distinct values up to which a signal is a state or a flag."""
-_JUMP, _JUMPS, _EVEN = 0.5, 0.01, 2.2
-"""A signal that moves by half of its range from one sample to the next, once in a hundred, and whose values are spread
-evenly, is a counter, a check value or has bits of another signal: a counter of four bits jumps once in sixteen, a check
-value every fourth time. Spread evenly is a kurtosis of 1.8; noise has 3."""
+_JUMP, _EVEN, _CHECK, _COUNTER, _ONE_WAY = 0.5, 2.2, 0.1, 0.01, 0.8
+"""A signal whose values are spread evenly and that moves by half of its range from one sample to the next is a check
+value (every fourth time) or a counter (one of four bits once in sixteen, and nearly always down), or has their bits. A
+brake that is on or off jumps as often up as down. Spread evenly is a kurtosis of 1.8; noise has 3."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +120,11 @@ def _unusable(values: Floats) -> str:
     if len(np.unique(values[:20000])) <= _STATES:
         return "a state or a flag: three values at most"
     scaled = (values - values.mean()) / values.std()
-    even = float(np.mean(scaled**4)) < _EVEN
-    if even and float(np.mean(np.abs(np.diff(values)) > _JUMP * span)) > _JUMPS:
+    steps = np.diff(values)
+    jumps = steps[np.abs(steps) > _JUMP * span]
+    one_way = max(float(np.mean(jumps > 0.0)), float(np.mean(jumps < 0.0))) if len(jumps) else 0.0
+    share = len(jumps) / len(steps)
+    if float(np.mean(scaled**4)) < _EVEN and (share > _CHECK or (share > _COUNTER and one_way > _ONE_WAY)):
         return "jumps from sample to sample: a counter, a check value, or bits that belong to another signal"
     return ""
 

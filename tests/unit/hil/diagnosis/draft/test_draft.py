@@ -121,10 +121,16 @@ def test_a_pressure_of_unknown_scale_stays_a_comment(tmp_path) -> None:
     assert "# scale = ?" in map_file.read_text("utf-8")
 
 
-def test_a_counter_is_no_pressure(tmp_path) -> None:
-    counter = (np.arange(len(CHANNELS["t_s"])) * 4096) % 65536
-    found = _drafted(tmp_path, {**CHANNELS, "n": counter}, {**strange.HEADS, "n": ("BrakePressure2 [bar]", 1.0)})
-    assert "counter" in found.left_out["BrakePressure2"]
+@pytest.mark.parametrize(("kind", "left_out"), [("counter", True), ("check value", True), ("on or off", False)])
+def test_counters_and_check_values_are_no_pressures(tmp_path, kind, left_out) -> None:
+    n = len(CHANNELS["t_s"])
+    values = {
+        "counter": (np.arange(n) * 4096) % 65536,
+        "check value": np.random.default_rng(1).integers(0, 256, n),
+        "on or off": np.where(np.arange(n) % 60 < 30, 40.0, 0.0) + np.arange(n) % 7,
+    }[kind]
+    found = _drafted(tmp_path, {**CHANNELS, "n": values}, {**strange.HEADS, "n": ("BrakePressure2 [bar]", 1.0)})
+    assert ("BrakePressure2" in found.left_out) is left_out
 
 
 def test_signs_that_all_turn_leave_two_readings(tmp_path) -> None:
