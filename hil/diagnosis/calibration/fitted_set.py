@@ -11,8 +11,9 @@ import numpy as np
 
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.simulation.parameter_set import ParameterSet
+from hil.diagnosis.vehicle.bounds import bounds_of
 from hil.diagnosis.vehicle.key_names import indices_of, quantity, value_of
-from hil.diagnosis.vehicle.keys import split_name
+from hil.diagnosis.vehicle.keys import ALIASES, split_name
 from hil.diagnosis.vehicle.latency import LATENCY_NODES, key_of
 from hil.diagnosis.vehicle.priors import HALF_WIDTH_TO_SIGMA, Nuisance, NuisanceKind
 from hil.diagnosis.vehicle.spec import Vehicle
@@ -127,9 +128,10 @@ def _number(fit: Fit, vehicle: Vehicle, key: str, at: Sequence[int], stated: boo
     most = max(at, key=lambda k: abs(fit.z[k]))
     nuisance = fit.nuisances[most]
     what = quantity(nuisance, vehicle)
+    unit = what.unit if key == what.key else bounds_of(ALIASES.get(key, key))[2]
     bounded = not nuisance.lower + 1e-3 < fit.z[most] < nuisance.upper - 1e-3 and abs(fit.z[most]) > 1e-3
     return FittedNumber(
-        key, what.unit, what.what, stated, before, after, wide, left, HALF_WIDTH_TO_SIGMA * float(fit.z[most]), bounded
+        key, unit, what.what, stated, before, after, wide, left, HALF_WIDTH_TO_SIGMA * float(fit.z[most]), bounded
     )
 
 
