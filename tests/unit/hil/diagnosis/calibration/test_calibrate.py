@@ -75,6 +75,7 @@ def test_what_was_fitted_moves_and_all_else_stays() -> None:
         pytest.approx(60.0, rel=0.01),
         pytest.approx(18.0, rel=0.01),
     )
+    assert (mass.unit, by_key["threshold_pressure_pa"].unit) == ("kg", "Pa")
     assert by_key["threshold_pressure_pa"].after == pytest.approx([4e4, 7e4], rel=0.01)
     new = with_numbers(TABLE | {"required": ["mass_kg"]}, numbers)
     kept = {key: value for key, value in TABLE.items() if key.removesuffix("_tolerance") not in by_key}
