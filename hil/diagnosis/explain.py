@@ -132,7 +132,11 @@ def _logs(
     logs: Any, car: Vehicle, channel_map: Path | None, database: Path | None, about: Path | None, stated: bool
 ) -> Sequence[Log]:
     items = list(logs) if isinstance(logs, list | tuple) else [logs]
-    mapped = None if channel_map is None else load_map(shipped(Path(channel_map), "map"))
+    mapped = (
+        None
+        if channel_map is None
+        else load_map(shipped(Path(channel_map), "map"), float(car.parameters.wheel.rolling_radius_m))
+    )
     dbc = None
     if database is not None:
         dbc = parse_database(Path(database).read_bytes(), str(database))

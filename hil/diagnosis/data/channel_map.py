@@ -1,5 +1,6 @@
 """Channel map (``--map CHANNELS.toml``): another car's signals as our channels, and the units they may have."""
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ import numpy as np
 from hil.diagnosis.data.log import CHANNELS, Floats, UnusableError
 from hil.diagnosis.data.units import ROAD_SPEED, TO_SI, units_of, written
 
+_QUESTION = re.compile(r"^\s*([A-Za-z_0-9]+)\s*=\s*\?")
 Series = tuple[Floats, Floats]
 """Times (s) and values of one signal, both (samples,)."""
 
@@ -85,8 +87,21 @@ class ChannelMap:
         return t, np.asarray(values, np.float64) * source.factor + source.offset
 
 
-def load_map(path: Path) -> ChannelMap:
-    """Read a channel map.
+def refuse_question_marks(path: Path, text: str) -> None:
+    """Refuse a draft (`brakebench prepare`) in which a number is still a question mark.
+
+    Raises
+    ------
+    UnusableError
+        With the lines.
+    """
+    marked = [f"{key} (line {k})" for k, line in enumerate(text.splitlines(), 1) for key in _QUESTION.findall(line)]
+    if marked:
+        raise UnusableError(f"{path}: not filled in: {', '.join(marked)}: write a number, or # before the line")
+
+
+def load_map(path: Path, radius_m: float | None = None) -> ChannelMap:
+    """Read a channel map; wheel speeds in units of the road are divided by the rolling radius, if that is given.
 
     One table per channel: ``[ax_mps2]`` with ``signal`` ("MESSAGE.SIGNAL" or a column), and optionally ``unit``,
     ``scale``, ``sign`` (+1/-1) and ``offset`` (SI, added last). ``time = "column"`` at the top names a time column.
@@ -97,7 +112,9 @@ def load_map(path: Path) -> ChannelMap:
         Not TOML; an unknown channel, key or unit.
     """
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        refuse_question_marks(path, text)
+        table = tomllib.loads(text)
     except (OSError, ValueError) as error:
         raise UnusableError(f"{path}: not a channel map: {error}") from error
     time = table.pop("time", None)
@@ -112,7 +129,9 @@ def load_map(path: Path) -> ChannelMap:
         if "signal" not in entry or unknown:
             raise UnusableError(f"{where}: expected signal, unit, scale, sign, offset, got {', '.join(entry)}")
         unit = str(entry.get("unit", ""))
-        factor, offset = channel_to_si(target, unit, where, "scale" in entry)
+        on_road = target.startswith("wheel_speed") and unit.strip().lower() in ROAD_SPEED and "scale" not in entry
+        factor, offset = channel_to_si(target, unit, where, "scale" in entry or (on_road and radius_m is not None))
+        factor /= radius_m if on_road and radius_m is not None else 1.0
         factor *= float(entry.get("scale", 1.0)) * float(entry.get("sign", 1.0))
         entries[target] = Source(str(entry["signal"]), factor, offset + float(entry.get("offset", 0.0)), unit)
     return ChannelMap(entries, None if time is None else str(time))

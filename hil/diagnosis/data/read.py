@@ -2,7 +2,7 @@
 
 import tomllib
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,8 @@ from hil.diagnosis.data.time_column import NAMES, times_s
 from hil.log import DecodedLog, decode_log, log_format, read_log
 
 _GRID_S = 0.01
+_MOTION, _SLOW_S = ("ax_mps2", "ay_mps2", "yaw_rate_rad_s", "speed_mps"), 0.04
+"""Channels of the motion, and the time between two samples from which on one is slow: the cells of a comparison."""
 _TABLES = (".csv", ".parquet", ".mf4", ".mdf", ".mat")
 _CSV_FRAMES = ("csv", "python_can_csv", "gvret")
 """Formats of frames with the suffix of a table; rows of numbers between tabs look like other logs of frames."""
@@ -41,13 +43,14 @@ def read_logs(
     UnusableError, hil.log.frames.LogError
         A file that cannot be used: the message says why.
     """
-    files = [file for path in paths for file in _files(path)]
+    files = [file for path in paths for file in files_of(path)]
     if not files:
         raise UnusableError(f"no log in {', '.join(map(str, paths))}; give log files or a folder of them")
     return [_with_log_facts(read_one(file, database, channel_map, torque_constant_nm_a), file, about) for file in files]
 
 
-def _files(path: Path) -> list[Path]:
+def files_of(path: Path) -> list[Path]:
+    """The logs in a folder; a file itself."""
     if not path.is_dir():
         return [path]
     suffixes = {*_TABLES, ".log", ".asc", ".blf", ".trc", ".pcap", ".pcapng", ".gz"}
@@ -95,10 +98,58 @@ def read_one(
         units = {target: channel_map.entries[target].unit for target in targets}
         signals = {target: channel_map.entries[target].signal for target in targets}
         converted = {target: channel_map.convert(target, series) for target in targets}
-        return replace(_gridded(path.name, converted, signals, units, tuple(decoded.columns)), another_car=True)
+        gridded = _gridded(path.name, converted, signals, units, tuple(decoded.columns), sparse=True)
+        return replace(gridded, another_car=True)
     if database is not None:
         raise UnusableError(f"{path.name}: another car's DBC needs --map CHANNELS.toml, its signals by channel")
     return _brakebench_log(path.name, decoded, torque_constant_nm_a)
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """All signals of one file as they came: times, s, and values by name, units as stated; ``time`` of a table."""
+
+    name: str
+    series: Mapping[str, tuple[Floats, Floats]]
+    units: Mapping[str, str]
+    time: str | None = None
+
+
+def read_samples(path: Path, database: Database | None = None) -> Samples:
+    """Every signal of a file, whatever it is called.
+
+    Raises
+    ------
+    UnusableError
+        A table without times; a CAN log of another car without ``database``, or one that it does not describe.
+    """
+    columns = None if database is not None else _table_columns(path, NAMES)
+    if columns is not None:
+        time, t_s, _ = times_s(path.name, columns, _time_of(columns))
+        own = {
+            key: (t_s, one.values) if one.own_t_s is None or one.own_values is None else (one.own_t_s, one.own_values)
+            for key, one in columns.items()
+            if key != time
+        }
+        return Samples(path.name, own, {key: one.unit for key, one in columns.items()}, None if time in NAMES else time)
+    decoded = decode_log(read_log(path), database)
+    if database is None and own_channels(decoded, 1.0):
+        raise UnusableError(f"{path.name}: a recording of brakebench's own bus: `explain` takes it without a map")
+    if not decoded.columns:
+        how = "none of its messages is in the DBC" if database is not None else "another car's frames need its --dbc"
+        raise UnusableError(f"{path.name}: no signal in it: {how}")
+    units = {name: column.signal.unit or "" for name, column in decoded.columns.items()}
+    return Samples(path.name, {name: decoded.series(name) for name in decoded.columns}, units)
+
+
+def _time_of(columns: Mapping[str, Column]) -> str | None:
+    """The time column where it has none of the usual names: the first whose name begins so and whose values grow."""
+    if any(key in columns for key in NAMES):
+        return None
+    named = [key for key in columns if key.lower().startswith(("time", "zeit", "t_", "stamp")) or key.lower() == "t"]
+    return next(
+        (key for key in named if len(columns[key].values) > 1 and np.diff(columns[key].values).min() >= 0), None
+    )
 
 
 def _brakebench_log(name: str, decoded: DecodedLog, torque_constant_nm_a: float) -> Log:
@@ -111,11 +162,12 @@ def _brakebench_log(name: str, decoded: DecodedLog, torque_constant_nm_a: float)
 
 def _gridded(
     name: str, series: Mapping[str, tuple[Floats, Floats]], signals: Mapping[str, str], units: Mapping[str, str],
-    columns: Sequence[str],
+    columns: Sequence[str], sparse: bool = False,
 ) -> Log:  # fmt: skip
     """Channels with their own time stamps on one grid: linear interpolation, NaN over gaps of 0.25 s.
 
-    ``signals`` and ``units`` are what each channel was made of, ``columns`` the names of all signals.
+    ``signals`` and ``units`` are what each channel was made of, ``columns`` the names of all signals. ``sparse`` leaves
+    a slow channel of the motion empty between its samples: what is drawn between them is no measurement, and smooth.
     """
     if not series:
         raise UnusableError(f"{name}: none of the mapped signals is in the log; {expected_instead(columns, CHANNELS)}")
@@ -128,6 +180,10 @@ def _gridded(
         nearest = np.clip(np.searchsorted(t, grid), 1, len(t) - 1) if len(t) > 1 else np.zeros(len(grid), int)
         gap = t[nearest] - t[nearest - 1] if len(t) > 1 else np.full(len(grid), np.inf)
         values[gap > GAP_S] = np.nan
+        if sparse and channel in _MOTION and len(t) > 1 and float(np.median(np.diff(t))) > _SLOW_S:
+            between = np.ones(len(grid), bool)
+            between[np.clip(np.round((t - begin) / _GRID_S).astype(int), 0, len(grid) - 1)] = False
+            values[between] = np.nan
         values_of[channel] = values
     origins = {channel: Origin(signals[channel], units[channel], t, v) for channel, (t, v) in series.items()}
     return make_log(name, grid - begin, values_of, origins=origins, columns=columns)

@@ -134,7 +134,7 @@ def check(
         "extension": extension,
         "missing": missing(motion),
         "remarks": [
-            reason, *vehicle.remarks, *_remarks(models, causes),
+            reason, *vehicle.remarks, *_runs_away(motion), *_remarks(models, causes),
             *(f"{log.name}: {text}" for log in logs for text in log.remarks),
         ],
         "estimates": estimates(models.get("braking"), vehicle),
@@ -196,6 +196,12 @@ def _rivals(causes: Sequence[Cause], named: Sequence[Mapping[str, Any]]) -> list
     """The rivals of all causes, without effects that are ``named`` as a cause in the same channels."""
     known = [(one["effect"], one["channels"]) for one in named]
     return [rival for cause in causes for rival in cause.rivals() if (rival["effect"], rival["channels"]) not in known]
+
+
+def _runs_away(motion: Motion) -> Iterator[str]:
+    if motion.rolling:
+        other = "rear" if motion.rolling == "front" else "front"
+        yield f"the {other} wheels spin or lock: the car's speed is that of the {motion.rolling} wheels"
 
 
 def _remarks(models: Mapping[str, SelectionResult], causes: Sequence[Cause]) -> Iterator[str]:

@@ -14,6 +14,9 @@ SLOW_MPS = 3.0
 SEGMENT_S = (6.0, 12.0)
 """A segment ends where the acceleration passes zero after the first time, and at the second at the latest."""
 _SLOPE_WINDOW_S = 0.4
+_RUNS_AWAY, _RUNS_AWAY_S = 1.08, 0.5
+"""Ratio of two axles' speeds from which on one spins or locks, and how long it does so in all: no bend and no radius
+makes 8 %, and tyres grip best at about as much slip."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,10 +30,12 @@ class Motion:
     log_id : (cells,) number of the log.
     channels : name -> (cells,) mean over the cell, NaN where nothing was measured; wheel speeds in m/s at the rolling
         radius, under ``wheel_fl`` and so on; ``pressure`` and ``pressure_demand`` are means over the wheels.
-    speed_mps : (cells,) the median wheel's speed; the ground speed where there are no wheels.
+    speed_mps : (cells,) the median wheel's speed, or that of the axle that rolls where the other one spins or locks
+        (`rolling_axle`); the ground speed where there are no wheels.
     accel_mps2 : (cells,) its slope over 0.4 s, centred, for start values and charts; no fit relies on it.
     moving : (cells,) 1 where the car is fast enough to compare.
     segment_id : (cells,) number of the segment.
+    rolling : ``front`` or ``rear`` where the other axle runs away; empty where none does.
     """
 
     logs: tuple[Log, ...]
@@ -43,6 +48,7 @@ class Motion:
     accel_mps2: Floats
     moving: Floats
     segment_id: Floats
+    rolling: str = ""
 
     def has(self, *names: str) -> bool:
         """Whether all these channels were measured."""
@@ -93,7 +99,9 @@ def motion_of(logs: Sequence[Log], radius_m: float) -> Motion:
     log_id = np.concatenate([np.full(len(t), k) for k, (t, _) in enumerate(parts)])
     log_start = np.concatenate([np.eye(1, len(t))[0] for t, _ in parts])
     wheels = [channels[f"wheel_{w}"] for w in ("fl", "fr", "rl", "rr") if f"wheel_{w}" in channels]
-    speed = _without_gaps(np.median(wheels, axis=0) if wheels else channels["speed_mps"])
+    rolling = rolling_axle(np.array(wheels), log_id, cell_s) if len(wheels) == 4 else ""
+    rolls = {"": wheels, "front": wheels[:2], "rear": wheels[2:]}[rolling]
+    speed = _without_gaps(np.median(rolls, axis=0) if wheels else channels["speed_mps"])
     accel = slope_of(speed, log_id, cell_s)
     margin = round(0.5 / cell_s)
     slow = np.convolve(speed < SLOW_MPS, np.ones(2 * margin + 1))[margin : margin + len(speed)] > 0.5
@@ -104,7 +112,25 @@ def motion_of(logs: Sequence[Log], radius_m: float) -> Motion:
             "such manoeuvres, or longer ones"
         )
     segment_id = _segment_id(log_id, accel, cell_s)
-    return Motion(tuple(logs), cell_s, t_s, log_start, log_id, channels, speed, accel, 1.0 * ~slow, segment_id)
+    return Motion(tuple(logs), cell_s, t_s, log_start, log_id, channels, speed, accel, 1.0 * ~slow, segment_id, rolling)
+
+
+def rolling_axle(wheels: Floats, log_id: Floats, cell_s: float) -> str:
+    """``front`` or ``rear`` where the other axle spins in acceleration or locks in braking; empty where neither does.
+
+    ``wheels`` (4, cells), m/s. The median of four wheels of which two spin is no speed of the car.
+    """
+    front, rear = wheels[:2].mean(axis=0), wheels[2:].mean(axis=0)
+    accel = slope_of(_without_gaps(np.median(wheels, axis=0)), log_id, cell_s)
+    fast = np.minimum(front, rear) > SLOW_MPS
+    spins_s = {
+        axle: float((fast & np.where(accel > 0.0, own > _RUNS_AWAY * other, _RUNS_AWAY * own < other)).sum()) * cell_s
+        for axle, own, other in (("rear", rear, front), ("front", front, rear))
+    }
+    worst = max(spins_s, key=lambda axle: spins_s[axle])
+    if spins_s[worst] < _RUNS_AWAY_S or spins_s[worst] < 2.0 * min(spins_s.values()):
+        return ""
+    return "front" if worst == "rear" else "rear"
 
 
 def _cell_means(log: Log, names: set[str], cell_s: float, radius_m: float) -> tuple[Floats, dict[str, Floats]]:

@@ -12,16 +12,19 @@ from typing import Any
 
 import numpy as np
 
+from hil.diagnosis.data.log import Floats
 from hil.diagnosis.vehicle.keys import ALIASES, DERIVED, LINE, SPECIAL
 from hil.diagnosis.vehicle.priors import BRAKE_K, CONSTANT_EPSILON_W, Nuisance, NuisanceKind
 from hil.diagnosis.vehicle.quantity_words import DERIVED_UNITS, IN_THETA, LATENCIES, OTHERS, PARAMETERS
-from hil.diagnosis.vehicle.spec import Vehicle, rest_friction
+from hil.diagnosis.vehicle.spec import Vehicle
+from plant.friction import mu_equilibrium
 from plant.injection.theta import THETA
-from plant.vectors import PARAMETER
+from plant.vectors import PARAMETER, P
 
 AXLES = ("front", "rear")
 _OF_PLANT = (NuisanceKind.VEHICLE, NuisanceKind.SIGNED)
 _AREA, _RADIUS, _COG = "friction_brake_piston_area_m2", "friction_brake_effective_radius_m", "vehicle_cog_to_axle_m"
+_GAINS = ("brake_gain_front", "brake_gain_rear")
 _ROW_S = 0.01
 _COG_KEYS = ("cog_to_front_axle_m", "cog_to_rear_axle_m", "front_weight_share")
 _PLACES = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
@@ -60,6 +63,13 @@ def stated_keys(table: Mapping[str, Any]) -> dict[str, str]:
     return stated
 
 
+def missing_keys(table: Mapping[str, Any]) -> list[str]:
+    """Keys of the set's list ``required`` that neither they nor another key for the same number state."""
+    required = table.get("required", [])
+    stated = stated_keys({key: value for key, value in table.items() if key != "required"})
+    return [key for key in map(str, required) if (_flat(key) or key) not in stated]
+
+
 def _flat(stem: str) -> str:
     """Flat name that a key states; empty where it is no number of the plant."""
     if stem in DERIVED:
@@ -67,6 +77,34 @@ def _flat(stem: str) -> str:
         return f"{name}_{AXLES[member]}" if member is not None and PARAMETER.sizes[name] == len(AXLES) else name
     name = ALIASES.get(stem, stem)
     return _COG if name in _COG_KEYS else name if name in SPECIAL or name in PARAMETER.sizes else ""
+
+
+def indices_of(key: str) -> frozenset[int]:
+    """Indices of the plant's parameters that a key of a set states a value of; none for other keys."""
+    if key in DERIVED:
+        name, member, _ = DERIVED[key]
+        own = PARAMETER.slice(name)
+        return frozenset() if member is None else frozenset({min(own.start + member, own.stop - 1)})
+    name = ALIASES.get(key, key)
+    if name in _GAINS:
+        return frozenset({PARAMETER.slice(_AREA).start + _GAINS.index(name)})
+    name = _COG if name in _COG_KEYS else name
+    return frozenset(range(*PARAMETER.slice(name).indices(PARAMETER.size))) if name in PARAMETER.sizes else frozenset()
+
+
+def value_of(key: str, p: Floats) -> float | list[float]:
+    """Value of a key of which `indices_of` are some, in its own unit, in parameters ``p`` of the plant."""
+    name = ALIASES.get(key, key)
+    front, rear = p[PARAMETER.slice(_COG)]
+    if name in _COG_KEYS:
+        return float({"cog_to_front_axle_m": front, "cog_to_rear_axle_m": rear}.get(name, rear / (front + rear)))
+    factor = 1.0
+    if key in DERIVED:
+        factor = 1.0 / DERIVED[key][2]
+    elif name in _GAINS:
+        factor = _brake_gain_per_area(p, _GAINS.index(name))
+    values = [factor * float(p[at]) for at in sorted(indices_of(key))]
+    return values[0] if all(value == values[0] for value in values) else values
 
 
 def stated_key(nuisance: Nuisance, quantity: Quantity, stated: Mapping[str, str]) -> str:
@@ -106,7 +144,7 @@ def _of_plant(nuisance: Nuisance, vehicle: Vehicle) -> Quantity:
     pair = own.stop - own.start == len(AXLES)
     axle = AXLES[nuisance.at[0] - own.start] if pair and len(nuisance.at) == 1 else ""
     if name == _AREA:
-        factor = _brake_gain_per_area(vehicle, AXLES.index(axle))
+        factor = _brake_gain_per_area(vehicle.p, AXLES.index(axle))
         what = PARAMETERS["brake_gain"]
         return Quantity(f"brake_gain_{axle}_nm_pa", what, "N m/Pa", axle, lambda area: factor * area)
     if name == _COG:
@@ -137,12 +175,12 @@ def _of_theta(nuisance: Nuisance) -> Quantity:
     return Quantity(nuisance.name if has_key else "", what, unit, location, _same, False)
 
 
-def _brake_gain_per_area(vehicle: Vehicle, axle: int) -> float:
+def _brake_gain_per_area(p: Floats, axle: int) -> float:
     """Brake gain at the temperature it is stated at (`hil.diagnosis.vehicle.spec.with_gains`) per piston area."""
-    brake = vehicle.parameters.friction_brake
-    is_constant = vehicle.parameters.pad.epsilon_w >= CONSTANT_EPSILON_W
-    mu = rest_friction(vehicle.parameters, brake.ambient_k if is_constant else BRAKE_K)
-    return float(2.0 * mu * brake.efficiency * brake.effective_radius_m[axle])
+    epsilon = float(p[P.pad_epsilon_w])
+    temperature = float(p[P.friction_brake_ambient_k]) if epsilon >= CONSTANT_EPSILON_W else BRAKE_K
+    mu = mu_equilibrium(0.0, temperature, float(p[P.pad_a_1_ks]), float(p[P.pad_b_1_j]), epsilon)
+    return float(2.0 * mu * p[P.friction_brake_efficiency] * p[PARAMETER.slice(_RADIUS)][axle])
 
 
 def _same(value: float) -> float:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hil.diagnosis.data.channel_map import refuse_question_marks
 from hil.diagnosis.data.log import UnusableError
 from hil.diagnosis.vehicle.bounds import refuse_implausible
 from hil.diagnosis.vehicle.checks import (
@@ -20,7 +21,7 @@ from hil.diagnosis.vehicle.checks import (
     checked_numbers,
     checked_tolerance,
 )
-from hil.diagnosis.vehicle.key_names import stated_keys
+from hil.diagnosis.vehicle.key_names import missing_keys, stated_keys
 from hil.diagnosis.vehicle.keys import (
     ALIASES,
     AXLES,
@@ -115,22 +116,42 @@ def load_vehicle(source: Path | Mapping[str, Any] | None) -> Vehicle:
     Raises
     ------
     UnusableError
-        Not TOML; a value that is not a number, or out of bounds.
+        Not TOML; a value that is not a number, or out of bounds; a key of the list ``required`` without a number.
     """
     if source is None:
         return paper_car()
     where = str(source) if isinstance(source, Path) else "vehicle"
-    table = _read(source) if isinstance(source, Path) else dict(source)
-    if "vehicle" in table and isinstance(table["vehicle"], Mapping) and "mass_kg" in table["vehicle"]:
-        table = dict(table["vehicle"])
+    table = read_set(source) if isinstance(source, Path) else _flattened(source)
+    missing = missing_keys(table)
+    table.pop("required", None)
+    if missing:
+        raise UnusableError(
+            f"{where}: not finished: no number yet of {', '.join(missing)}; fill them in from the car's sheet (key = "
+            "number, in SI units)"
+        )
     return replace(_from_flat(table, where), stated=stated_keys(table))
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_set(path: Path) -> dict[str, Any]:
+    """A vehicle set as written.
+
+    Raises
+    ------
+    UnusableError
+        Not TOML, or a draft with a question mark.
+    """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        refuse_question_marks(path, text)
+        return _flattened(tomllib.loads(text))
     except (OSError, ValueError) as error:
         raise UnusableError(f"{path}: not a vehicle set: {error}") from error
+
+
+def _flattened(table: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of a set, whether they stand in a table ``[vehicle]`` or not."""
+    inner = table.get("vehicle")
+    return dict(inner if isinstance(inner, Mapping) and "mass_kg" in inner else table)
 
 
 @cache

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dbc.database import parse_database
 from hil.diagnosis.data.channel_map import load_map
 from hil.diagnosis.data.log import UnusableError, make_log
 from hil.diagnosis.data.read import from_frame, read_logs, read_one
@@ -94,3 +95,47 @@ def test_logs_toml_gives_direction_and_temperature(tmp_path: Path) -> None:
 def test_an_unusable_log_is_refused(t_s: np.ndarray, channels: dict[str, np.ndarray], message: str) -> None:
     with pytest.raises(UnusableError, match=message):
         make_log("x", t_s, channels)
+
+
+def test_wheel_speeds_of_the_road_are_divided_by_the_sets_radius(tmp_path: Path) -> None:
+    (tmp_path / "map.toml").write_text('[wheel_speed_fl_rad_s]\nsignal = "v"\nunit = "km/h"\n')
+    assert load_map(tmp_path / "map.toml", 0.3).entries["wheel_speed_fl_rad_s"].factor == pytest.approx(1 / 3.6 / 0.3)
+    with pytest.raises(UnusableError, match="divide it by the rolling radius"):
+        load_map(tmp_path / "map.toml")
+    scaled = tmp_path / "scaled.toml"
+    scaled.write_text('[wheel_speed_fl_rad_s]\nsignal = "v"\nunit = "km/h"\nscale = 4.0\n')
+    assert load_map(scaled, 0.3).entries["wheel_speed_fl_rad_s"].factor == pytest.approx(4.0 / 3.6)
+
+
+def test_a_map_with_a_question_mark_is_refused_by_its_line(tmp_path: Path) -> None:
+    (tmp_path / "map.toml").write_text('[steer_rad]\nsignal = "s"\nscale = ?\n')
+    with pytest.raises(UnusableError, match=r"not filled in: scale \(line 3\)"):
+        load_map(tmp_path / "map.toml")
+
+
+SLOW_DBC = """VERSION ""
+BU_: CAR
+BO_ 256 FAST: 8 CAR
+ SG_ V : 0|16@1+ (0.01,0) [0|655] "m/s" CAR
+BO_ 512 SLOW: 8 CAR
+ SG_ AX : 0|16@1- (0.01,0) [-40|40] "m/s2" CAR
+"""
+
+
+def test_a_slow_channel_of_the_bus_has_values_where_it_was_sampled_alone(tmp_path: Path) -> None:
+    """Lines between samples of 0.1 s are smooth: a comparison took that for a filter of the sensor."""
+    lines = []
+    for k in range(500):
+        lines.append(f"({k * 0.02:.6f}) can0 100#{(1000 + k).to_bytes(2, 'little').hex()}000000000000")
+        if k % 5 == 0:
+            lines.append(f"({k * 0.02 + 0.004:.6f}) can0 200#{(k % 7).to_bytes(2, 'little').hex()}000000000000")
+    (tmp_path / "a.log").write_text("\n".join(lines) + "\n")
+    (tmp_path / "map.toml").write_text('[speed_mps]\nsignal = "FAST.V"\n[ax_mps2]\nsignal = "SLOW.AX"\n')
+    database = parse_database(SLOW_DBC.encode(), "slow.dbc")
+    log = read_one(tmp_path / "a.log", database, load_map(tmp_path / "map.toml"))
+    assert np.isfinite(log.channels["speed_mps"]).mean() > 0.98
+    finite = np.isfinite(log.channels["ax_mps2"])
+    assert finite.sum() == pytest.approx(100, abs=2)
+    # what stands there is the line at the row of 10 ms nearest to the sample, 4 ms off
+    steps = np.abs(log.channels["ax_mps2"][finite] - np.round(log.channels["ax_mps2"][finite], 2))
+    assert steps.max() < 0.005
