@@ -25,6 +25,11 @@ class Feed:
     Parameters
     ----------
     vehicle, bench : databases of the two buses.
+
+    Attributes
+    ----------
+    messages : all of them, in the order of their numbers.
+    further : frames with identifiers beyond `MOST_MESSAGES`.
     """
 
     def __init__(self, vehicle: Databases, bench: Databases) -> None:
@@ -33,12 +38,12 @@ class Feed:
         self._order: dict[Key, int] = {}
         self._rows: dict[int, list[list[Value]]] = {}
         self._events: list[str] = []
-        self._bits = self._load_ns = 0
-        self._load: float | None = None
+        self._bits = 0
+        self._load_ns: int | None = None
         self._start_ns: int | None = None
         self.further = 0
-        self.bench_ns = 0
-        self._named: list[LiveMessage] = []
+        self._bench_ns = 0
+        self.messages: list[LiveMessage] = []
         for bus, databases in self._databases.items():
             for message in databases.of(bus.value).messages.values():
                 if not message.pgn_match and len(self._order) < MOST_MESSAGES:
@@ -52,13 +57,8 @@ class Feed:
             name += f"@{can_id & 0xFF:02X}"
         live = self._messages[key] = LiveMessage(bus.value, name, can_id, extended, message)
         self._order[key] = len(self._order)
-        self._named.append(live)
+        self.messages.append(live)
         return live
-
-    @property
-    def messages(self) -> list[LiveMessage]:
-        """All messages, in the order of their numbers."""
-        return self._named
 
     def hear(self, received: Sequence[Received]) -> None:
         """Take what came, in order."""
@@ -74,7 +74,7 @@ class Feed:
         if self._start_ns is None:
             self._start_ns = at_ns
         if bus is BusName.BENCH:
-            self.bench_ns = at_ns
+            self._bench_ns = at_ns
         else:
             self._bits += most_classical_bits(extended, len(data)).nominal
         key = (bus, can_id, extended)
@@ -103,7 +103,7 @@ class Feed:
                 "cycle": one.message.cycle_time_ms if one.message else None,
                 "signals": [{"name": s.name, "unit": s.unit, "choices": s.choices} for s in one.signals],
             }
-            for one in list(self._named)
+            for one in list(self.messages)
         ]  # fmt: skip
 
     def news(self) -> str | None:
@@ -121,22 +121,23 @@ class Feed:
         now_ns : by the clock that stamps frames.
         more : what else the page is told.
         """
-        elapsed_ns, self._load_ns = now_ns - self._load_ns, now_ns
+        elapsed_ns = 0 if self._load_ns is None else now_ns - self._load_ns
+        self._load_ns = now_ns
         rate = self._databases[BusName.VEHICLE].bit_rate(BusName.VEHICLE.value)
-        self._load = None if not rate else self._bits / (elapsed_ns * 1e-9 * rate)
+        load = None if not rate or not elapsed_ns else self._bits / (elapsed_ns * 1e-9 * rate)
         self._bits = 0
         events, self._events = self._events, []
         rows = [
             [number, m.count, _rounded(m.cycle_ms), round((now_ns - m.last_ns) * 1e-9, 2), m.data.hex(),
              m.status, m.sound, *((m.checker.lost, m.checker.corrupt) if m.checker else (None, None))]
-            for number, m in enumerate(self._named)
+            for number, m in enumerate(self.messages)
             if m.count
         ]  # fmt: skip
         return json.dumps(
             {
-                "kind": "state", "rows": rows, "load": _rounded(self._load, 4), "events": events,
+                "kind": "state", "rows": rows, "load": _rounded(load, 4), "events": events,
                 "further": self.further,
-                **more, "bench": self.bench_ns > 0 and now_ns - self.bench_ns < 1_000_000_000,
+                **more, "bench": self._bench_ns > 0 and now_ns - self._bench_ns < 1_000_000_000,
             },
             separators=(",", ":"),
         )  # fmt: skip

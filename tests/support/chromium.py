@@ -43,7 +43,7 @@ class Page:
                 assert "error" not in message, message
                 return message["result"]
             if message.get("method") == "Runtime.exceptionThrown":
-                self.complaints.append(str(message["params"]["exceptionDetails"]))
+                self.complaints.append(message["params"]["exceptionDetails"]["exception"].get("description", "thrown"))
             if message.get("method") == "Log.entryAdded" and message["params"]["entry"]["level"] == "error":
                 self.complaints.append(message["params"]["entry"]["text"])
 
@@ -94,7 +94,8 @@ def opened(url: str, folder: Path) -> Iterator[Page]:
         said = profile / "DevToolsActivePort"
         deadline = time.monotonic() + _PATIENCE_S
         while not (said.exists() and said.read_text().count("\n")):
-            assert time.monotonic() < deadline and browser.poll() is None, "Chromium did not start"
+            assert browser.poll() is None, "Chromium ended at once"
+            assert time.monotonic() < deadline, "Chromium did not start"
             time.sleep(0.05)
         port = said.read_text().splitlines()[0]
         with urlopen(f"http://127.0.0.1:{port}/json") as answer:
