@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
-from dbc.bench_messages import FaultCommand, StimulusDriver, StimulusEcu, StimulusRoad
+from dbc.bench_messages import FaultCommand, FaultParameter, FaultSelect, StimulusDriver, StimulusEcu, StimulusRoad
 from dbc.contract import Message, spec_of
 from dbc.e2e import COUNTER_MODULUS
 from dbc.frame import BusName, Frame, LinkEvent, Received
@@ -55,6 +55,7 @@ CONTROLS = (
     Control("friction_right", StimulusRoad, "friction_right", 0.05, 1.2, 0.01, "Road friction, right"),
     Control("grade", StimulusRoad, "grade", -0.3, 0.3, 0.01, "Grade, uphill positive", "%", 100.0),
 )  # fmt: skip
+_STIMULUS: tuple[type[Message], ...] = (StimulusDriver, StimulusEcu, StimulusRoad)
 _BY_NAME = {control.name: control for control in CONTROLS}
 
 
@@ -89,7 +90,7 @@ class Controls:
         self._armed: dict[str, Injection] = {}
         self._counters: dict[type[Message], int] = {}
         self._planned: list[tuple[int, list[Message]]] = []
-        self._ids = {spec_of(kind).can_id: kind for kind in (StimulusDriver, StimulusEcu, StimulusRoad)}
+        self._ids = {spec_of(kind).can_id: kind for kind in (*_STIMULUS, FaultCommand, FaultParameter, FaultSelect)}
         self._heard_ns: int | None = None
 
     @property
@@ -98,7 +99,7 @@ class Controls:
         return list(self._armed)
 
     def hear(self, now_ns: int, received: Sequence[Received]) -> None:
-        """Take what came: whether somebody is there, and the counters of the bench's own stimulus."""
+        """Take what came: whether somebody is there, and the counters of what others send beside us."""
         for item in received:
             if isinstance(item, LinkEvent) or item.bus is not BusName.BENCH:
                 continue
@@ -167,7 +168,7 @@ class Controls:
         """Frames of this tick: commands once, values that are set with every tick."""
         out: list[Message] = [message for due_ns, some in self._planned if due_ns <= now_ns for message in some]
         self._planned = [one for one in self._planned if one[0] > now_ns]
-        for kind in self._ids.values():
+        for kind in _STIMULUS:
             mine = {c.field: self.values[c.name] for c in CONTROLS if c.message is kind and c.name in self.values}
             if mine:
                 fields: tuple[str, ...] = kind._fields

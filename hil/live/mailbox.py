@@ -29,14 +29,14 @@ class Mailbox:
             self._changed.notify()
 
     def take(self) -> str | None:
-        """Wait for the oldest message; None once the mailbox is closed."""
+        """Wait for the oldest message; None once the mailbox is closed and empty."""
         with self._changed:
             while not self._waiting and not self._closed:
                 self._changed.wait()
-            return None if self._closed else self._waiting.popleft()
+            return self._waiting.popleft() if self._waiting else None
 
     def close(self) -> None:
-        """Let nobody wait any longer."""
+        """Let nobody wait any longer; what is in it can still be taken."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()

@@ -23,6 +23,7 @@ from websockets.sync.server import ServerConnection, serve
 from hil.errors import BrakebenchError
 from hil.live.assets import SECURITY, assets
 from hil.live.mailbox import Mailbox
+from hil.rt.clock import WallClock
 
 HOST = "127.0.0.1"
 SOCKET = "/socket"
@@ -30,6 +31,7 @@ MOST_PAGES = 8
 _MOST_COMMAND = 4096  # bytes of a command
 _OPEN_TIMEOUT_S = 2.0  # a browser opens connections that it may never use
 _SEND_TIMEOUT_S = 30  # a page that takes nothing for so long is let go; it comes back by itself
+_FAREWELL_NS = 500_000_000  # for the last message of all pages; one that stands still has to do without
 
 Greet = Callable[[], str]
 Take = Callable[[str, Mailbox], None]
@@ -62,6 +64,7 @@ class Server:
         self._token = secrets.token_urlsafe(24)
         self._lock = Lock()
         self._pages: dict[ServerConnection, Mailbox] = {}
+        self._senders: dict[ServerConnection, Thread] = {}
         try:
             listener = socket.create_server((HOST, port))
         except OSError as error:
@@ -106,12 +109,18 @@ class Server:
                 mailbox.put(text)
 
     def close(self) -> None:
-        """Let all pages go, those too that take nothing any longer."""
+        """Let all pages go once they have the last message, and without it those that take nothing any longer."""
         with self._lock:
-            for page, mailbox in self._pages.items():
+            pages, senders = list(self._pages), list(self._senders.values())
+            for mailbox in self._pages.values():
                 mailbox.close()
-                with contextlib.suppress(OSError):
-                    page.socket.shutdown(socket.SHUT_RDWR)
+        clock = WallClock()
+        deadline_ns = clock.now_ns() + _FAREWELL_NS
+        for sender in senders:
+            sender.join(max(0, deadline_ns - clock.now_ns()) * 1e-9)
+        for page in pages:
+            with contextlib.suppress(OSError):
+                page.socket.shutdown(socket.SHUT_RDWR)
         self._server.shutdown()
         self._thread.join()
 
@@ -151,9 +160,9 @@ class Server:
         page.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", _SEND_TIMEOUT_S, 0))
         with contextlib.suppress(ConnectionClosed):
             page.send(self._greet())
-            with self._lock:
-                self._pages[page] = mailbox
             sender = Thread(target=_send_all, args=(page, mailbox), name="live page", daemon=True)
+            with self._lock:
+                self._pages[page], self._senders[page] = mailbox, sender
             sender.start()
             try:
                 for text in page:
@@ -161,7 +170,7 @@ class Server:
                         self._take(text, mailbox)
             finally:
                 with self._lock:
-                    del self._pages[page]
+                    del self._pages[page], self._senders[page]
                 mailbox.close()
 
 

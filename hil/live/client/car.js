@@ -81,7 +81,7 @@ class Car {
     put(byId("stored"), String(stored));
     if (stored < this.found.size) this.found.clear();
     if (code) this.found.set(code, [status === null ? "" : name("BRAKE_TROUBLE_CODE.STATUS").toLowerCase(), store.value("BRAKE_TROUBLE_CODE.OCCURRENCES"), index]);
-    const rows = [...this.found].sort((a, b) => a[0] - b[0]).map(([number, [state, times]]) => {
+    const rows = [...this.found].sort(([a, [x]], [b, [y]]) => (y === "active") - (x === "active") || a - b).map(([number, [state, times]]) => {
       const [name, text] = this.texts[number] ?? ["", ""];
       return [number.toString(16).toUpperCase().padStart(4, "0"), name, state, String(times ?? ""), text];
     });

@@ -60,8 +60,10 @@ class Controls {
     put(byId("armed"), state.armed.length ? `armed: ${state.armed.join(", ")}` : "none armed");
     for (const one of this.faults) this.press(one);
     for (const one of this.values) {
-      if (document.activeElement !== one.input) one.show(state.values[one.name]);
-      else if (!(one.name in state.values)) one.row.querySelector("button").disabled = true;
+      const value = state.values[one.name];
+      if (document.activeElement === one.input && value !== undefined) continue; // it is being moved
+      one.show(value);
+      if (value !== undefined) one.input.value = value;
     }
   }
 

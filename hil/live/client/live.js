@@ -40,7 +40,8 @@ const takers = {
     controls = new Controls(message, send);
     const names = [...store.places.keys()].filter((name) => !/\.(CRC|ALIVE_COUNTER)$/.test(name)).slice(0, MOST_LISTED);
     byId("signals").replaceChildren(...names.map((name) => element("option", { value: name })));
-    for (const name of message.own ? chosen : [...new Set([...chosen, ...names.slice(0, 4)])]) choose(name);
+    const first = message.own ? [] : names.filter((name) => store.messages[store.places.get(name)[0]].bus === "vehicle").slice(0, 4);
+    for (const name of chosen.length ? chosen : first) choose(name);
   },
   data({ rows }) {
     fresh = true;

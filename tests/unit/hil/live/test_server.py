@@ -180,8 +180,19 @@ def test_a_mailbox_keeps_the_newest():
         mailbox.put(str(number))
     assert mailbox.dropped == 2
     assert [mailbox.take() for _ in range(3)] == ["2", "3", "4"]
+    mailbox.put("last")
     mailbox.close()
-    assert mailbox.take() is None
+    assert [mailbox.take(), mailbox.take()] == ["last", None]
+
+
+def test_the_last_message_still_comes_to_a_page_that_reads(server):
+    with page(server) as own:
+        own.recv(timeout=10)
+        own.send("in")
+        own.recv(timeout=10)
+        server.send("the end")
+        server.close()
+        assert own.recv(timeout=10) == "the end"
 
 
 def test_a_port_that_is_taken_is_named():
