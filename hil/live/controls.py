@@ -55,7 +55,7 @@ CONTROLS = (
     Control("friction_right", StimulusRoad, "friction_right", 0.05, 1.2, 0.01, "Road friction, right"),
     Control("grade", StimulusRoad, "grade", -0.3, 0.3, 0.01, "Grade, uphill positive", "%", 100.0),
 )  # fmt: skip
-_STIMULUS: tuple[type[Message], ...] = (StimulusDriver, StimulusEcu, StimulusRoad)
+_STIMULUS = (StimulusDriver, StimulusEcu, StimulusRoad)
 _BY_NAME = {control.name: control for control in CONTROLS}
 
 
@@ -89,8 +89,10 @@ class Controls:
         self.values: dict[str, float] = {}
         self._armed: dict[str, Injection] = {}
         self._counters: dict[type[Message], int] = {}
-        self._planned: list[tuple[int, list[Message]]] = []
-        self._ids = {spec_of(kind).can_id: kind for kind in (*_STIMULUS, FaultCommand, FaultParameter, FaultSelect)}
+        self._once: list[Message] = []
+        self._ids: dict[int, type[Message]] = {
+            spec_of(kind).can_id: kind for kind in (*_STIMULUS, FaultCommand, FaultParameter, FaultSelect)
+        }
         self._heard_ns: int | None = None
 
     @property
@@ -113,7 +115,7 @@ class Controls:
 
         Parameters
         ----------
-        now_ns : tick at which it acts.
+        now_ns : time of this tick.
         asked : ``{"do": "set", "name": ..., "value": SI number or None}``, ``{"do": "fault", "name": ..., "on": ...}``
             or ``{"do": "clear", "name": ..., "on": ...}``.
 
@@ -131,7 +133,7 @@ class Controls:
         if do == "set":
             return self._set(name, asked.get("value"))
         if do in ("fault", "clear"):
-            return self._fault(now_ns, name, str(asked.get("on"))[:_NAMED], ends=do == "clear")
+            return self._fault(name, str(asked.get("on"))[:_NAMED], ends=do == "clear")
         raise CommandError(f"command {str(do)[:_NAMED]!r}: expected set, fault or clear")
 
     def _set(self, name: str, value: object) -> str:
@@ -147,7 +149,7 @@ class Controls:
         self.values[name] = number
         return f"{control.text}: {number * control.factor:g} {control.unit}".rstrip()
 
-    def _fault(self, now_ns: int, name: str, on: str, ends: bool) -> str:
+    def _fault(self, name: str, on: str, ends: bool) -> str:
         kind = fault_named(name)
         if kind.side is Side.HOST:
             raise CommandError(f"fault {name}: only inside the vcan laboratory")
@@ -155,19 +157,18 @@ class Controls:
         key = f"{kind.name} on {injection.target}"
         if kind.side is Side.PLANT:
             event = events_of(injection)[0]
-            self._planned.append((now_ns, [FaultCommand(event.fault, int(not ends), event.wheels)]))
+            self._once.append(FaultCommand(event.fault, int(not ends), event.wheels))
         else:
-            self._planned.append((now_ns, stop_messages(injection) if ends else start_messages(injection)))
+            self._once += stop_messages(injection) if ends else start_messages(injection)
         if ends:
             self._armed.pop(key, None)
         else:
             self._armed[key] = injection
         return f"{'ended' if ends else 'armed'}: {key}"
 
-    def frames(self, now_ns: int) -> list[Frame]:
+    def frames(self) -> list[Frame]:
         """Frames of this tick: commands once, values that are set with every tick."""
-        out: list[Message] = [message for due_ns, some in self._planned if due_ns <= now_ns for message in some]
-        self._planned = [one for one in self._planned if one[0] > now_ns]
+        out, self._once = self._once, []
         for kind in _STIMULUS:
             mine = {c.field: self.values[c.name] for c in CONTROLS if c.message is kind and c.name in self.values}
             if mine:

@@ -106,7 +106,7 @@ def serve_view(
             controls.hear(tick.now_ns, received)
             feed.hear(received)
             _carry_out(tick.now_ns, controls, asked, server)
-            frames = controls.frames(tick.now_ns)
+            frames = controls.frames()
             if frames:
                 bench.send(frames)
                 feed.hear([frame._replace(time_ns=clock_ns) for frame in frames])  # a bus does not tell us our own

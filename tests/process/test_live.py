@@ -47,7 +47,8 @@ VAL_ 256 SPEED_OF_IT 7 "</script><script>document.title='hit'</script>" ;
 def live(start, channel, tmp_path):
     """A run that drives and its live page's address: process, folder, address."""
     (tmp_path / "drives.toml").write_text(DRIVES)
-    process = start("run", "drives.toml", "--live", "--bus", channel, "--out", "out")
+    # drawing takes what processor there is: nodes that may be real-time processes are not to wait for it
+    process = start("run", "drives.toml", "--live", "--realtime", "--bus", channel, "--out", "out")
     words = tmp_path / "out" / "live.txt"
 
     def address():
@@ -88,6 +89,8 @@ def test_values_move_and_a_fault_from_the_page_is_seen_found_and_on_record(live,
         page.run("byId('fault-motor_weak').focus()")
         page.press(" ", 32)
         page.wait("byId('fault-motor_weak').getAttribute('aria-pressed') === 'true'")
+        weak_at = page.run("store.now")
+        page.wait(f"store.now > {weak_at} + 1.5")
         page.wait(f"{demand('FR')} < -40 && Math.abs({motor('FR')} / {demand('FR')} - 1) < 0.1")  # once all is in order
         page.wait(f"{demand('FL')} < -40 && Math.abs({motor('FL')} / {demand('FL')} - 0.5) < 0.1")
 
@@ -111,14 +114,14 @@ def test_values_move_and_a_fault_from_the_page_is_seen_found_and_on_record(live,
     at_s, fault = signals.get("FAULT_COMMAND.FAULT")
     weak_s, dead_s = (at_s[np.flatnonzero(fault == number)[0]] for number in (4, 1))
     t_s, asked_nm = signals.get("MOTOR_DEMAND_FRONT.TORQUE_DEMAND_FL")
-    braking = np.minimum(asked_nm[5:], asked_nm[:-5]) < -40.0  # for 50 ms: the motor follows
+    braking = np.maximum(asked_nm[5:], asked_nm[:-5]) < -40.0  # for 50 ms: the motor follows
     for begin_s, end_s, share in ((0.0, weak_s, 1.0), (weak_s + 0.2, dead_s, 0.5)):
         chosen = t_s[5:][braking & (t_s[5:] > begin_s) & (t_s[5:] < end_s)]
         current_s, current_a = signals.get("MOTOR_STATUS_FRONT.CURRENT_FL")
         torque_nm = 1.75 * np.interp(chosen, current_s, current_a)
         assert len(chosen) > 10
         assert np.median(torque_nm / np.interp(chosen, t_s, asked_nm)) == pytest.approx(share, abs=0.07)
-    assert signals.get("STIMULUS_DRIVER.PEDAL_TRAVEL")[1][-1] == pytest.approx(50.0, abs=0.1)
+    assert signals.get("STIMULUS_DRIVER.PEDAL_TRAVEL")[1][-1] == pytest.approx(0.5, abs=0.01)
 
 
 def test_a_stopped_or_closed_browser_disturbs_nobody(live, tmp_path):

@@ -30,13 +30,13 @@ def test_values_go_out_with_every_tick_until_they_are_released(controls):
     controls.command(0, {"do": "set", "name": "pedal", "value": 0.5})
     controls.command(0, {"do": "set", "name": "friction_left", "value": 0.3})
     for n in range(4):
-        receiver.accept(n * TICK_NS, controls.frames(n * TICK_NS))
+        receiver.accept(n * TICK_NS, controls.frames())
     assert receiver.latest(StimulusDriver) == (pytest.approx(0.5), None, None)
     assert receiver.latest(StimulusRoad) == (pytest.approx(0.3), None, None)
     assert receiver.latest(StimulusEcu) is None
     assert receiver.lost == receiver.corrupt == 0
     controls.command(0, {"do": "set", "name": "pedal", "value": None})
-    assert [frame.can_id for frame in controls.frames(5 * TICK_NS)] == [spec_of(StimulusRoad).can_id]
+    assert [frame.can_id for frame in controls.frames()] == [spec_of(StimulusRoad).can_id]
 
 
 @pytest.mark.parametrize("control", CONTROLS, ids=lambda one: one.name)
@@ -44,7 +44,7 @@ def test_every_value_reaches_its_field_at_both_ends(controls, control):
     receiver = Receiver((control.message,))
     for n, value in enumerate([control.low] * 4 + [control.high] * 2):
         controls.command(0, {"do": "set", "name": control.name, "value": value})
-        receiver.accept(n * TICK_NS, controls.frames(n * TICK_NS))
+        receiver.accept(n * TICK_NS, controls.frames())
         if n > 2:
             got = getattr(receiver.latest(control.message), control.field)
             assert got == pytest.approx(value, abs=0.01)
@@ -65,7 +65,7 @@ def test_the_benchs_own_stimulus_gives_way_and_its_counter_goes_on(controls):
             controls.command(now_ns, {"do": "set", "name": "blending", "value": 0.8})
         if n == 40:
             controls.command(now_ns, {"do": "set", "name": "blending", "value": None})
-        mine = controls.frames(now_ns)
+        mine = controls.frames()
         receiver.accept(now_ns, [*bench, *mine])
         seen.append(receiver.latest(StimulusEcu))
     assert seen[8] == (pytest.approx(0.2),)
@@ -81,12 +81,12 @@ FRAME_FAULTS = [kind for kind in FAULTS if kind.side not in (Side.HOST, Side.PLA
 def test_every_fault_of_frames_is_armed_and_ended_as_by_hand(controls, kind):
     reader = Commands()
     controls.command(0, {"do": "fault", "name": kind.name, "on": kind.usual[0]})
-    (command,) = reader.read(controls.frames(0))
+    (command,) = reader.read(controls.frames())
     assert (command.start.kind, command.start.target.name) == (kind, kind.usual[0])
     assert controls.armed == [f"{kind.name} on {kind.usual[0]}"]
-    assert controls.frames(TICK_NS) == []
+    assert controls.frames() == []
     controls.command(0, {"do": "clear", "name": kind.name, "on": kind.usual[0]})
-    (command,) = reader.read(controls.frames(2 * TICK_NS))
+    (command,) = reader.read(controls.frames())
     assert command.stop == kind.on(kind.usual[0]).key
     assert controls.armed == []
 
@@ -96,7 +96,7 @@ def test_every_fault_of_the_car_is_switched_on_and_off(controls, kind):
     reader = CommandReader((FaultCommand,))
     for do, active in (("fault", 1), ("clear", 0)):
         controls.command(0, {"do": do, "name": kind.name, "on": "rl"})
-        assert list(reader.read(controls.frames(0))) == [(PhysicalFault[kind.name.upper()], active, 0b0100)]
+        assert list(reader.read(controls.frames())) == [(PhysicalFault[kind.name.upper()], active, 0b0100)]
 
 
 def test_the_page_is_told_of_every_fault_but_those_of_the_laboratory():
@@ -123,7 +123,7 @@ def test_the_page_is_told_of_every_fault_but_those_of_the_laboratory():
 def test_what_cannot_be_done_is_refused_and_sends_nothing(controls, asked, words):
     with pytest.raises(BrakebenchError, match=words):
         controls.command(0, asked)
-    assert controls.frames(0) == []
+    assert controls.frames() == []
     assert controls.armed == []
 
 
