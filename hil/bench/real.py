@@ -1,7 +1,7 @@
 """The bench in real time: recorder, plant and ECU as processes on their buses."""
 
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from dbc.frame import BusName, Frame, Received
@@ -26,6 +26,7 @@ _TRACEBACK = "Traceback (most recent call last)"
 RECORDER = "recorder"
 VIEWER = "live"
 OTHERS_TIMEOUT_NS = 120_000_000_000  # how long we wait for a node that somebody else starts
+PAGE_TIMEOUT_NS = 30_000_000_000  # how long a run waits for somebody to open its live page: a stop takes 10 s
 SETTLE_NS = 500_000_000  # how long a bench keeps recording after a process died, so that the reaction is on record
 NODES = ("plant", "ecu")
 
@@ -145,11 +146,21 @@ class RealBench(BenchRun):
         """Have a process of its own serve the live page; False where somebody asks to stop before."""
         words = self.out / f"{VIEWER}.txt"
         words.touch(0o600)  # it holds the page's token, which is for nobody else on this machine
-        self._spawn(VIEWER, ["watch", "--scenario", self.scenario.source], self._viewer, self._joined)
-        if not self._await_ready(self._viewer):
+        wait_s = f"{PAGE_TIMEOUT_NS * 1e-9:g}"
+        arguments = ["watch", "--scenario", self.scenario.source, "--wait", wait_s]
+        self._spawn(VIEWER, arguments, self._viewer, self._joined)
+        told = False
+
+        def tell() -> None:
+            nonlocal told
+            if not told and (text := words.read_text()).endswith("\n"):
+                self._say(f"live page: {text.strip()}\nthe run begins once it is open, or after {wait_s} s")
+                told = True
+
+        if not self._await_ready(self._viewer, tell):
             return False
+        tell()
         self._viewer[0].release()
-        self._say(f"live page: {words.read_text().strip()}")
         return True
 
     def _listen(self) -> None:
@@ -182,13 +193,14 @@ class RealBench(BenchRun):
         except OSError as error:
             raise BenchError(f"{name} cannot be started: {error}") from error
 
-    def _await_ready(self, children: Sequence[Child]) -> bool:
+    def _await_ready(self, children: Sequence[Child], meanwhile: Callable[[], None] = lambda: None) -> bool:
         """Wait until all are ready; False where somebody asks to stop before."""
         deadline_ns = WallClock().now_ns() + READY_TIMEOUT_NS
         for child in children:
             while not child.wait_ready(_LOOK_NS * 1e-9):
                 if self._asked_to_stop:
                     return False
+                meanwhile()
                 for bus in self._buses.values():  # what comes before the start is of no use, and must not pile up
                     bus.receive(0.0)
                 if child.ended or WallClock().now_ns() > deadline_ns:

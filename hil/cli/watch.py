@@ -28,6 +28,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--port", type=_port, default=0, help="port of the page (default: any that is free)")
     parser.add_argument("--scenario", default="stop72", metavar="SCENARIO",
                         help="whose car's wheel radius and torque constant are used (default: stop72)")  # fmt: skip
+    parser.add_argument("--wait", type=float, default=0.0, help=argparse.SUPPRESS)  # of a run, for its first page
     add_ready_fd(parser)
     parser.set_defaults(run=run)
 
@@ -53,7 +54,8 @@ def run(args: argparse.Namespace) -> int:
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    serve_view(args.bus, _databases(args.dbc), car, port=args.port, ready_fd=args.ready_fd, say=say)
+    databases, wait_ns = _databases(args.dbc), round(args.wait * 1e9)
+    serve_view(args.bus, databases, car, port=args.port, ready_fd=args.ready_fd, wait_ns=wait_ns, say=say)
     return 0
 
 

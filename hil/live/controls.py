@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
 from typing import Any
 
 from dbc.bench_messages import FaultCommand, FaultParameter, FaultSelect, StimulusDriver, StimulusEcu, StimulusRoad
@@ -136,16 +135,18 @@ class Controls:
             return self._fault(name, str(asked.get("on"))[:_NAMED], ends=do == "clear")
         raise CommandError(f"command {str(do)[:_NAMED]!r}: expected set, fault or clear")
 
-    def _set(self, name: str, value: object) -> str:
+    def _set(self, name: str, value: Any) -> str:
         control = _BY_NAME.get(name)
         if control is None:
             raise CommandError(f"set {name!r}: expected one of {', '.join(_BY_NAME)}")
         if value is None:
             self.values.pop(name, None)
             return f"{control.text}: released"
-        number = float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else float("nan")
-        if not (isfinite(number) and control.low <= number <= control.high):
-            raise CommandError(f"set {name}: expected a number from {control.low:g} to {control.high:g}, got {value!r}")
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not is_number or not control.low <= value <= control.high:
+            got = repr(value)[:_NAMED]
+            raise CommandError(f"set {name}: expected a number from {control.low:g} to {control.high:g}, got {got}")
+        number = float(value)
         self.values[name] = number
         return f"{control.text}: {number * control.factor:g} {control.unit}".rstrip()
 

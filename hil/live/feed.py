@@ -128,7 +128,7 @@ class Feed:
         self._bits = 0
         events, self._events = self._events, []
         rows = [
-            [number, m.count, _rounded(m.cycle_ms), round((now_ns - m.last_ns) * 1e-9, 2), m.data.hex(),
+            [number, m.count, _rounded(m.cycle_ms), round(max(0, now_ns - m.last_ns) * 1e-9, 2), m.data.hex(),
              m.status, m.sound, *((m.checker.lost, m.checker.corrupt) if m.checker else (None, None))]
             for number, m in enumerate(self.messages)
             if m.count

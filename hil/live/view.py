@@ -38,6 +38,7 @@ def serve_view(
     *,
     port: int = 0,
     ready_fd: int | None = None,
+    wait_ns: int = 0,
     say: Callable[[str], None] = lambda _: None,
 ) -> None:
     """Serve the page until Ctrl-C or SIGTERM.
@@ -49,6 +50,7 @@ def serve_view(
     car : numbers that the page needs beside the signals: ``wheel_radius_m``, ``torque_constant_nm_a``.
     port : of the page; 0 for any that is free.
     ready_fd : where to say that the page is served.
+    wait_ns : how long to wait for somebody to open the page before that, ns.
     say : takes the page's address, and what is odd.
 
     Raises
@@ -88,7 +90,7 @@ def serve_view(
                     mailbox.put(greet())
                 else:
                     asked.put_nowait((wish, mailbox))
-            except ValueError as error:
+            except (ValueError, RecursionError) as error:
                 mailbox.put(_said(f"not a command: {error}", wrong=True))
             except Full:
                 mailbox.put(_said("too many commands at once; this one was dropped", wrong=True))
@@ -97,6 +99,7 @@ def serve_view(
         stack.callback(server.close)
         say(server.url)
         with stop.at_once():
+            _wait_for_page(server, wait_ns)
             say_ready(ready_fd)
         for tick in Loop(WallClock(), TICK_NS, _PHASE_NS).ticks():
             if stop.asked:
@@ -116,6 +119,13 @@ def serve_view(
                 more = {"values": controls.values, "armed": controls.armed, "dropped": server.dropped}
                 server.send(feed.state(clock_ns, more))
         server.send(json.dumps({"kind": "end"}))
+
+
+def _wait_for_page(server: Server, wait_ns: int) -> None:
+    clock = WallClock()
+    deadline_ns = clock.now_ns() + wait_ns
+    while not server.pages and clock.now_ns() < deadline_ns:
+        clock.sleep_until(clock.now_ns() + TICK_NS)
 
 
 def _carry_out(now_ns: int, controls: Controls, asked: "Queue[Asked]", server: Server) -> None:

@@ -112,6 +112,8 @@ def test_the_page_is_told_of_every_fault_but_those_of_the_laboratory():
         ({"do": "set", "name": "handbrake", "value": 1}, "expected one of pedal"),
         ({"do": "set", "name": "pedal", "value": 1.5}, "from 0 to 1, got 1.5"),
         ({"do": "set", "name": "pedal", "value": float("nan")}, "got nan"),
+        ({"do": "set", "name": "pedal", "value": 10**4000}, "got 1000"),
+        ({"do": "set", "name": "pedal", "value": -float("inf")}, "got -inf"),
         ({"do": "set", "name": "pedal", "value": "1"}, "got '1'"),
         ({"do": "set", "name": "pedal", "value": True}, "got True"),
         ({"do": "set", "name": ["pedal"], "value": 1}, "expected one of"),
