@@ -82,6 +82,13 @@ def test_values_move_and_a_fault_from_the_page_is_seen_found_and_on_record(live,
         page.wait("plots[3].traces.every((trace) => trace.course.end > 50)")
         page.wait("parseFloat(byId('load').textContent) > 10")
 
+        page.run("byId('find').focus()")
+        page.ask("Input.insertText", text="STEERING.STEERING_WHEEL_ANGLE")
+        page.press("Enter", 13)
+        page.wait("plots.length === 9 && plots[8].traces[0].course.end > 20")
+        page.run("document.querySelector('.remove').click()")
+        assert page.run("[plots.length, document.querySelectorAll('#plots figure').length]") == [8, 8]
+
         # by keyboard alone: open the faults, go to the button, press it
         page.run("document.querySelector('#faultbox summary').focus()")
         page.press("Enter", 13)

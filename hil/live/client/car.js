@@ -44,7 +44,7 @@ class Car {
 
   show() {
     const v = store.value("TRUTH_MOTION.SPEED");
-    const text = (value, digits) => (value === null || Number.isNaN(value) ? "–" : value.toFixed(digits));
+    const text = (value, digits) => (value === null ? "–" : value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1")); // no minus zero
     for (const w of WHEELS) {
       const omega = store.value(`WHEEL_SPEED_${AXLE[w]}.WHEEL_SPEED_${w}`);
       const current = store.value(`MOTOR_STATUS_${AXLE[w]}.CURRENT_${w}`);

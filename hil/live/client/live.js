@@ -82,7 +82,10 @@ function draw() {
   car?.show();
 }
 
-byId("find").onchange = (event) => { if (choose(event.target.value.trim())) event.target.value = ""; };
+byId("find").onchange = ({ target }) => { if (choose(target.value.trim())) target.value = ""; };
+byId("find").oninput = ({ target, inputType }) => {
+  if (!inputType || inputType === "insertReplacementText") target.onchange({ target }); // picked from the list
+};
 byId("window").onchange = () => { fresh = true; };
 byId("pause").onclick = (event) => {
   frozen = frozen === null ? store.now : null;
