@@ -1,7 +1,7 @@
 """The bench in real time: recorder, plant and ECU as processes on their buses."""
 
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from dbc.frame import BusName, Frame, Received
@@ -24,7 +24,9 @@ READY_TIMEOUT_NS = 120_000_000_000  # a first start compiles the plant
 _LOOK_NS = 50_000_000  # how often a stop is looked at meanwhile
 _TRACEBACK = "Traceback (most recent call last)"
 RECORDER = "recorder"
+VIEWER = "live"
 OTHERS_TIMEOUT_NS = 120_000_000_000  # how long we wait for a node that somebody else starts
+PAGE_TIMEOUT_NS = 30_000_000_000  # how long a run waits for somebody to open its live page: a stop takes 10 s
 SETTLE_NS = 500_000_000  # how long a bench keeps recording after a process died, so that the reaction is on record
 NODES = ("plant", "ecu")
 
@@ -39,6 +41,7 @@ class RealBench(BenchRun):
     realtime : as of the commands ``plant`` and ``ecu``.
     without : nodes that somebody else puts on the bus: ``plant``, ``ecu``.
     transmit : whether a bus with hardware may be sent to; it is refused else.
+    live : whether a page shows the run and commands it (`hil.live`).
 
     Attributes
     ----------
@@ -60,6 +63,7 @@ class RealBench(BenchRun):
         stop: StopSignal | None = None,
         without: Sequence[str] = (),
         transmit: bool = False,
+        live: bool = False,
     ) -> None:
         check_transmit(bus, transmit, "a run sends")
         with contextlib.ExitStack() as stack:
@@ -70,6 +74,8 @@ class RealBench(BenchRun):
         self._joined = self.spec  # what recorder and nodes join
         self._sharer: list[Child] = []  # none, or the one that has the adapter
         self.state = BenchState.CLAIMED
+        self._viewer: list[Child] = []  # none, or the one that serves the page: whatever becomes of it, the run goes on
+        self._live = live
         self._realtime = realtime
         self._node_options = ["--transmit", *(["--realtime"] if realtime else [])]
         self._without = frozenset(without)
@@ -114,7 +120,7 @@ class RealBench(BenchRun):
             words = [name, self.scenario.source, "--seed", str(self._seed), *self._node_options]
             self._spawn(name, words, self._children, self._joined)
             self._waiting.append((round(order[name] * 1e9), self._children[-1]))
-        if not self._await_ready(self._children[1:]):
+        if not self._await_ready(self._children[1:]) or (self._live and not self._open_page()):
             return
         self.punctuality = self._granted()
         self._say(self.punctuality)
@@ -134,6 +140,27 @@ class RealBench(BenchRun):
         child.release()
         self._joined = shared_channel(self.spec)
         self._say(f"one process has the adapter; it is shared on {self._joined}")
+        return True
+
+    def _open_page(self) -> bool:
+        """Have a process of its own serve the live page; False where somebody asks to stop before."""
+        words = self.out / f"{VIEWER}.txt"
+        words.touch(0o600)  # it holds the page's token, which is for nobody else on this machine
+        wait_s = f"{PAGE_TIMEOUT_NS * 1e-9:g}"
+        arguments = ["watch", "--scenario", self.scenario.source, "--wait", wait_s]
+        self._spawn(VIEWER, arguments, self._viewer, self._joined)
+        told = False
+
+        def tell() -> None:
+            nonlocal told
+            if not told and (text := words.read_text()).endswith("\n"):
+                self._say(f"live page: {text.strip()}\nthe run begins once it is open, or after {wait_s} s")
+                told = True
+
+        if not self._await_ready(self._viewer, tell):
+            return False
+        tell()
+        self._viewer[0].release()
         return True
 
     def _listen(self) -> None:
@@ -166,13 +193,14 @@ class RealBench(BenchRun):
         except OSError as error:
             raise BenchError(f"{name} cannot be started: {error}") from error
 
-    def _await_ready(self, children: Sequence[Child]) -> bool:
+    def _await_ready(self, children: Sequence[Child], meanwhile: Callable[[], None] = lambda: None) -> bool:
         """Wait until all are ready; False where somebody asks to stop before."""
         deadline_ns = WallClock().now_ns() + READY_TIMEOUT_NS
         for child in children:
             while not child.wait_ready(_LOOK_NS * 1e-9):
                 if self._asked_to_stop:
                     return False
+                meanwhile()
                 for bus in self._buses.values():  # what comes before the start is of no use, and must not pile up
                     bus.receive(0.0)
                 if child.ended or WallClock().now_ns() > deadline_ns:
@@ -207,6 +235,8 @@ class RealBench(BenchRun):
         tick = next(self._ticks)
         self._release(tick.now_ns)
         received: list[Received] = [item for bus in self._buses.values() for item in bus.receive(0.0)]
+        if self._live:
+            self.stimulus_node.give_way(tick.now_ns, received)
         frames: list[Frame] = self.stimulus_node.step(tick.now_ns, received)
         for name, bus in self._buses.items():
             mine = [frame for frame in frames if frame.bus is name]
@@ -223,7 +253,7 @@ class RealBench(BenchRun):
         waiting, self._waiting = self._waiting, []
         for _, child in waiting:  # who waits for its release does not hear us
             child.release()
-        for group in (nodes, recorder, self._sharer):
+        for group in (nodes, self._viewer, recorder, self._sharer):
             for child in group:
                 child.ask_to_stop()
             wait_for_end(group)

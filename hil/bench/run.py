@@ -93,6 +93,7 @@ def run_scenario(
     without: Sequence[str] = (),
     transmit: bool = False,
     plant: "OpenPlant | None" = None,
+    live: bool = False,
 ) -> Outcome:
     """Run one scenario in real or in virtual time and measure it.
 
@@ -100,6 +101,7 @@ def run_scenario(
     ----------
     name : of the library, a path, or a scenario that was read already (in virtual time alone: nodes read a file).
     plant : in virtual time, somebody else's FMU in the place of our car.
+    live : in real time, serve a page that shows the run and commands it.
 
     Raises
     ------
@@ -119,7 +121,7 @@ def run_scenario(
             node = None if plant is None else plant.node(scenario)
             bench_run = VirtualBench(scenario, folder, seed, say, stop, node, line=line)
         else:
-            bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without, transmit)
+            bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without, transmit, live)
         with bench_run:
             say(f"bus {bench_run.spec}" + (f" ({bench_run.note})" if bench_run.note else ""))
             bench_run.run()

@@ -18,7 +18,7 @@ from dbc.bench_messages import (
     StimulusRoad,
     TruthMotion,
 )
-from dbc.contract import Message
+from dbc.contract import Message, spec_of
 from dbc.exchange import Receiver, Transmitter
 from dbc.frame import BusName, Frame, Received
 from hil.faults.fault import FROM_THE_FIRST_TICK, MOST_SEEDS, Injection, Side
@@ -28,6 +28,7 @@ from plant.manoeuvre import Trace, value_at
 
 BENCH_PHASE_NS = 2_500_000  # after the plant, before the controller: each hears the stimulus at its next tick
 _MANOEUVRE, _FINISHED = TruthMotion._fields.index("manoeuvre"), float(ManoeuvreState.FINISHED)
+_LEFT_NS = 50_000_000  # five cycles of the stimulus, half of what its receivers wait for it
 _OPENING_FRAMES = 3  # fault commands without a fault: the receiver's sequence stands before one counts
 
 
@@ -51,6 +52,8 @@ _CHANNELS: tuple[tuple[type[Message], tuple[Channel, ...]], ...] = (
     (StimulusRoad, (Channel.FRICTION_LEFT, Channel.FRICTION_RIGHT, Channel.GRADE)),
 )
 """What each message of the stimulus carries, in the order of its fields."""
+_ID_OF = {channels: spec_of(kind).can_id for kind, channels in _CHANNELS}
+_STIMULUS_IDS = frozenset(_ID_OF.values())
 
 
 class _Planned(NamedTuple):
@@ -103,6 +106,7 @@ class StimulusNode:
         self._receiver = Receiver((TruthMotion,))
         self._truth = self._receiver.values
         self._transmitter = Transmitter()
+        self._left_until_ns: dict[int, int] = {}
         for fault in faults:
             self.plan(fault)
 
@@ -148,6 +152,12 @@ class StimulusNode:
         """Value of a channel that acts next; None where it is not stimulated."""
         trace = self._traces.get(channel)
         return value_at(trace, self.next_s) if trace else None
+
+    def give_way(self, now_ns: int, inbox: Iterable[Received]) -> None:
+        """Leave messages of the stimulus to somebody else who sends them: a person at the live page."""
+        for item in inbox:
+            if item[1] in _STIMULUS_IDS and isinstance(item, Frame) and item.bus is BusName.BENCH:
+                self._left_until_ns[item.can_id] = now_ns + _LEFT_NS
 
     def plan(self, fault: FaultEvent | Injection) -> None:
         """Add a fault to come."""
@@ -202,6 +212,8 @@ class StimulusNode:
         if self._traces:
             next_s = self.next_s
             for batch, channels in self._stimulated:
+                if self._left_until_ns and self._left_until_ns.get(_ID_OF[channels], 0) > now_ns:
+                    continue
                 traces = [self._traces.get(channel) for channel in channels]
                 batch.write(*[value_at(trace, next_s) if trace else nan for trace in traces])
                 frames += batch.frames(now_ns)

@@ -25,6 +25,7 @@ COMMANDS = (
     "share",
     "tunnel",
     "record",
+    "watch",
     "inject",
     "diag",
     "replay",

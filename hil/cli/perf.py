@@ -8,7 +8,7 @@ from dataclasses import asdict
 from hil.cli.options import add_json
 from hil.errors import BrakebenchError
 
-MEASUREMENTS = ("rt", "plant", "ecu", "codec", "loop", "decode", "explain")
+MEASUREMENTS = ("rt", "plant", "ecu", "codec", "loop", "decode", "explain", "live")
 """Each is a module of hil.validation.perf with ``measure() -> list[Row]``."""
 
 

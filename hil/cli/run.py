@@ -26,6 +26,11 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         default=[],
         help="do not start this node: it is somebody else's, on the same bus",
     )
+    parser.add_argument(
+        "--live",
+        action="store_true",
+        help="serve a page on 127.0.0.1 that shows the run and commands it; see docs/live.md",
+    )
     parser.add_argument("--extend", type=Path, metavar="FILE", help="extension that `explain` wrote: the car it taught")
     parser.add_argument(
         "--plant",
@@ -56,6 +61,12 @@ def run(args: argparse.Namespace) -> int:
         )
     if timed and not args.virtual:
         raise BrakebenchError(f"--bus {args.bus}: a timed bus is in virtual time; add --virtual")
+    if args.live:
+        from hil.cli.watch import check_extra
+
+        if args.virtual:
+            raise BrakebenchError("--live shows a run in real time: leave out --virtual")
+        check_extra()
     if (args.plant is None) != (args.map is None) or (args.plant is not None and not args.virtual):
         raise BrakebenchError("--plant FMU: give it with --map MAP.toml and --virtual")
     scenario, out = args.scenario, args.out
@@ -88,6 +99,7 @@ def run(args: argparse.Namespace) -> int:
             command_line=" ".join(sys.argv[1:]),
             say=lambda line: print(line, file=sys.stderr, flush=True),
             plant=foreign,
+            live=args.live,
         )
     if args.json:
         print(outcome.json_text())

@@ -1,6 +1,19 @@
 "use strict";
 // Lines, points and intervals on a canvas; X and Y turn values into its px.
 
+// Place of the sample nearest to t among increasing times.
+function nearest(x, t) {
+  let low = 0, high = x.length - 1;
+  while (high - low > 1) { const mid = (low + high) >> 1; if (x[mid] > t) high = mid; else low = mid; }
+  return Math.abs(x[low] - t) <= Math.abs(x[high] - t) ? low : high;
+}
+
+// Place of the last sample at t or before.
+function latest(x, t) {
+  const i = nearest(x, t);
+  return i > 0 && x[i] > t ? i - 1 : i;
+}
+
 // Samples to draw: all of a curve; of a course what is seen from `seen[0]` to `seen[1]`, and one more on both sides.
 function part({ x }, seen) {
   if (!seen || !x.length) return [0, x.length];

@@ -38,19 +38,6 @@ function scaleFor(range) {
   return largest > 1e12 || (largest > 0 && largest < 1e-9) ? 10 ** -Math.floor(Math.log10(largest)) : 1;
 }
 
-// Place of the sample nearest to t among increasing times.
-function nearest(x, t) {
-  let low = 0, high = x.length - 1;
-  while (high - low > 1) { const mid = (low + high) >> 1; if (x[mid] > t) high = mid; else low = mid; }
-  return Math.abs(x[low] - t) <= Math.abs(x[high] - t) ? low : high;
-}
-
-// Place of the last sample at t or before.
-function latest(x, t) {
-  const i = nearest(x, t);
-  return i > 0 && x[i] > t ? i - 1 : i;
-}
-
 const gaps = (values) => values && Float64Array.from(values, (v) => v ?? NaN);
 
 class Plot {
