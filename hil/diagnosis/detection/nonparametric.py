@@ -111,7 +111,7 @@ class BasisFunction(Candidate):
 
     def applied(self, base: ParameterSet, value: float) -> ParameterSet:
         """The parameter set with this coefficient added."""
-        return replace(base, nonparametric_rows=np.vstack([base.nonparametric_rows, self.row(value)]))
+        return base.with_rows(self.row(value))
 
 
 @dataclass(frozen=True, eq=False)

@@ -110,7 +110,11 @@ class _Whitened:
 
 
 class Fitter:
-    """Fits models of one dataset; ``nuisance_columns`` is the Jacobian, (samples, nuisances) by track, in prior sd."""
+    """Fits models of one dataset.
+
+    ``nuisance_columns`` is the Jacobian, (samples, nuisances) by track, in prior sd. ``origin`` (nuisances,) is the car
+    that deviations count from: the one told, or the one that reference logs show.
+    """
 
     def __init__(
         self,
@@ -119,9 +123,11 @@ class Fitter:
         base: ParameterSet,
         nuisances: Sequence[Nuisance],
         nuisance_columns: Tracks,
+        origin: Floats | None = None,
     ) -> None:
         self.simulator, self.masks, self.base = simulator, masks, base
         self.nuisances, self.nuisance_jacobian = tuple(nuisances), nuisance_columns
+        self.origin = np.zeros(len(self.nuisances)) if origin is None else origin
         self.bound = np.array([nuisance.bound for nuisance in self.nuisances])
         self.upper = np.array([nuisance.upper for nuisance in self.nuisances])
         self.lower = np.array([nuisance.lower for nuisance in self.nuisances])
@@ -134,7 +140,7 @@ class Fitter:
     def copy(self) -> "Fitter":
         """A fitter whose Jacobian may be updated independently of this one."""
         columns = {name: values.copy() for name, values in self.nuisance_jacobian.items()}
-        return Fitter(self.simulator, self.masks, self.base, self.nuisances, columns)
+        return Fitter(self.simulator, self.masks, self.base, self.nuisances, columns, self.origin)
 
     def with_simulator(self, simulator: Simulator) -> "Fitter":
         """This fitter on another simulator of the same dataset; both share the Jacobian of the nuisances."""
@@ -178,8 +184,8 @@ class Fitter:
         return -2.0 * whiten(residual, self.masks, noise)[1] + float(z @ z)
 
     def start(self, enabled: bool = True) -> tuple[Model, Noise]:
-        """The nominal vehicle, and a first guess of the noise."""
-        z = np.zeros(len(self.nuisances))
+        """The vehicle at the origin, and a first guess of the noise."""
+        z = self.origin
         noise = first_guess(self.residual(z, ()), self.masks, enabled)
         return self.at(z, (), noise), noise
 
@@ -337,7 +343,7 @@ class Fitter:
         no data determine stays at 0. There, if the ratio of all is large, a nuisance at its bound counts as if it were
         twice as far.
         """
-        z, bound = z[self._counted], self.bound[self._counted]
+        z, bound = (z - self.origin)[self._counted], self.bound[self._counted]
         squares = np.square(z)
         if effective_parameters is None:
             return max(1.0, float(squares.sum()) / max(len(z), 1.0))

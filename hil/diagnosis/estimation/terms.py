@@ -4,9 +4,8 @@ Takes the effects of the plant; gives the columns of their Jacobian and the cand
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
-from hil.diagnosis.data.log import Floats
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from plant.effects.effect import NODES, Effect, Parameter, Scope
 from plant.injection.theta import THETA
@@ -54,9 +53,7 @@ class Column:
 
     def stepped(self, parameters: ParameterSet) -> ParameterSet:
         """The parameter set with this entry one step off."""
-        theta: Floats = parameters.theta.copy()
-        theta[self.at] += self.step
-        return replace(parameters, theta=theta)
+        return parameters.adding((self.at,), self.step)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,11 +91,8 @@ class Candidate:
 
     def applied(self, parameters: ParameterSet, value: float) -> ParameterSet:
         """The parameter set with ``value`` added to the parameter at the location."""
-        theta: Floats = parameters.theta.copy()
         start = THETA.slice(self.effect.name, self.parameter.name).start
-        for member in self.members():
-            theta[start + member] += value
-        return replace(parameters, theta=theta)
+        return parameters.adding([start + member for member in self.members()], value)
 
 
 def typical_size(parameter: Parameter) -> float:

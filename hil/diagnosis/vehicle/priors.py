@@ -48,6 +48,12 @@ class NuisanceKind(StrEnum):
     """Lag of a toothed wheel's speed."""
     TOOTH_WINDOW = "tooth_window"
     """Time over which a toothed wheel's speed is a mean; not negative."""
+    LEARNED = "learned"
+    """Strength of a listed effect that reference logs and the others share, in theta."""
+    OF_THE_DAY = "of_the_day"
+    """What differs from the day of the reference logs to that of the others, in theta."""
+    DISC_TEMPERATURE_OF_THE_DAY = "disc_temperature_of_the_day"
+    """Temperature of the discs at the start, beside that of the reference logs."""
 
 
 _NOT_NEGATIVE = (NuisanceKind.TOOTH_WINDOW, NuisanceKind.LINE_LAG)
@@ -350,3 +356,46 @@ def recording_nuisances(disc_measured: bool, latencies: Sequence[Latency]) -> li
         *late,
         *(_in_theta(f"zero_{name}", "imu_bias", name, sd) for name, sd in ZERO_SD.items()),
     ]
+
+
+_TWO_DAYS = 2.0**0.5
+"""Each of two days is off by itself."""
+_OF_THE_DAY = (
+    ("headwind", "wind_mps", 1.0), ("headwind", "drag_gain", 0.03), ("road_grade", "grade", 0.0025),
+    ("rolling_resistance", "gain", 0.05), ("imu_bias", "ax_mps2", 0.025), ("imu_bias", "ay_mps2", 0.01),
+    ("imu_bias", "yaw_rate_rad_s", 0.0005), ("steer_lateral", "offset_rad", 0.0005),
+)  # fmt: skip
+"""Effect, parameter and standard deviation on one day, of the whole car: wind and slope as in `INSTRUMENTS`, density of
+the air (10 K and 10 hPa), rolling resistance (10 K of air: SAE J1263 corrects 0.6 % a kelvin), zeros of the inertial
+unit (`INSTRUMENTS`, `ZERO_SD`), steering wheel straight ahead (a tenth of `_STRAIGHT_AHEAD_RAD`)."""
+
+
+def of_the_day(nuisances: Sequence[Nuisance], p: Floats, disc_measured: bool) -> list[Nuisance]:
+    """What differs between the day of reference logs and that of the others, with a car unchanged.
+
+    Load and the road's friction vary within the tolerances of ``nuisances``, the car's own; temperature of the discs,
+    wind, slope, air, zeros of sensors as they usually do.
+    """
+    rows = [*_OF_THE_DAY, ("pressure_offset", "offset_pa", _sd("pressure_offset", "offset_pa"))]
+    steps = {one.name: one.step[0] for one in nuisances}
+    if mass := steps.get("vehicle_mass_kg"):
+        rows.append(("mass_offset", "mass_kg", mass / _TWO_DAYS))
+    if grip := steps.get("tyre_lmux"):
+        rows.append(("mu_road", "scale", grip / float(p[P.tyre_lmux]) / _TWO_DAYS))
+    found = []
+    for effect, parameter, sd in rows:
+        own = THETA.slice(effect, parameter)
+        at, step = tuple(range(own.start, own.stop)), _TWO_DAYS * sd
+        low, high = (limit / step for limit in _limits(effect, parameter))
+        name = f"{effect}.{parameter}_of_the_day"
+        found.append(
+            Nuisance(name, at, (step,) * len(at), NuisanceKind.OF_THE_DAY, upper_bound=high, lower_bound=low)
+        )
+    disc_sd_k = _TWO_DAYS * (DISC_MEASURED_SD_K if disc_measured else DISC_ASSUMED_SD_K)
+    kind = NuisanceKind.DISC_TEMPERATURE_OF_THE_DAY
+    return [*found, Nuisance("disc_temperature_of_the_day", (0,), (disc_sd_k,), kind)]
+
+
+def _limits(effect: str, parameter: str) -> tuple[float, float]:
+    declared = THETA.effect(effect).parameter(parameter)
+    return declared.low, declared.high
