@@ -9,7 +9,15 @@ from dataclasses import replace
 import numpy as np
 
 from hil.diagnosis.data.dataset import SLOW_MPS
-from hil.diagnosis.data.log import MOTOR_DEMAND, MOTOR_TORQUE, PRESSURE, PRESSURE_DEMAND, WHEEL_SPEED, Log, UnusableError
+from hil.diagnosis.data.log import (
+    MOTOR_DEMAND,
+    MOTOR_TORQUE,
+    PRESSURE,
+    PRESSURE_DEMAND,
+    WHEEL_SPEED,
+    Log,
+    UnusableError,
+)
 
 _BRAKED_PA, _BRAKED_S = 2e5, 1.0
 """Pressure, and the time above it while the car moves, of braking that tells of the brakes."""
@@ -82,8 +90,8 @@ def _with_only(logs: Sequence[Log], left_out: set[str]) -> list[Log]:
 
 def _without(what: str, of_logs: set[str], of_reference: set[str]) -> str:
     return (
-        f"--reference: no {what} in both; the reference has {', '.join(sorted(of_reference))}, the logs to be explained "
-        f"have {', '.join(sorted(of_logs))}; give reference logs with the channels of these"
+        f"--reference: no {what} in both; the reference has {', '.join(sorted(of_reference))}, the logs to be "
+        f"explained have {', '.join(sorted(of_logs))}; give reference logs with the channels of these"
     )
 
 

@@ -121,9 +121,7 @@ def _shown(fitter: Fitter, model: Model, noise: Noise, candidates: CandidateSet)
     return [listed[k] for k in chosen]
 
 
-def _tests(
-    listed: Sequence[Candidate], b: Floats, q: Floats, prior: Floats, chosen: Sequence[int]
-) -> list[ScoreTest]:
+def _tests(listed: Sequence[Candidate], b: Floats, q: Floats, prior: Floats, chosen: Sequence[int]) -> list[ScoreTest]:
     """Score tests of all but those chosen, which are marginalised; what needs more than noise to show has none."""
     at = list(chosen)
     if at:

@@ -45,9 +45,9 @@ def build_report(answer: Answer, sources: Sequence[str]) -> Report:
         reason=content["headline"],
         numbers=tuple(numbers(answer)),
         sections=(
-            _comparison(answer), *reference.section(diagnosis), moved(answer), *goodness_of_fit(answer), _patterns(answer), *_curves(answer),
-            _candidates(answer), held_out(answer), *stops.section(content.get("stops", ())),
-            channels_section(content), _limits(answer),
+            _comparison(answer), *reference.section(diagnosis), moved(answer), *goodness_of_fit(answer),
+            _patterns(answer), *_curves(answer), _candidates(answer), held_out(answer),
+            *stops.section(content.get("stops", ())), channels_section(content), _limits(answer),
         ),
         provenance={
             "logs": list(sources), "segments": len(diagnosis.dataset.segments),

@@ -144,9 +144,7 @@ class ParameterSet:
                         p[at] = _positive(p[at], amount, step)
                     case NuisanceKind.SIGNED:
                         p[at] += amount * step
-                    case (
-                        NuisanceKind.SENSOR | NuisanceKind.SIDE_TO_SIDE | NuisanceKind.LINE_LAG | NuisanceKind.LEARNED
-                    ):
+                    case NuisanceKind.SENSOR | NuisanceKind.SIDE_TO_SIDE | NuisanceKind.LINE_LAG | NuisanceKind.LEARNED:
                         theta[at] += amount * step
                     case NuisanceKind.OF_THE_DAY:
                         change[at] += amount * step

@@ -388,9 +388,7 @@ def of_the_day(nuisances: Sequence[Nuisance], p: Floats, disc_measured: bool) ->
         at, step = tuple(range(own.start, own.stop)), _TWO_DAYS * sd
         low, high = (limit / step for limit in _limits(effect, parameter))
         name = f"{effect}.{parameter}_of_the_day"
-        found.append(
-            Nuisance(name, at, (step,) * len(at), NuisanceKind.OF_THE_DAY, upper_bound=high, lower_bound=low)
-        )
+        found.append(Nuisance(name, at, (step,) * len(at), NuisanceKind.OF_THE_DAY, upper_bound=high, lower_bound=low))
     disc_sd_k = _TWO_DAYS * (DISC_MEASURED_SD_K if disc_measured else DISC_ASSUMED_SD_K)
     kind = NuisanceKind.DISC_TEMPERATURE_OF_THE_DAY
     return [*found, Nuisance("disc_temperature_of_the_day", (0,), (disc_sd_k,), kind)]
