@@ -85,7 +85,7 @@ def test_what_has_changed_since_a_reference_acts_in_later_logs_alone():
     pads, wind = THETA.slice("pad_mu_gain", "gain"), THETA.slice("headwind", "wind_mps")
     common = Nuisance("pad_mu_gain@front", (pads.start, pads.start + 1), (0.1, 0.1), NuisanceKind.LEARNED)
     days = of_the_day((), base.p, disc_measured=False)
-    at = [one.name for one in days].index("headwind.wind_mps_of_the_day")
+    at = [one.name for one in days].index("headwind.wind_mps_of_the_day_0")
     moved = base.with_nuisances((common, *days), np.append(0.5, np.eye(len(days))[at] + np.eye(len(days))[-1]))
     moved = moved.adding([pads.start], -0.2)
     assert moved.in_recording(1).theta[pads] == pytest.approx([0.05, 0.05, 0.0, 0.0])
