@@ -123,6 +123,11 @@ class BasisExpansion:
     functions: tuple[BasisFunction, ...]
 
     @property
+    def name(self) -> str:
+        """For people: term and location."""
+        return f"{self.term.name}@{self.location}"
+
+    @property
     def variable(self) -> str:
         """Name of the variable."""
         return _VARIABLE_NAMES[self.term.variable]

@@ -1,9 +1,9 @@
 """The car as reference logs show it: what the vehicle set, and the plant's equations, get wrong of it.
 
-Takes a dataset whose first recordings are the reference; gives its nuisance parameters, those listed effects included
-that the reference shows, or that a change might be taken for. Each of these has a *common* part, which acts in all
-recordings, beside the *change* that is looked for, which acts from the first other recording on. What both share is no
-change: it moves the common part alone.
+Takes a dataset whose first recordings are the reference; gives its nuisance parameters, those listed effects and
+nonparametric terms included that the reference shows, or that a change might be taken for. Each of these has a *common*
+part, which acts in all recordings, beside the *change* that is looked for, which acts from the first other recording
+on. What both share is no change: it moves the common part alone.
 """
 
 from collections.abc import Sequence
@@ -14,6 +14,8 @@ import numpy as np
 from hil.diagnosis.data.dataset import Dataset
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.candidates import CandidateSet
+from hil.diagnosis.detection.group_score_test import GroupScoreTest, best_of_each_term
+from hil.diagnosis.detection.nonparametric import BasisExpansion
 from hil.diagnosis.detection.result import Progress, Settings
 from hil.diagnosis.detection.score_test import ScoreTest, score, shortlist
 from hil.diagnosis.detection.threshold import SHORTLIST_MIN_GAIN
@@ -37,6 +39,11 @@ _MOST_DOUBTED = 12
 """Changes with the largest scores that get a common part each, besides half as many by gain and other locations."""
 
 
+_MOST_CURVES, _LEAST_CURVE_GAIN = 2, 20.0
+"""Nonparametric terms that get a common part, at most each time, and the gain in chi-squared from which on: that of
+`SHORTLIST_MIN_GAIN` for each coefficient, which noise exceeds once in 800 (five degrees of freedom)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Reference:
     """What the reference says.
@@ -44,18 +51,20 @@ class Reference:
     Attributes
     ----------
     recordings : how many of the dataset, its first ones, are the reference.
+    base : the nominal vehicle, with the rows of common nonparametric terms.
     nuisances : of the whole dataset, common ones first.  z : (nuisances,) as the reference shows them, in prior sds.
     """
 
     recordings: int
+    base: ParameterSet
     nuisances: tuple[Nuisance, ...]
     z: Floats
 
-    def with_common_parts(self, candidates: Sequence[Candidate]) -> "Reference":
+    def with_common_parts(self, candidates: Sequence[Candidate], curves: Sequence[BasisExpansion]) -> "Reference":
         """With a common part of each of these that has none yet."""
-        known = {one.name for one in self.nuisances}
-        added = [one for one in map(common_part, candidates) if one.name not in known]
-        return replace(self, nuisances=(*self.nuisances, *added), z=np.append(self.z, np.zeros(len(added))))
+        base, added = _common_parts(self.base, self.nuisances, candidates, curves)
+        z = np.append(self.z, np.zeros(len(added)))
+        return replace(self, base=base, nuisances=(*self.nuisances, *added), z=z)
 
 
 def common_part(candidate: Candidate) -> Nuisance:
@@ -66,6 +75,24 @@ def common_part(candidate: Candidate) -> Nuisance:
     return Nuisance(
         candidate.name, at, (sd,) * len(at), NuisanceKind.LEARNED, max(-low, high), upper_bound=high, lower_bound=low
     )
+
+
+def _common_parts(
+    base: ParameterSet, known: Sequence[Nuisance], candidates: Sequence[Candidate], curves: Sequence[BasisExpansion]
+) -> tuple[ParameterSet, list[Nuisance]]:
+    """Common parts of candidates and nonparametric terms not ``known`` yet; the vehicle with rows of the latter."""
+    names = {one.name for one in known}
+    added = [one for one in map(common_part, candidates) if one.name not in names]
+    rows = base.nonparametric_rows
+    for function in (one for curve in curves for one in curve.functions):
+        if function.name in names:
+            continue
+        none, unit, typical = function.row(0.0), function.row(1.0), function.term.typical
+        at = tuple((rows.size + np.flatnonzero(unit != none)).tolist())
+        bound = function.parameter.high / typical
+        added.append(Nuisance(function.name, at, (typical,) * len(at), NuisanceKind.LEARNED_CURVE, bound))
+        rows = np.vstack([rows, none])
+    return replace(base, nonparametric_rows=rows), added
 
 
 def since(base: ParameterSet, recordings: int) -> ParameterSet:
@@ -83,24 +110,27 @@ def fit_reference(
     masks = SampleMasks.of(simulator.dataset)
     fit = NuisanceFit(simulator, masks, vehicle, base, settings.relinearise)
     model, noise = fit.fit(*fit.fitter.start(settings.noise_model))
-    for _ in range(_ROUNDS):
-        candidates = CandidateSet(fit.fitter.simulator, masks, vehicle.undiagnosable_effects)
-        progress(f"the reference: Jacobian of {len(candidates.candidates)} candidates")
-        shown = _shown(fit.fitter.at_baseline(model), model, noise, candidates)
-        if not shown:
-            break
-        progress(f"the reference shows {', '.join(one.name for one in shown)}")
-        known = {one.name for one in fit.nuisances}
-        added = [one for one in map(common_part, shown) if one.name not in known]
+    for turn in range(_ROUNDS + 1):
+        shown: list[Candidate] = []
+        curves: list[BasisExpansion] = []
+        if turn < _ROUNDS:
+            candidates = CandidateSet(fit.fitter.simulator, masks, vehicle.undiagnosable_effects)
+            progress(f"the reference: Jacobian of {len(candidates.candidates)} candidates")
+            shown = _shown(fit.fitter.at_baseline(model), model, noise, candidates)
+        elif settings.dictionary:
+            progress("the reference: simulating nonparametric terms")
+            curves = curves_shown(fit.fitter, model, noise)
+        base, added = _common_parts(base, fit.nuisances, shown, curves)
         if not added:
-            break
+            continue
+        progress(f"the reference shows {', '.join([one.name for one in shown] + [one.name for one in curves])}")
         z = np.append(model.z, np.zeros(len(added)))
         fit = NuisanceFit(simulator, masks, vehicle, base, settings.relinearise, (*fit.nuisances, *added), z)
         model, noise = fit.fit(fit.fitter.at(z, (), noise), noise)
     others = dataset.recordings[recordings:]
     measured = all(one.log.disc_temperature_k is not None for one in (*alone.recordings, *others))
     days = of_the_day(vehicle.nuisances, base.p, measured)
-    return Reference(recordings, (*fit.nuisances, *days), np.append(model.z, np.zeros(len(days))))
+    return Reference(recordings, base, (*fit.nuisances, *days), np.append(model.z, np.zeros(len(days))))
 
 
 def _shown(fitter: Fitter, model: Model, noise: Noise, candidates: CandidateSet) -> list[Candidate]:
@@ -129,6 +159,14 @@ def _tests(listed: Sequence[Candidate], b: Floats, q: Floats, prior: Floats, cho
         b, q = b - q[:, at] @ solved[:, 0], q - q[:, at] @ solved[:, 1:]
     tests = [score(one, float(b[k]), float(q[k, k])) for k, one in enumerate(listed) if k not in at]
     return [item for item in tests if item.raw_gain >= SHORTLIST_MIN_GAIN]
+
+
+def curves_shown(fitter: Fitter, model: Model, noise: Noise) -> list[BasisExpansion]:
+    """Nonparametric terms that the data show most clearly, each at its best location."""
+    fitter = fitter.at_baseline(model)
+    scores, _ = GroupScoreTest(fitter, fitter.parameter_set(model.z, model.terms)).scores(fitter, model, noise)
+    best = best_of_each_term(scores, _MOST_CURVES)
+    return [entry.expansion for entry in best if entry.gain >= _LEAST_CURVE_GAIN]
 
 
 def doubted(tests: Sequence[ScoreTest]) -> list[Candidate]:

@@ -20,7 +20,10 @@ _SHOWN_CORRELATION = 0.5
 """Correlation with a cause's value from which on a number matters to it."""
 _TWO_SIDED_95 = 1.96
 _AT_BOUND = 1e-3
-BESIDE_REFERENCE = (NuisanceKind.LEARNED, NuisanceKind.OF_THE_DAY, NuisanceKind.DISC_TEMPERATURE_OF_THE_DAY)
+BESIDE_REFERENCE = (
+    NuisanceKind.LEARNED, NuisanceKind.LEARNED_CURVE, NuisanceKind.OF_THE_DAY,
+    NuisanceKind.DISC_TEMPERATURE_OF_THE_DAY,
+)  # fmt: skip
 """Nuisance parameters that reference logs bring, and no vehicle set has a key for."""
 
 Value = float | list[float]

@@ -135,6 +135,9 @@ class ParameterSet:
         """With nuisances ``z`` prior standard deviations off, (nuisances,)."""
         p, disc, late, tooth = self.p.copy(), self.disc_offset_k, list(self.latency_s), self.tooth_share
         theta, window = self.theta.copy(), self.window_rows2
+        rows = self.nonparametric_rows
+        if any(nuisance.kind is NuisanceKind.LEARNED_CURVE for nuisance in nuisances):
+            rows = rows.copy()
         change = np.zeros(THETA.size) if self.change is None else self.change.theta.copy()
         disc_change = 0.0 if self.change is None else self.change.disc_offset_k
         for nuisance, amount in zip(nuisances, z, strict=True):
@@ -146,6 +149,8 @@ class ParameterSet:
                         p[at] += amount * step
                     case NuisanceKind.SENSOR | NuisanceKind.SIDE_TO_SIDE | NuisanceKind.LINE_LAG | NuisanceKind.LEARNED:
                         theta[at] += amount * step
+                    case NuisanceKind.LEARNED_CURVE:
+                        rows.flat[at] += amount * step
                     case NuisanceKind.OF_THE_DAY:
                         change[at] += amount * step
                     case NuisanceKind.DISC_TEMPERATURE_OF_THE_DAY:
@@ -170,7 +175,7 @@ class ParameterSet:
             since = replace(self.change, theta=change, disc_offset_k=disc_change)
         return replace(
             self, p=p, theta=theta, disc_offset_k=disc, latency_s=tuple(late), tooth_share=tooth, window_rows2=window,
-            onsets=onsets, change=since,
+            onsets=onsets, change=since, nonparametric_rows=rows,
         )  # fmt: skip
 
     def with_extension(self, extension: Extension, logs: Sequence[str] = ()) -> "ParameterSet":

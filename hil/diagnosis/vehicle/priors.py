@@ -50,6 +50,8 @@ class NuisanceKind(StrEnum):
     """Time over which a toothed wheel's speed is a mean; not negative."""
     LEARNED = "learned"
     """Strength of a listed effect that reference logs and the others share, in theta."""
+    LEARNED_CURVE = "learned_curve"
+    """Coefficient of a nonparametric term that they share, in its rows, row by row."""
     OF_THE_DAY = "of_the_day"
     """What differs from the day of the reference logs to that of the others, in theta."""
     DISC_TEMPERATURE_OF_THE_DAY = "disc_temperature_of_the_day"

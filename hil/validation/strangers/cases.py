@@ -27,8 +27,8 @@ SNR, REACHED = 15.0, 0.02
 class Case:
     """A drive of a car; ``hidden`` None is nothing. ``reached`` False: the cause's range ends before the ratio.
 
-    ``reference`` is the seed of a drive before with nothing hidden, None where there is none: of manoeuvres, noise, road
-    and sensors of its own, and of single wheels that differ from this one's by 0.4 to 0.6 of what wheels differ by.
+    ``reference`` is the seed of a drive before with nothing hidden, None where there is none: of manoeuvres, noise,
+    road and sensors of its own, and of single wheels that differ from this one's by half of what wheels differ by.
     """
 
     family: str
