@@ -40,7 +40,7 @@ def build_report(answer: Answer, sources: Sequence[str]) -> Report:
     content, diagnosis = answer.json, answer.diagnosis
     verdict = content["verdict"]
     return Report(
-        title="Measured data against the simulation",
+        title="Measured data against " + ("reference logs" if diagnosis.reference else "the simulation"),
         verdict={"none": Verdict.PASSED, "named": None}.get(verdict, Verdict.INCONCLUSIVE),
         reason=content["headline"],
         numbers=tuple(numbers(answer)),

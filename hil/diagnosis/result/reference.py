@@ -1,4 +1,4 @@
-"""What reference logs taught of the car beside its vehicle set: listed effects that it shares with them.
+"""What reference logs taught of the car beside its vehicle set: effects that the logs since share with them.
 
 Takes a diagnosis; gives them as ``reference`` of the JSON and as a section of the report.
 """
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hil.diagnosis.detection.result import Diagnosis
+from hil.diagnosis.estimation.model_discrepancy import UNLISTED
 from hil.diagnosis.result.moved_numbers import uncertainty
 from hil.diagnosis.result.phrases import place
 from hil.diagnosis.vehicle.priors import Nuisance, NuisanceKind
@@ -63,12 +64,25 @@ def _of(nuisance: Nuisance, z: float, half: float) -> Learned:
     )
 
 
+def learned_curves(diagnosis: Diagnosis) -> list[str]:
+    """Nonparametric terms, as ``friction.mu(speed)@front``, of which a coefficient is away from zero."""
+    half, _ = uncertainty(diagnosis)
+    each = zip(diagnosis.fitter.nuisances, diagnosis.final.z, half, strict=True)
+    clear = (
+        nuisance.name.removeprefix(f"{UNLISTED}.").rsplit(".", 1)
+        for nuisance, z, width in each
+        if nuisance.kind is NuisanceKind.LEARNED_CURVE and abs(z) > _CLEAR * width
+    )
+    return list(dict.fromkeys(f"{term}@{rest.split('@')[1]}" for term, rest in clear))
+
+
 def reference_as_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """The entry ``reference``: names of its logs, and what they taught."""
     recordings = diagnosis.dataset.recordings[: diagnosis.reference]
     return {
         "logs": [one.log.name.removeprefix("reference ") for one in recordings],
         "learned": [one.as_json() for one in learned(diagnosis)],
+        "learned_curves": learned_curves(diagnosis),
     }
 
 
@@ -87,6 +101,8 @@ def section(diagnosis: Diagnosis) -> tuple[Section, ...]:
         "What is explained is the change since these logs. What both share is no change: the numbers of the car, and "
         "the listed effects below, as which also count what the equations of the simulation get wrong."
     )
+    if curves := learned_curves(diagnosis):
+        text += f" Unknown functions that both share: {', '.join(curves)}."
     names = ", ".join(reference_as_json(diagnosis)["logs"])
     table = Table(
         f"Effects in the reference as in the logs since: {names}",
