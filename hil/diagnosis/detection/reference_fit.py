@@ -14,7 +14,7 @@ import numpy as np
 from hil.diagnosis.data.dataset import Dataset
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.candidates import CandidateSet
-from hil.diagnosis.detection.group_score_test import GroupScoreTest, best_of_each_term
+from hil.diagnosis.detection.group_score_test import GroupScoreTest
 from hil.diagnosis.detection.nonparametric import BasisExpansion
 from hil.diagnosis.detection.result import Progress, Settings
 from hil.diagnosis.detection.score_test import ScoreTest, score, shortlist
@@ -39,9 +39,9 @@ _MOST_DOUBTED = 12
 """Changes with the largest scores that get a common part each, besides half as many by gain and other locations."""
 
 
-_MOST_CURVES, _LEAST_CURVE_GAIN = 2, 20.0
-"""Nonparametric terms that get a common part, at most each time, and the gain in chi-squared from which on: that of
-`SHORTLIST_MIN_GAIN` for each coefficient, which noise exceeds once in 800 (five degrees of freedom)."""
+_LEAST_CURVE_GAIN = 20.0
+"""Gain in chi-squared from which on the best nonparametric term is learned: that of `SHORTLIST_MIN_GAIN` for each
+coefficient, which noise exceeds once in 800 (five degrees of freedom). One alone: each slows every simulation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +60,10 @@ class Reference:
     nuisances: tuple[Nuisance, ...]
     z: Floats
 
-    def with_common_parts(self, candidates: Sequence[Candidate], curves: Sequence[BasisExpansion]) -> "Reference":
+    def with_common_parts(self, candidates: Sequence[Candidate]) -> "Reference":
         """With a common part of each of these that has none yet."""
-        base, added = _common_parts(self.base, self.nuisances, candidates, curves)
-        z = np.append(self.z, np.zeros(len(added)))
-        return replace(self, base=base, nuisances=(*self.nuisances, *added), z=z)
+        _, added = _common_parts(self.base, self.nuisances, candidates, ())
+        return replace(self, nuisances=(*self.nuisances, *added), z=np.append(self.z, np.zeros(len(added))))
 
 
 def common_part(candidate: Candidate) -> Nuisance:
@@ -119,7 +118,7 @@ def fit_reference(
             shown = _shown(fit.fitter.at_baseline(model), model, noise, candidates)
         elif settings.dictionary:
             progress("the reference: simulating nonparametric terms")
-            curves = curves_shown(fit.fitter, model, noise)
+            curves = _curves_shown(fit.fitter, model, noise)
         base, added = _common_parts(base, fit.nuisances, shown, curves)
         if not added:
             continue
@@ -161,12 +160,11 @@ def _tests(listed: Sequence[Candidate], b: Floats, q: Floats, prior: Floats, cho
     return [item for item in tests if item.raw_gain >= SHORTLIST_MIN_GAIN]
 
 
-def curves_shown(fitter: Fitter, model: Model, noise: Noise) -> list[BasisExpansion]:
-    """Nonparametric terms that the data show most clearly, each at its best location."""
+def _curves_shown(fitter: Fitter, model: Model, noise: Noise) -> list[BasisExpansion]:
+    """The nonparametric term that the data show most clearly; empty where they show none."""
     fitter = fitter.at_baseline(model)
     scores, _ = GroupScoreTest(fitter, fitter.parameter_set(model.z, model.terms)).scores(fitter, model, noise)
-    best = best_of_each_term(scores, _MOST_CURVES)
-    return [entry.expansion for entry in best if entry.gain >= _LEAST_CURVE_GAIN]
+    return [entry.expansion for entry in scores[:1] if entry.gain >= _LEAST_CURVE_GAIN]
 
 
 def doubted(tests: Sequence[ScoreTest]) -> list[Candidate]:

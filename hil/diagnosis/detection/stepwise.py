@@ -23,7 +23,7 @@ from hil.diagnosis.detection.profile_fit import (
     refitted,
     unscored,
 )
-from hil.diagnosis.detection.reference_fit import Reference, curves_shown, doubted, fit_reference, since
+from hil.diagnosis.detection.reference_fit import Reference, doubted, fit_reference, since
 from hil.diagnosis.detection.result import Diagnosis, Progress, Settings, causes_in, selections
 from hil.diagnosis.detection.score_test import (
     OnsetTime,
@@ -149,14 +149,13 @@ class StepwiseSelection:
         self.fitter = self.fitter.at_baseline(model)
         candidates = candidates.at(self.fitter, model)
         blocks = self.fitter.information_blocks(model, candidates.jacobian, noise)
-        curves = curves_shown(self.fitter, model, noise) if self.settings.dictionary else []
-        more = reference.with_common_parts(doubted(candidates.scores(self.fitter, blocks, model, noise)), curves)
+        more = reference.with_common_parts(doubted(candidates.scores(self.fitter, blocks, model, noise)))
         added = len(more.z) - len(reference.z)
         if not added:
             return model, noise
         self.progress(f"{added} common parts of what may have changed")
         self.reference = more
-        self.nuisance_fit = self._nuisance_fit(self.fitter.simulator, since(more.base, more.recordings))
+        self.nuisance_fit = self._nuisance_fit(self.fitter.simulator, self.fitter.base)
         self.nominal_fitter = self.fitter
         self.nominal, _ = self.fitter.start(self.settings.noise_model)
         start = self.fitter.at(np.append(model.z, np.zeros(added)), (), noise)
