@@ -21,7 +21,7 @@ DRAG_NM = (0.0, 0.0, 120.0, 0.0)
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_weaker_front_pads_are_the_change_alone_or_with_what_is_tied(tmp_path: Path) -> None:
-    new, before = stops(first_seed=20, front=0.85), stops(first_seed=10)
+    new, before = stops(first_seed=20, front_share=0.85), stops(first_seed=10)
     answer = explain(new, SIX, reference=before, out=tmp_path)
     found = answer.json
     (cause,) = found["causes"]
