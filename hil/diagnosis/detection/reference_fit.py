@@ -22,8 +22,7 @@ from hil.diagnosis.detection.threshold import SHORTLIST_MIN_GAIN
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model
 from hil.diagnosis.estimation.information import marginalise
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
-from hil.diagnosis.estimation.terms import Candidate
-from hil.diagnosis.isolation.groups import summed
+from hil.diagnosis.estimation.terms import Candidate, summed
 from hil.diagnosis.noise.model import Noise, SampleMasks
 from hil.diagnosis.simulation.parameter_set import Change, ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator

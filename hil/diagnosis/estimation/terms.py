@@ -3,9 +3,12 @@
 Takes the effects of the plant; gives the columns of their Jacobian and the candidates made of these.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from hil.diagnosis.data.log import Floats
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from plant.effects.effect import NODES, Effect, Parameter, Scope
 from plant.injection.theta import THETA
@@ -93,6 +96,14 @@ class Candidate:
         """The parameter set with ``value`` added to the parameter at the location."""
         start = THETA.slice(self.effect.name, self.parameter.name).start
         return parameters.adding([start + member for member in self.members()], value)
+
+
+def summed(q: Floats, candidates: Sequence[Candidate], offset: int = 0) -> Floats:
+    """Information matrix of the candidates, (candidates, candidates): columns of one candidate are summed."""
+    moves = np.zeros((len(candidates), q.shape[0]))
+    for row, candidate in enumerate(candidates):
+        moves[row, [offset + k for k in candidate.columns]] = 1.0
+    return np.asarray(moves @ q @ moves.T)
 
 
 def typical_size(parameter: Parameter) -> float:
