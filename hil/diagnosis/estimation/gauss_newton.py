@@ -113,7 +113,7 @@ class Fitter:
     """Fits models of one dataset.
 
     ``nuisance_columns`` is the Jacobian, (samples, nuisances) by track, in prior sd. ``origin`` (nuisances,) is the car
-    that deviations count from: the one told, or the one that reference logs show.
+    that deviations count from: the nominal one, or the one that reference logs show.
     """
 
     def __init__(

@@ -23,10 +23,10 @@ def headline(
     is, and with which numbers of the car; or what has changed since the reference."""
     if verdict == "none":
         return _UNCHANGED if since_reference else _nothing(moved)
-    told = [sentence(cause) for cause in causes]
-    if since_reference and told:
-        told[0] = f"Changed since the reference: {_lower(told[0])}"
-    sentences = [f"{'; '.join(told)}."] if causes else []
+    each = [sentence(cause) for cause in causes]
+    if since_reference and each:
+        each[0] = f"Changed since the reference: {_lower(each[0])}"
+    sentences = [f"{'; '.join(each)}."] if causes else []
     if verdict in _OTHERS:
         sentences.append(_OTHERS[verdict])
     elif not causes:

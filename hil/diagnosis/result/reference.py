@@ -17,7 +17,7 @@ from hil.report.report import Section, Table
 from plant.injection.theta import THETA
 
 _CLEAR = 1.0
-"""Half-widths of its 95 % interval that an effect is away from zero to be told."""
+"""Half-widths of its 95 % interval that an effect is away from zero to be shown."""
 
 
 @dataclass(frozen=True)
