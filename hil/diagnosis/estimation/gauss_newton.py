@@ -132,6 +132,8 @@ class Fitter:
         self.upper = np.array([nuisance.upper for nuisance in self.nuisances])
         self.lower = np.array([nuisance.lower for nuisance in self.nuisances])
         self._counted = np.array([nuisance.kind is not NuisanceKind.SIDE_TO_SIDE for nuisance in self.nuisances])
+        counted = (one for one, taken in zip(self.nuisances, self._counted, strict=True) if taken)
+        self._of_the_day = np.array([one.kind is NuisanceKind.OF_THE_DAY for one in counted], bool)
         self._limits = [k for k, nuisance in enumerate(self.nuisances) if nuisance.name in _LIMITS]
         self.radius = float(simulator.vehicle.parameters.wheel.rolling_radius_m)
         self._measured = simulator.measured()
@@ -346,7 +348,9 @@ class Fitter:
         z, bound = (z - self.origin)[self._counted], self.bound[self._counted]
         squares = np.square(z)
         if effective_parameters is None:
-            return max(1.0, float(squares.sum()) / max(len(z), 1.0))
+            of_the_day = squares[self._of_the_day]  # these alone absorb a change since reference logs
+            day = float(of_the_day.mean()) if len(of_the_day) else 1.0
+            return max(1.0, float(squares.sum()) / max(len(z), 1.0), day)
         if squares.sum() >= BIASED_BIRGE_RATIO * len(z):
             squares = squares * np.where(np.abs(z) >= bound, 4.0, 1.0)
         return max(1.0, float(squares.sum()) / max(effective_parameters, 1.0))
