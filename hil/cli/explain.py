@@ -33,6 +33,10 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--logs", dest="about", type=Path, metavar="LOGS.toml", help="direction, disc temperature per file"
     )
+    parser.add_argument(
+        "--reference", nargs="+", type=Path, metavar="REF",
+        help="logs of the same car from before something changed, or a folder of them: the change is explained",
+    )  # fmt: skip
     parser.add_argument("--extend", type=Path, metavar="FILE", help="extension to start from")
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="write report.html, report.png, result.json, extension.toml"
@@ -60,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         answer = explain(
             list(args.logs), args.vehicle, channel_map=args.map, database=args.dbc, about=args.about,
-            extend=args.extend, out=args.out, progress=progress,
+            extend=args.extend, out=args.out, reference=args.reference, progress=progress,
         )  # fmt: skip
     except UnusableError as error:
         if not args.json:

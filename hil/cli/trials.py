@@ -27,7 +27,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "the cause open, then the manoeuvres that decide; twin, a sensor against its physical twin; not_testable, what "
         "the drive does not excite; parameters, gain and calibration score cases of single at 15 and 8 and run those "
         "alone that single has not run yet; strangers, cars of other equations by turns with nothing hidden, and "
-        "strangers_single, with one cause at signal-to-noise 15.",
+        "strangers_single, with one cause at signal-to-noise 15; strangers_reference and strangers_reference_single, "
+        "the same with reference logs of another day.",
     )
     parser.add_argument("--family", choices=FAMILIES, metavar="F", help="one of the families below (default: all)")
     parser.add_argument(

@@ -16,6 +16,7 @@ from hil.diagnosis.data.masks import is_straight_line
 from hil.diagnosis.data.paired_wheels import with_paired_wheels
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.data.read import from_frame, read_logs
+from hil.diagnosis.data.reference import with_shared_channels
 from hil.diagnosis.data.trial.run import on_trial
 from hil.diagnosis.detection.result import Progress, Settings
 from hil.diagnosis.detection.stepwise import diagnose
@@ -45,7 +46,7 @@ _INERTIAL = {"ax_mps2", "ay_mps2", "yaw_rate_rad_s"}
 def explain(
     logs: Any, vehicle: Path | str | Mapping[str, Any] | None = None, *, channel_map: Path | None = None,
     database: Path | None = None, about: Path | None = None, extend: Path | None = None, out: Path | None = None,
-    settings: Settings | None = None, progress: Progress | None = None,
+    reference: Any = None, settings: Settings | None = None, progress: Progress | None = None,
 ) -> Answer | Consistency | CoastDown | StopFigures:  # fmt: skip
     """Find what the simulation gets wrong in measured data, name its cause, extend the model and measure the gain.
 
@@ -60,6 +61,7 @@ def explain(
     channel_map, database, about : another car's channel map, its DBC, and ``logs.toml``.
     extend : extension file whose model is the starting point.
     out : folder for the extension file; without it none is written.
+    reference : logs of the same car from before something changed, given as ``logs``: what has changed is explained.
     settings : parts to switch off, for tests.  progress : called with one line of text a step.
 
     Raises
@@ -70,10 +72,21 @@ def explain(
     report = progress or (lambda _: None)
     folder = None if out is None else Path(out)
     car = _vehicle(vehicle)
-    read = with_both_axles(with_paired_wheels(_logs(logs, car, channel_map, database, about, vehicle is not None)))
-    if vehicle is None:
-        _refuse_another_car(read)
     radius_m = float(car.parameters.wheel.rolling_radius_m)
+
+    def given(items: Any) -> list[Log]:
+        found = _logs(items, car, channel_map, database, about, vehicle is not None)
+        return list(with_both_axles(with_paired_wheels(found)))
+
+    read = given(logs)
+    before = [] if reference is None else _named_reference(given(reference))
+    if vehicle is None:
+        _refuse_another_car([*read, *before])
+    if reference is not None:
+        read, before, notes = with_shared_channels(read, before, radius_m)
+        _refuse_unsimulated([*before, *read], car)
+        both = on_trial([*before, *read], car_of(car))
+        return _simulated(both, car, extend, folder, settings, report, len(before), notes)
     is_inertial = bool(measured_channels(read) & _INERTIAL)
     coasting = coast_down(read, car, extend, None if is_inertial else folder)
     stops = [stop.as_json() for stop in stops_of(read, radius_m)]
@@ -87,18 +100,28 @@ def explain(
         return replace(compared, json=compared.json | {"stops": stops} | road_load)
     if (figures := stop_figures(read, car, stops)) is not None:
         return figures
-    car = (car.without_lateral_dynamics() if is_straight_line(read) else car).with_motor_limits_from(read)
-    dataset = prepare(read, radius_m, car.unstated)
-    base, notes = (nominal(car), []) if extend is None else extended_car(car, Path(extend), dataset)
+    return _simulated(read, car, extend, folder, settings, report)
+
+
+def _simulated(
+    logs: Sequence[Log], car: Vehicle, extend: Path | None, folder: Path | None, settings: Settings | None,
+    report: Progress, reference: int = 0, notes: Sequence[str] = (),
+) -> Answer:  # fmt: skip
+    """The answer by simulation; the first ``reference`` logs are what the others are compared with."""
+    radius_m = float(car.parameters.wheel.rolling_radius_m)
+    stops = [stop.as_json() for stop in stops_of(logs[reference:], radius_m)]
+    car = (car.without_lateral_dynamics() if is_straight_line(logs) else car).with_motor_limits_from(logs)
+    dataset = prepare(logs, radius_m, car.unstated)
+    base, of_extension = (nominal(car), []) if extend is None else extended_car(car, Path(extend), dataset)
     with threadpool_limits(1, "blas"):  # simulations fill the processors; linear algebra beside them only waits
-        diagnosis = diagnose(dataset, car, base, settings, report)
+        diagnosis = diagnose(dataset, car, base, settings, report, reference)
         report("held-out error by cross-validation")
         diagnosis = confirmed(diagnosis, report)
         errors, patterns = held_out_error(diagnosis), residual_patterns(diagnosis)
         fits = goodness_of_fit(diagnosis)
     extension = None if folder is None else write_extended_car(diagnosis, folder)
     of_logs = (f"{one.log.name}: {text}" for one in dataset.recordings for text in one.log.remarks)
-    remarks = [*car.remarks, *notes, *of_logs, *diagnosis.remarks]
+    remarks = [*notes, *car.remarks, *of_extension, *of_logs, *diagnosis.remarks]
     found = answer(diagnosis, errors, patterns, fits, extension, remarks, folder)
     return replace(found, json=found.json | {"stops": stops})
 
@@ -113,6 +136,22 @@ def _vehicle(vehicle: Path | str | Mapping[str, Any] | None) -> Vehicle:
     if vehicle is None or str(vehicle) == _SHIPPED_CAR:
         return load_vehicle(None)
     return load_vehicle(shipped(Path(vehicle), "vehicle") if isinstance(vehicle, str | Path) else vehicle)
+
+
+def _named_reference(logs: Sequence[Log]) -> list[Log]:
+    """Reference logs by names that tell them from the others."""
+    return [replace(log, name=f"reference {log.name}") for log in logs]
+
+
+def _refuse_unsimulated(logs: Sequence[Log], car: Vehicle) -> None:
+    """Refuse a comparison of logs that no simulation can follow."""
+    radius_m = float(car.parameters.wheel.rolling_radius_m)
+    why = why_not_simulatable(logs, radius_m)
+    if why or stop_figures(logs, car, []) is not None:
+        raise UnusableError(
+            f"--reference: expected logs that can be simulated, got {why or 'speeds alone'}; give logs with measured "
+            "or demanded brake pressures or motor torques, or leave --reference out"
+        )
 
 
 def _refuse_another_car(logs: Sequence[Log]) -> None:

@@ -37,8 +37,9 @@ def demands(rng: np.random.Generator, kind: str) -> tuple[np.ndarray, np.ndarray
     return pressure, motor
 
 
-def drive(kind: str, seed: int, law: Law) -> dict[str, np.ndarray]:
-    """One log in canonical columns; ``law(speed_mps, pressure_pa)`` gives the share of each brake's nominal torque."""
+def drive(kind: str, seed: int, law: Law, drag_nm: tuple[float, ...] = (0.0,) * 4) -> dict[str, np.ndarray]:
+    """One log in canonical columns; ``law(speed_mps, pressure_pa)`` gives the share of each brake's nominal torque,
+    ``drag_nm`` what it grips with when it is released."""
     rng = np.random.default_rng(seed)
     asked_pa, asked_nm = demands(rng, kind)
     n, v, gust = len(asked_pa), START_MPS[kind], 0.0
@@ -50,7 +51,7 @@ def drive(kind: str, seed: int, law: Law) -> dict[str, np.ndarray]:
         m = m + STEP_S / 0.012 * (asked_nm[k] - m)
         gust = 0.998 * gust + 0.03 * np.sqrt(1.0 - 0.998**2) * rng.standard_normal()
         moving = v > 0.3
-        torque = m - moving * gain * p * law(v, p)
+        torque = m - moving * (gain * p * law(v, p) + np.array(drag_nm))
         road = 0.5 * 1.2 * 0.29 * 2.2 * v * v + 0.012 * mass * 9.81
         a = torque.sum() / radius / (mass + 4 * 0.9 / radius**2) - moving * road / mass + gust
         if not moving and a < 0.0:

@@ -23,16 +23,16 @@ TYRES: dict[str, Callable[[float], float]] = {
 STOPS = ((30.0, 2e6), (33.0, 3.6e6), (24.0, 1.5e6), (27.0, 4.3e6))
 
 
-def stop(speed_mps: float, pressure_pa: float, tyre: str, pole_s: float, seed: int) -> Log:
+def stop(speed_mps: float, pressure_pa: float, tyre: str, pole_s: float, seed: int, front_share: float = 1.0) -> Log:
     """One stop of half a second of coasting and a step of pressure with a lag of 0.12 s, at 100 Hz with white noise.
 
-    ``pole_s`` : lag of the load transfer, as one pole; 0: none.
+    ``pole_s`` : lag of the load transfer, as one pole; 0: none.  ``front_share`` : of the front brakes' torque.
     """
     c, form, rng = CAR, TYRES[tyre], np.random.default_rng(seed)
     mass, radius, inertia = c["mass_kg"], c["rolling_radius_m"], c["wheel_inertia_kg_m2"]
     front = c["cog_to_front_axle_m"]
     static = [0.5 * 9.81 * mass * arm / c["wheelbase_m"] for arm in (c["wheelbase_m"] - front, front)]
-    gains = c["brake_gain_front_nm_pa"], c["brake_gain_rear_nm_pa"]
+    gains = front_share * c["brake_gain_front_nm_pa"], c["brake_gain_rear_nm_pa"]
     drag = 0.5 * c["air_density_kg_m3"] * c["drag_coefficient"] * c["frontal_area_m2"]
     v, wheel, p, moved, rows, k = speed_mps, [speed_mps / radius] * 2, 0.0, 0.0, [], 0
     while v > 1.5:
@@ -63,6 +63,7 @@ def stop(speed_mps: float, pressure_pa: float, tyre: str, pole_s: float, seed: i
     return make_log(f"stop {seed}", t, channels)
 
 
-def stops(tyre: str = "tanh", pole_s: float = 0.0) -> list[Log]:
+def stops(tyre: str = "tanh", pole_s: float = 0.0, first_seed: int = 0, front_share: float = 1.0) -> list[Log]:
     """Four stops of the car with one of the `TYRES`."""
-    return [stop(speed, pressure, tyre, pole_s, seed) for seed, (speed, pressure) in enumerate(STOPS)]
+    each = enumerate(STOPS, first_seed)
+    return [stop(speed, pressure, tyre, pole_s, seed, front_share) for seed, (speed, pressure) in each]

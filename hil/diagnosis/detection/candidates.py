@@ -66,16 +66,18 @@ class CandidateSet:
     ----------
     undiagnosable : effects that the vehicle set says too little for.
     unexcited : nodes whose channels carry only noise (`unexcited_sensors`).
+    since_reference : candidates are changes since reference logs, which share what the form of the model errs.
     """
 
     def __init__(
-        self, simulator: Simulator, masks: SampleMasks, undiagnosable: Sequence[str], unexcited: Sequence[str] = ()
-    ) -> None:
+        self, simulator: Simulator, masks: SampleMasks, undiagnosable: Sequence[str], unexcited: Sequence[str] = (),
+        *, since_reference: bool = False,
+    ) -> None:  # fmt: skip
         self._masks, self._starts = masks, segment_starts(simulator.dataset)
         self._columns = columns((*undiagnosable, *inseparable_forward(simulator.dataset)))
         without = undriven(recording.log for recording in simulator.dataset.recordings)
         vehicle = simulator.vehicle
-        form_share = FORM_SHARE if vehicle.unlimited else 0.0
+        form_share = FORM_SHARE if vehicle.unlimited and not since_reference else 0.0
         listed = candidates(self._columns, without, vehicle.suspension_stated, unexcited, form_share)
         self.candidates = [_with_penalty(one, simulator) for one in listed]
         self.jacobian: Tracks = {}

@@ -241,7 +241,7 @@ class ForwardStep:
         """The shortlist at the nominal vehicle, where no nuisance parameter has absorbed a cause."""
         self._progress("Jacobian at the nominal vehicle")
         fitter = self._nominal_fitter.with_simulator(self._fitter.simulator)
-        nominal = fitter.at(np.zeros(len(self._nuisance_fit.nuisances)), (), noise)
+        nominal = fitter.at(fitter.origin, (), noise)
         fitter = fitter.at_baseline(nominal)
         self._fitter = self._fitter.with_simulator(fitter.simulator)
         candidates = candidates.at(fitter, nominal)
@@ -264,10 +264,9 @@ class ForwardStep:
             self._progress(f"fitting {len(beyond)} quantities that are at their bounds, from the nominal vehicle")
         last, nominal = self._fitter, self._nominal_fitter.with_simulator(self._fitter.simulator)
         _, guess = nominal.start(noise.enabled)
-        none = np.zeros(len(nominal.nuisances))
         for candidate in beyond if self._settings.relinearise else ():
             self._fitter = nominal.copy()
-            start = nominal.at(none, (Term(candidate, 0.0),), guess)
+            start = nominal.at(nominal.origin, (Term(candidate, 0.0),), guess)
             fitted, own = self._nuisance_fit.fit(start, guess)
             item = tests[candidate]
             found.append((item, refitted(unscored(fitted, own, item.information), fitted, own)))

@@ -111,7 +111,7 @@ class BasisFunction(Candidate):
 
     def applied(self, base: ParameterSet, value: float) -> ParameterSet:
         """The parameter set with this coefficient added."""
-        return replace(base, nonparametric_rows=np.vstack([base.nonparametric_rows, self.row(value)]))
+        return base.with_rows(self.row(value))
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +121,11 @@ class BasisExpansion:
     term: NonparametricTerm
     location: str
     functions: tuple[BasisFunction, ...]
+
+    @property
+    def name(self) -> str:
+        """For people: term and location."""
+        return f"{self.term.name}@{self.location}"
 
     @property
     def variable(self) -> str:

@@ -75,7 +75,7 @@ class _NominalFits:
 
     def _from_nominal(self, one: FittedHypothesis, best: float) -> FittedHypothesis:
         own, noise = self._fitter.copy(), one.noise
-        model = own.at(np.zeros(len(self._nuisance_fit.nuisances)), one.model.terms, noise)
+        model = own.at(own.origin, one.model.terms, noise)
         model = own.fit(model, noise, 4, follow=True)
         start = self._refit(one, model, noise)
         if not self._biased(one.model.z) and start.cost >= one.cost:

@@ -3,7 +3,10 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from hil.diagnosis.data.dataset import Dataset
+from hil.diagnosis.data.masks import Mask
 from hil.diagnosis.detection.nonparametric import BasisFunction
 from hil.diagnosis.detection.profile_fit import FittedHypothesis
 from hil.diagnosis.detection.score_test import ScoreTest
@@ -56,6 +59,7 @@ class Diagnosis:
     scores, information : score tests at ``base``, and the information blocks they are from.
     undetectable_effects : names of effects that these manoeuvres or this vehicle set cannot show.
     detection_threshold : gain in chi-squared that a cause needed.
+    reference : recordings, the first ones, that the others are compared with; 0 where the vehicle set is all there is.
     """
 
     dataset: Dataset
@@ -72,6 +76,17 @@ class Diagnosis:
     information: InformationBlocks
     detection_threshold: float
     remarks: tuple[str, ...]
+    reference: int = 0
+
+    @property
+    def reference_segments(self) -> int:
+        """How many segments, the first ones, are of the reference."""
+        return sum(recording < self.reference for recording, _ in self.dataset.segments)
+
+    @property
+    def compared_samples(self) -> Mask:
+        """(samples,) true where a sample is not of the reference."""
+        return np.asarray(self.fitter.masks.segment_id) >= self.reference_segments
 
     @property
     def selections(self) -> list[list[FittedHypothesis]]:

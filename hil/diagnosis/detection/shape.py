@@ -49,7 +49,11 @@ class ShapedCandidate(Candidate):
     def applied(self, base: ParameterSet, value: float) -> ParameterSet:
         """The parameter set with ``value`` added, and the shape parameter set."""
         changed = super().applied(base, value)
-        changed.theta[THETA.slice(self.effect.name, self.shape.name)] = self.at
+        own = THETA.slice(self.effect.name, self.shape.name)
+        if changed.change is None:
+            changed.theta[own] = self.at
+        else:
+            changed.change.theta[own] = self.at - changed.theta[own]
         return changed
 
     def interval(self) -> tuple[float, float]:

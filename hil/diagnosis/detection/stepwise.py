@@ -8,6 +8,8 @@ parameters, or ends the selection (`hil.diagnosis.detection.forward_step`).
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from hil.diagnosis.data.dataset import Dataset
 from hil.diagnosis.detection.candidates import CandidateSet, unexcited_sensors
 from hil.diagnosis.detection.forward_step import Added, Done, ForwardStep, Restarted, Screening, State
@@ -21,6 +23,7 @@ from hil.diagnosis.detection.profile_fit import (
     refitted,
     unscored,
 )
+from hil.diagnosis.detection.reference_fit import Reference, doubted, fit_reference, since
 from hil.diagnosis.detection.result import Diagnosis, Progress, Settings, causes_in, selections
 from hil.diagnosis.detection.score_test import (
     OnsetTime,
@@ -50,9 +53,17 @@ def diagnose(
     base: ParameterSet,
     settings: Settings | None = None,
     progress: Progress | None = None,
+    reference: int = 0,
 ) -> Diagnosis:
-    """Diagnose a dataset; ``base`` is the parameter set of the nominal vehicle."""
-    return StepwiseSelection(dataset, vehicle, base, settings or Settings(), progress or (lambda _: None)).run()
+    """Diagnose a dataset; ``base`` is the parameter set of the nominal vehicle.
+
+    With a ``reference`` of so many recordings, the first ones, what has changed since is diagnosed.
+    """
+    settings, progress = settings or Settings(), progress or (lambda _: None)
+    if not reference:
+        return StepwiseSelection(dataset, vehicle, base, settings, progress).run()
+    shown = fit_reference(dataset, vehicle, base, reference, settings, progress)
+    return StepwiseSelection(dataset, vehicle, since(shown.base, reference), settings, progress, shown).run()
 
 
 class StepwiseSelection:
@@ -64,15 +75,22 @@ class StepwiseSelection:
     dataset: Dataset
 
     def __init__(
-        self, dataset: Dataset, vehicle: Vehicle, base: ParameterSet, settings: Settings, progress: Progress
-    ) -> None:
-        self.settings, self.progress = settings, progress
+        self, dataset: Dataset, vehicle: Vehicle, base: ParameterSet, settings: Settings, progress: Progress,
+        reference: Reference | None = None,
+    ) -> None:  # fmt: skip
+        self.settings, self.progress, self.reference = settings, progress, reference
         simulator = Simulator(dataset, vehicle).prepared(base)
         self.vehicle, self.masks = vehicle, SampleMasks.of(simulator.dataset)
         progress("simulating the nominal vehicle")
-        self.nuisance_fit = NuisanceFit(simulator, self.masks, vehicle, base, settings.relinearise)
+        self.nuisance_fit = self._nuisance_fit(simulator, base)
         self.nominal_fitter = self.fitter
         self.nominal, self.first_noise = self.fitter.start(settings.noise_model)
+
+    def _nuisance_fit(self, simulator: Simulator, base: ParameterSet) -> NuisanceFit:
+        relinearise, given = self.settings.relinearise, self.reference
+        if given is None:
+            return NuisanceFit(simulator, self.masks, self.vehicle, base, relinearise)
+        return NuisanceFit(simulator, self.masks, self.vehicle, base, relinearise, given.nuisances, given.z)
 
     @property
     def fitter(self) -> Fitter:
@@ -116,8 +134,32 @@ class StepwiseSelection:
         self.dataset = simulator.dataset
         channels = model.channels or simulator.run(self.fitter.parameter_set(model.z, ()))
         unexcited = unexcited_sensors(self.fitter.tracks(channels), noise)
-        candidates = CandidateSet(simulator, self.masks, self.vehicle.undiagnosable_effects, unexcited)
+        since_reference = self.reference is not None
+        candidates = CandidateSet(
+            simulator, self.masks, self.vehicle.undiagnosable_effects, unexcited, since_reference=since_reference
+        )
+        if self.reference is not None:
+            model, noise = self._with_common_parts(candidates, self.reference, model, noise)
         return self.screen(candidates, model, noise)
+
+    def _with_common_parts(
+        self, candidates: CandidateSet, reference: Reference, model: Model, noise: Noise
+    ) -> tuple[Model, Noise]:
+        """The model with a common part of each change that may be taken for one, fitted anew."""
+        self.fitter = self.fitter.at_baseline(model)
+        candidates = candidates.at(self.fitter, model)
+        blocks = self.fitter.information_blocks(model, candidates.jacobian, noise)
+        more = reference.with_common_parts(doubted(candidates.scores(self.fitter, blocks, model, noise)))
+        added = len(more.z) - len(reference.z)
+        if not added:
+            return model, noise
+        self.progress(f"{added} common parts of what may have changed")
+        self.reference = more
+        self.nuisance_fit = self._nuisance_fit(self.fitter.simulator, self.fitter.base)
+        self.nominal_fitter = self.fitter
+        self.nominal, _ = self.fitter.start(self.settings.noise_model)
+        start = self.fitter.at(np.append(model.z, np.zeros(added)), (), noise)
+        return self.nuisance_fit.fit(start, noise)
 
     def screen(self, candidates: CandidateSet, model: Model, noise: Noise, restarted: bool = False) -> State:
         """Test each candidate at a model without causes; that sets the threshold."""
@@ -231,6 +273,7 @@ class StepwiseSelection:
             undetectable_effects=sorted({*undetectable_effects(first.scores), *self.vehicle.undiagnosable_effects}),
             information=first.information,
             detection_threshold=state.threshold.gain,
+            reference=0 if self.reference is None else self.reference.recordings,
             remarks=(*left.remarks, *(f"{text} is at its bound: the true value may lie beyond" for text in bounded)),
         )
 

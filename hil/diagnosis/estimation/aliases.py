@@ -42,7 +42,7 @@ class Alias:
 
 def alias_of(term: Term, nuisances: Sequence[Nuisance], parameters: ParameterSet) -> Alias | None:
     """Alias of a term, given the parameter set without it; None where it is no or more than one parameter."""
-    if term.onset is not None:
+    if term.onset is not None or parameters.change is not None:
         return None
     if NODE_LATENCY in term.candidate.parameter.aliases:
         late = (k for k, one in enumerate(nuisances) if one.name == f"late_{term.candidate.location}")

@@ -110,7 +110,11 @@ class _Whitened:
 
 
 class Fitter:
-    """Fits models of one dataset; ``nuisance_columns`` is the Jacobian, (samples, nuisances) by track, in prior sd."""
+    """Fits models of one dataset.
+
+    ``nuisance_columns`` is the Jacobian, (samples, nuisances) by track, in prior sd. ``origin`` (nuisances,) is the car
+    that deviations count from: the nominal one, or the one that reference logs show.
+    """
 
     def __init__(
         self,
@@ -119,13 +123,17 @@ class Fitter:
         base: ParameterSet,
         nuisances: Sequence[Nuisance],
         nuisance_columns: Tracks,
+        origin: Floats | None = None,
     ) -> None:
         self.simulator, self.masks, self.base = simulator, masks, base
         self.nuisances, self.nuisance_jacobian = tuple(nuisances), nuisance_columns
+        self.origin = np.zeros(len(self.nuisances)) if origin is None else origin
         self.bound = np.array([nuisance.bound for nuisance in self.nuisances])
         self.upper = np.array([nuisance.upper for nuisance in self.nuisances])
         self.lower = np.array([nuisance.lower for nuisance in self.nuisances])
         self._counted = np.array([nuisance.kind is not NuisanceKind.SIDE_TO_SIDE for nuisance in self.nuisances])
+        counted = (one for one, taken in zip(self.nuisances, self._counted, strict=True) if taken)
+        self._of_the_day = np.array([one.kind is NuisanceKind.OF_THE_DAY for one in counted], bool)
         self._limits = [k for k, nuisance in enumerate(self.nuisances) if nuisance.name in _LIMITS]
         self.radius = float(simulator.vehicle.parameters.wheel.rolling_radius_m)
         self._measured = simulator.measured()
@@ -134,7 +142,7 @@ class Fitter:
     def copy(self) -> "Fitter":
         """A fitter whose Jacobian may be updated independently of this one."""
         columns = {name: values.copy() for name, values in self.nuisance_jacobian.items()}
-        return Fitter(self.simulator, self.masks, self.base, self.nuisances, columns)
+        return Fitter(self.simulator, self.masks, self.base, self.nuisances, columns, self.origin)
 
     def with_simulator(self, simulator: Simulator) -> "Fitter":
         """This fitter on another simulator of the same dataset; both share the Jacobian of the nuisances."""
@@ -178,8 +186,8 @@ class Fitter:
         return -2.0 * whiten(residual, self.masks, noise)[1] + float(z @ z)
 
     def start(self, enabled: bool = True) -> tuple[Model, Noise]:
-        """The nominal vehicle, and a first guess of the noise."""
-        z = np.zeros(len(self.nuisances))
+        """The vehicle at the origin, and a first guess of the noise."""
+        z = self.origin
         noise = first_guess(self.residual(z, ()), self.masks, enabled)
         return self.at(z, (), noise), noise
 
@@ -337,10 +345,12 @@ class Fitter:
         no data determine stays at 0. There, if the ratio of all is large, a nuisance at its bound counts as if it were
         twice as far.
         """
-        z, bound = z[self._counted], self.bound[self._counted]
+        z, bound = (z - self.origin)[self._counted], self.bound[self._counted]
         squares = np.square(z)
         if effective_parameters is None:
-            return max(1.0, float(squares.sum()) / max(len(z), 1.0))
+            of_the_day = squares[self._of_the_day]  # these alone absorb a change since reference logs
+            day = float(of_the_day.mean()) if len(of_the_day) else 1.0
+            return max(1.0, float(squares.sum()) / max(len(z), 1.0), day)
         if squares.sum() >= BIASED_BIRGE_RATIO * len(z):
             squares = squares * np.where(np.abs(z) >= bound, 4.0, 1.0)
         return max(1.0, float(squares.sum()) / max(effective_parameters, 1.0))

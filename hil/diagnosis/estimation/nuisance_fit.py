@@ -22,7 +22,7 @@ from hil.diagnosis.estimation.information import finite_difference_jacobian
 from hil.diagnosis.noise.model import Noise, SampleMasks
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator
-from hil.diagnosis.vehicle.priors import recording_nuisances
+from hil.diagnosis.vehicle.priors import Nuisance, recording_nuisances
 from hil.diagnosis.vehicle.spec import Vehicle
 
 _KINKED = ("ehb_dead_time_s",)
@@ -39,23 +39,25 @@ best of several causes is accepted."""
 
 
 class NuisanceFit:
-    """Nuisances of the nominal vehicle (``base``), linearised there first.
+    """Nuisances of the nominal vehicle (``base``), linearised at its ``origin`` (`Fitter`) first.
 
     ``fitter`` has the Jacobian taken last and the simulator of the fits to come; ``relinearise`` False keeps the
-    first Jacobian.
+    first Jacobian. ``nuisances`` are those of the vehicle and its logs by default.
     """
 
     def __init__(
-        self, simulator: Simulator, masks: SampleMasks, vehicle: Vehicle, base: ParameterSet, relinearise: bool
-    ) -> None:
+        self, simulator: Simulator, masks: SampleMasks, vehicle: Vehicle, base: ParameterSet, relinearise: bool,
+        nuisances: Sequence[Nuisance] | None = None, origin: Floats | None = None,
+    ) -> None:  # fmt: skip
         self._masks, self._base, self._relinearise = masks, base, relinearise
         recordings = simulator.dataset.recordings
         measured = all(recording.log.disc_temperature_k is not None for recording in recordings)
-        self.nuisances = (*vehicle.nuisances, *recording_nuisances(measured, vehicle.latencies))
+        usual = (*vehicle.nuisances, *recording_nuisances(measured, vehicle.latencies))
+        self.nuisances = usual if nuisances is None else tuple(nuisances)
         self._steps: Floats = np.full(len(self.nuisances), _COARSE)
-        self.fitter = Fitter(simulator, masks, base, self.nuisances, {})
+        self.fitter = Fitter(simulator, masks, base, self.nuisances, {}, origin)
         self._taken: deque[tuple[Floats, tuple[Term, ...], Fitter]] = deque(maxlen=_REMEMBERED)
-        self.relinearise(np.zeros(len(self.nuisances)))
+        self.relinearise(self.fitter.origin)
 
     def relinearise(self, z: Floats, terms: Sequence[Term] = ()) -> None:
         """Take the Jacobian at ``z`` prior standard deviations, given these terms.
@@ -78,7 +80,7 @@ class NuisanceFit:
                 other = jacobian([-moves[k]], [-float(steps[k])])
                 for name, values in columns.items():
                     values[:, k] = 0.5 * (values[:, k] + other[name][:, 0])
-        self.fitter = Fitter(simulator, self._masks, self._base, self.nuisances, columns)
+        self.fitter = Fitter(simulator, self._masks, self._base, self.nuisances, columns, self.fitter.origin)
         self._taken.append((z, tuple(terms), self.fitter))
 
     def _parameter_set(self, z: Floats, terms: Sequence[Term]) -> ParameterSet:

@@ -3,8 +3,10 @@
 Takes the effects of the plant; gives the columns of their Jacobian and the candidates made of these.
 """
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.simulation.parameter_set import ParameterSet
@@ -54,9 +56,7 @@ class Column:
 
     def stepped(self, parameters: ParameterSet) -> ParameterSet:
         """The parameter set with this entry one step off."""
-        theta: Floats = parameters.theta.copy()
-        theta[self.at] += self.step
-        return replace(parameters, theta=theta)
+        return parameters.adding((self.at,), self.step)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,11 +94,16 @@ class Candidate:
 
     def applied(self, parameters: ParameterSet, value: float) -> ParameterSet:
         """The parameter set with ``value`` added to the parameter at the location."""
-        theta: Floats = parameters.theta.copy()
         start = THETA.slice(self.effect.name, self.parameter.name).start
-        for member in self.members():
-            theta[start + member] += value
-        return replace(parameters, theta=theta)
+        return parameters.adding([start + member for member in self.members()], value)
+
+
+def summed(q: Floats, candidates: Sequence[Candidate], offset: int = 0) -> Floats:
+    """Information matrix of the candidates, (candidates, candidates): columns of one candidate are summed."""
+    moves = np.zeros((len(candidates), q.shape[0]))
+    for row, candidate in enumerate(candidates):
+        moves[row, [offset + k for k in candidate.columns]] = 1.0
+    return np.asarray(moves @ q @ moves.T)
 
 
 def typical_size(parameter: Parameter) -> float:

@@ -20,8 +20,8 @@ from hil.diagnosis.data.log import CHANNELS, MOTOR_DEMAND, PRESSURE_DEMAND, Floa
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.detection.threshold import ISOLABILITY_SIGMA
 from hil.diagnosis.estimation.information import finite_difference_jacobian, information_blocks, marginalise
-from hil.diagnosis.estimation.terms import Candidate, Column, candidates, columns
-from hil.diagnosis.isolation.groups import remaining, summed
+from hil.diagnosis.estimation.terms import Candidate, Column, candidates, columns, summed
+from hil.diagnosis.isolation.groups import remaining
 from hil.diagnosis.noise.estimate import first_guess
 from hil.diagnosis.noise.model import Noise, SampleMasks, tracks_of
 from hil.diagnosis.simulation.measurement_model import Stack

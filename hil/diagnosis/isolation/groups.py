@@ -11,7 +11,7 @@ import numpy as np
 
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.threshold import ISOLABILITY_SIGMA
-from hil.diagnosis.estimation.terms import Candidate
+from hil.diagnosis.estimation.terms import Candidate, summed
 
 MAX_RIVALS = 4
 """Rivals that imitate together, at most."""
@@ -43,14 +43,6 @@ class IsolabilityGroup:
     def indices(self) -> tuple[int, ...]:
         """Every rival: of the joint imitation and of the pairs."""
         return tuple(dict.fromkeys((*self.members, *(index for index, _ in self.pairs))))
-
-
-def summed(q: Floats, candidates: Sequence[Candidate], offset: int = 0) -> Floats:
-    """Information matrix of the candidates, (candidates, candidates): columns of one candidate are summed."""
-    moves = np.zeros((len(candidates), q.shape[0]))
-    for row, candidate in enumerate(candidates):
-        moves[row, [offset + k for k in candidate.columns]] = 1.0
-    return np.asarray(moves @ q @ moves.T)
 
 
 def isolability_group(

@@ -22,6 +22,7 @@ from hil.diagnosis.result.cross_validation import HeldOutError
 from hil.diagnosis.result.goodness_of_fit import ChannelFit
 from hil.diagnosis.result.headline import headline, not_described
 from hil.diagnosis.result.moved_numbers import MovedNumber, moved_numbers
+from hil.diagnosis.result.reference import reference_as_json
 from hil.diagnosis.result.residual_patterns import WORDS, ResidualPattern
 
 NOT_DESCRIBED = "model_does_not_describe"
@@ -58,7 +59,10 @@ def answer(
         verdict, rivals, causes = NOT_DESCRIBED, [*causes, *rivals], []
     content = {
         "verdict": verdict,
-        "headline": not_described(misfits, rivals) if misfits else headline(verdict, causes, rivals, moved),
+        "headline": (
+            not_described(misfits, rivals) if misfits
+            else headline(verdict, causes, rivals, moved, diagnosis.reference > 0)
+        ),
         "causes": causes,
         "rivals": rivals,
         "moved_numbers": [one.as_json() for one in moved],
@@ -81,8 +85,10 @@ def answer(
         "extension": extension,
         "missing": list(diagnosis.dataset.missing_channels),
         "remarks": remarks,
-        "channels_read": channels_read(recording.log for recording in diagnosis.dataset.recordings),
+        "channels_read": channels_read(one.log for one in diagnosis.dataset.recordings[diagnosis.reference :]),
     }  # fmt: skip
+    if diagnosis.reference:
+        content |= {"reference": reference_as_json(diagnosis)}
     return Answer(content, diagnosis, held_out, patterns, moved)
 
 

@@ -63,21 +63,24 @@ def best_wrong(diagnosis: Diagnosis) -> FittedHypothesis | None:
     return next((c for c in diagnosis.hypotheses[0] if c.term.candidate.effect.name != right), None)
 
 
-def folds(masks: SampleMasks) -> list[Floats]:
-    """Training weights of each fold, (segments,) each; neighbours in time go to different folds."""
+def folds(masks: SampleMasks, first: int = 0) -> list[Floats]:
+    """Training weights of each fold, (segments,) each; neighbours in time go to different folds.
+
+    Segments before ``first``, those of a reference, are in none: every fit may use them.
+    """
     count = int(np.max(masks.segment_id)) + 1
-    parts = min(FOLDS, count)
-    return [np.array([0.0 if k % parts == fold else 1.0 for k in range(count)]) for fold in range(parts)]
+    parts = min(FOLDS, count - first)
+    return [np.array([0.0 if k >= first and k % parts == fold else 1.0 for k in range(count)]) for fold in range(parts)]
 
 
-def held_out_residual(fitter: Fitter, noise: Noise, model: Model) -> Tracks:
-    """Residual of every segment from a fit to the other folds, within the bounds of all parameters.
+def held_out_residual(fitter: Fitter, noise: Noise, model: Model, first: int = 0) -> Tracks:
+    """Residual of every segment from ``first`` on from a fit to the other folds, within the bounds of all parameters.
 
     That fit is the present one plus the change of one linear step by leaving the fold out: near the tyres' limit, where
     the cost is not quadratic, a full step would move on from the best fit with all segments, too.
     """
     masks = fitter.masks
-    trained = folds(masks)
+    trained = folds(masks, first)
     if len(trained) < 2:
         return model.residual
     columns = dict(fitter.nuisance_jacobian)
@@ -85,7 +88,7 @@ def held_out_residual(fitter: Fitter, noise: Noise, model: Model) -> Tracks:
         own = fitter.term_jacobian(model)
         columns = {name: np.hstack([values, own[name]]) for name, values in columns.items()}
     blocks = information_blocks(model.residual, columns, masks, noise, len(fitter.nuisances))
-    out = {name: np.zeros_like(values) for name, values in model.residual.items()}
+    out = {name: values.copy() for name, values in model.residual.items()}
     segments = np.asarray(masks.segment_id, np.int64)
     z_of_all, of_all, *_ = fitter.moved(model, blocks.total())
     for weights in trained:
@@ -112,13 +115,13 @@ def confirmed(diagnosis: Diagnosis, progress: Progress) -> Diagnosis:
     alone. The error of a speed in free run is no such measure: over a few manoeuvres a slow disturbance moves it more
     than a true cause does.
     """
-    fitter, noise = diagnosis.fitter, diagnosis.noise
+    fitter, noise, first = diagnosis.fitter, diagnosis.noise, diagnosis.reference_segments
     if not diagnosis.final.terms:
         return diagnosis
     none = np.zeros(len(fitter.nuisances))
-    tuned = fitter.cost(held_out_residual(fitter, noise, diagnosis.base), none, noise)
+    tuned = fitter.cost(held_out_residual(fitter, noise, diagnosis.base, first), none, noise)
     while diagnosis.final.terms:
-        after = fitter.cost(held_out_residual(fitter, noise, diagnosis.final), none, noise)
+        after = fitter.cost(held_out_residual(fitter, noise, diagnosis.final, first), none, noise)
         if after < tuned:
             break
         diagnosis = _without_last(diagnosis)
@@ -143,22 +146,22 @@ def _without_last(diagnosis: Diagnosis) -> Diagnosis:
 
 
 def held_out_error(diagnosis: Diagnosis) -> list[HeldOutError]:
-    """Held-out error of every channel."""
+    """Held-out error of every channel, over what is no reference."""
     fitter, noise, masks = diagnosis.fitter, diagnosis.noise, diagnosis.fitter.masks
-    wrong = best_wrong(diagnosis)
-    after = held_out_residual(fitter, noise, diagnosis.final) if diagnosis.final.terms else None
-    tuned = held_out_residual(fitter, noise, diagnosis.base)
-    other = held_out_residual(fitter, noise, wrong.model) if wrong is not None else None
+    wrong, first = best_wrong(diagnosis), diagnosis.reference_segments
+    after = held_out_residual(fitter, noise, diagnosis.final, first) if diagnosis.final.terms else None
+    tuned = held_out_residual(fitter, noise, diagnosis.base, first)
+    other = held_out_residual(fitter, noise, wrong.model, first) if wrong is not None else None
     errors = []
     for name in masks.names:
-        before = _squares(diagnosis.nominal.residual[name], masks, name)
-        own = _squares((after or tuned)[name], masks, name)
+        before = _squares(diagnosis.nominal.residual[name], masks, name)[first:]
+        own = _squares((after or tuned)[name], masks, name)[first:]
         low, high = bootstrap_interval(own)
         errors.append(
             HeldOutError(
                 name, root_mean_square(before), root_mean_square(own), low, high,
-                root_mean_square(_squares(tuned[name], masks, name)),
-                None if other is None else root_mean_square(_squares(other[name], masks, name)),
+                root_mean_square(_squares(tuned[name], masks, name)[first:]),
+                None if other is None else root_mean_square(_squares(other[name], masks, name)[first:]),
             )
         )  # fmt: skip
     return errors

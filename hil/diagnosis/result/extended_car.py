@@ -9,6 +9,7 @@ from hil.diagnosis.data.dataset import Dataset
 from hil.diagnosis.detection.result import Diagnosis
 from hil.diagnosis.simulation.parameter_set import ParameterSet, nominal
 from hil.diagnosis.vehicle.extension_file import load_extension, write_extension
+from hil.diagnosis.vehicle.priors import NuisanceKind
 from hil.diagnosis.vehicle.spec import Vehicle
 from plant.injection.theta import THETA
 
@@ -33,13 +34,14 @@ def extended_car(vehicle: Vehicle, path: Path, dataset: Dataset) -> tuple[Parame
 def write_extended_car(diagnosis: Diagnosis, folder: Path) -> str:
     """Write the causes and the estimated nuisances as ``extension.toml``; its path.
 
-    Sensor zeros belong to these logs alone and are left out.
+    Sensor zeros belong to these logs alone and are left out. Since a reference, it is the car as it is now.
     """
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "extension.toml"
     fitter, final = diagnosis.fitter, diagnosis.final
-    causes = fitter.parameter_set(np.zeros_like(final.z), final.terms)
-    extended = replace(fitter.parameter_set(final.z, final.terms), theta=causes.theta)
+    kept = [nuisance.kind is NuisanceKind.LEARNED for nuisance in fitter.nuisances]
+    causes = fitter.parameter_set(np.where(kept, final.z, 0.0), final.terms).changed()
+    extended = replace(fitter.parameter_set(final.z, final.terms).changed(), theta=causes.theta)
     onsets, notes = _onsets(causes, diagnosis.dataset)
     names = ", ".join(term.candidate.name for term in final.terms) or "no effect"
     head = f"Estimated from {len(diagnosis.dataset.recordings)} logs: {names}"

@@ -83,7 +83,7 @@ def goodness_of_fit(diagnosis: Diagnosis) -> list[ChannelFit]:
     places = _segment_places(diagnosis)
     fits = []
     for name in masks.names:
-        known, residual = masks.present[name] > 0.5, model.residual[name][:, 0]
+        known, residual = (masks.present[name] > 0.5) & diagnosis.compared_samples, model.residual[name][:, 0]
         squares = squares_by_segment(residual, known, masks.segment_id)
         by_segment = np.sqrt(squares[:, 0] / np.maximum(squares[:, 1], 1.0))
         worst = int(np.argmax(np.where(squares[:, 1] > 0.0, by_segment, 0.0)))

@@ -11,17 +11,22 @@ _OTHERS = {
     "not_testable": "These manoeuvres excite too little to conclude anything.",
     "unlisted": "No listed cause explains the data.",
 }
+_UNCHANGED = "No change since the reference beyond noise and what differs from day to day."
 _MOST_RIVALS, _MOST_NUMBERS = 3, 3
 
 
 def headline(
-    verdict: str, causes: Sequence[Mapping[str, Any]], rivals: Sequence[Mapping[str, Any]], moved: Sequence[MovedNumber]
-) -> str:
+    verdict: str, causes: Sequence[Mapping[str, Any]], rivals: Sequence[Mapping[str, Any]],
+    moved: Sequence[MovedNumber], since_reference: bool = False,
+) -> str:  # fmt: skip
     """What is wrong, where, by how much and from when on, and what these logs cannot tell it from; else that nothing
-    is, and with which numbers of the car."""
+    is, and with which numbers of the car; or what has changed since the reference."""
     if verdict == "none":
-        return _nothing(moved)
-    sentences = [f"{'; '.join(map(sentence, causes))}."] if causes else []
+        return _UNCHANGED if since_reference else _nothing(moved)
+    each = [sentence(cause) for cause in causes]
+    if since_reference and each:
+        each[0] = f"Changed since the reference: {_lower(each[0])}"
+    sentences = [f"{'; '.join(each)}."] if causes else []
     if verdict in _OTHERS:
         sentences.append(_OTHERS[verdict])
     elif not causes:

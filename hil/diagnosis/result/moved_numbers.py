@@ -20,6 +20,11 @@ _SHOWN_CORRELATION = 0.5
 """Correlation with a cause's value from which on a number matters to it."""
 _TWO_SIDED_95 = 1.96
 _AT_BOUND = 1e-3
+BESIDE_REFERENCE = (
+    NuisanceKind.LEARNED, NuisanceKind.LEARNED_CURVE, NuisanceKind.OF_THE_DAY,
+    NuisanceKind.DISC_TEMPERATURE_OF_THE_DAY,
+)  # fmt: skip
+"""Nuisance parameters that reference logs bring, and no vehicle set has a key for."""
 
 Value = float | list[float]
 """One number, or one for each axle."""
@@ -81,11 +86,13 @@ class MovedNumber:
 
 
 def moved_numbers(diagnosis: Diagnosis) -> list[MovedNumber]:
-    """Every nuisance parameter of the final model, those that moved farthest first."""
+    """Every number of the car and the logs in the final model, those that moved farthest first."""
     fitter, vehicle, model = diagnosis.fitter, diagnosis.vehicle, diagnosis.final
-    deviations, correlations = _uncertainty(diagnosis)
+    deviations, correlations = uncertainty(diagnosis)
     listed = []
     for k, nuisance in enumerate(fitter.nuisances):
+        if nuisance.kind in BESIDE_REFERENCE:
+            continue
         z, base = float(model.z[k]), fitter.base
         what = quantity(nuisance, vehicle)
         key = stated_key(nuisance, what, vehicle.stated)
@@ -108,7 +115,7 @@ def shown_numbers(listed: Sequence[MovedNumber]) -> tuple[list[MovedNumber], int
     return shown, len(listed) - len(shown)
 
 
-def _uncertainty(diagnosis: Diagnosis) -> tuple[Floats, Floats | None]:
+def uncertainty(diagnosis: Diagnosis) -> tuple[Floats, Floats | None]:
     """Half of the 95 % interval of each nuisance in prior standard deviations, the causes marginalised; its correlation
     with the cause it goes with most."""
     fitter, model, noise = diagnosis.fitter, diagnosis.final, diagnosis.noise

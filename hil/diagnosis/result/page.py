@@ -11,6 +11,7 @@ from hil.diagnosis.detection.threshold import INDISTINGUISHABLE
 from hil.diagnosis.estimation.gauss_newton import Model
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.manoeuvres import stops
+from hil.diagnosis.result import reference
 from hil.diagnosis.result.answer import Answer
 from hil.diagnosis.result.channels_table import channels_section
 from hil.diagnosis.result.cross_validation import probabilities
@@ -39,20 +40,20 @@ def build_report(answer: Answer, sources: Sequence[str]) -> Report:
     content, diagnosis = answer.json, answer.diagnosis
     verdict = content["verdict"]
     return Report(
-        title="Measured data against the simulation",
+        title="Measured data against " + ("reference logs" if diagnosis.reference else "the simulation"),
         verdict={"none": Verdict.PASSED, "named": None}.get(verdict, Verdict.INCONCLUSIVE),
         reason=content["headline"],
         numbers=tuple(numbers(answer)),
         sections=(
-            _comparison(answer), moved(answer), *goodness_of_fit(answer), _patterns(answer), *_curves(answer),
-            _candidates(answer), held_out(answer), *stops.section(content.get("stops", ())),
-            channels_section(content), _limits(answer),
+            _comparison(answer), *reference.section(diagnosis), moved(answer), *goodness_of_fit(answer),
+            _patterns(answer), *_curves(answer), _candidates(answer), held_out(answer),
+            *stops.section(content.get("stops", ())), channels_section(content), _limits(answer),
         ),
         provenance={
             "logs": list(sources), "segments": len(diagnosis.dataset.segments),
             "simulations": diagnosis.fitter.simulator.runs,
             "extension": content["extension"] or "not written", "remarks": content["remarks"],
-        },
+        } | ({"reference": content["reference"]["logs"]} if diagnosis.reference else {}),
     )  # fmt: skip
 
 

@@ -48,7 +48,7 @@ def residual_patterns(diagnosis: Diagnosis) -> list[ResidualPattern]:
     patterns = []
     for name in masks.names:
         values = diagnosis.nominal.residual[name][:, 0]
-        known = masks.present[name] > 0.5
+        known = (masks.present[name] > 0.5) & diagnosis.compared_samples
         rms, noise = float(np.sqrt(np.mean(values[known] ** 2))), expected[name]
         text = "noise" if rms < _NOISE_RATIO * noise else _pattern(name, values, known, variables, masks)
         patterns.append(ResidualPattern(name, WORDS[name], UNITS[name.split(".")[0]], rms, noise, text))
@@ -57,8 +57,9 @@ def residual_patterns(diagnosis: Diagnosis) -> list[ResidualPattern]:
 
 def _expected(diagnosis: Diagnosis, masks: SampleMasks) -> dict[str, float]:
     """Root mean square that noise and disturbances leave: that of the final model's residual."""
-    final = diagnosis.final.residual
-    return {name: float(np.sqrt(np.mean(final[name][masks.present[name] > 0.5, 0] ** 2))) for name in masks.names}
+    final, compared = diagnosis.final.residual, diagnosis.compared_samples
+    known = {name: (masks.present[name] > 0.5) & compared for name in masks.names}
+    return {name: float(np.sqrt(np.mean(final[name][known[name], 0] ** 2))) for name in masks.names}
 
 
 def _variables(dataset: Dataset) -> dict[str, Floats]:

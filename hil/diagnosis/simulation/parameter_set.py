@@ -36,6 +36,17 @@ class Onset:
 
 
 @dataclass(frozen=True, eq=False)
+class Change:
+    """What is otherwise in all recordings from number ``since`` on: theta (THETA.size,), rows of nonparametric terms
+    and the temperature of the discs at the start, all added."""
+
+    since: int
+    theta: Floats = field(default_factory=lambda: np.zeros(THETA.size))
+    nonparametric_rows: Floats = field(default_factory=NO_TERMS.copy)
+    disc_offset_k: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class ParameterSet:
     """One simulated car.
 
@@ -47,6 +58,7 @@ class ParameterSet:
     tooth_share : multiplies the lag of a toothed wheel, half the time between two teeth: it measures when a tooth has
         passed.  window_rows2 : square of the time over which that speed is a mean, in rows.
     onsets : of effects that act from a time on.
+    change : since reference logs; None where there are none.
     """
 
     p: Floats
@@ -57,6 +69,42 @@ class ParameterSet:
     tooth_share: float = 1.0
     window_rows2: float = 0.0
     onsets: tuple[Onset, ...] = ()
+    change: Change | None = None
+
+    def adding(self, at: Sequence[int], value: float) -> "ParameterSet":
+        """With ``value`` added to these entries of theta: since the reference, where there is one."""
+        theta: Floats = (self.theta if self.change is None else self.change.theta).copy()
+        for index in at:
+            theta[index] += value
+        if self.change is None:
+            return replace(self, theta=theta)
+        return replace(self, change=replace(self.change, theta=theta))
+
+    def with_rows(self, rows: Floats) -> "ParameterSet":
+        """With further nonparametric terms, (rows, columns): since the reference, where there is one."""
+        if self.change is None:
+            return replace(self, nonparametric_rows=np.vstack([self.nonparametric_rows, rows]))
+        added = np.vstack([self.change.nonparametric_rows, rows])
+        return replace(self, change=replace(self.change, nonparametric_rows=added))
+
+    def in_recording(self, number: int) -> "ParameterSet":
+        """As it is in one recording, before or since the change."""
+        if self.change is None:
+            return self
+        if number < self.change.since:
+            kept = tuple(one for one in self.onsets if one.recording < self.change.since)
+            return replace(self, change=None, onsets=kept)
+        return self.changed()
+
+    def changed(self) -> "ParameterSet":
+        """As it is since the change."""
+        if self.change is None:
+            return self
+        rows = self.nonparametric_rows
+        if len(self.change.nonparametric_rows):
+            rows = np.vstack([rows, self.change.nonparametric_rows])
+        theta, disc_offset_k = self.theta + self.change.theta, self.disc_offset_k + self.change.disc_offset_k
+        return replace(self, theta=theta, nonparametric_rows=rows, disc_offset_k=disc_offset_k, change=None)
 
     def theta_in(self, recording: Recording) -> Floats:
         """Theta of one recording at its end: direction along the road, onsets in it or later."""
@@ -80,13 +128,18 @@ class ParameterSet:
 
     def with_onset(self, effect: str, number: int, since_s: float, before: "ParameterSet") -> "ParameterSet":
         """With an effect that acts from a time on in recording ``number``; until then, with strengths of ``before``."""
-        strengths = tuple(before.theta[_strengths(effect)].tolist())
+        strengths = tuple(before.changed().theta[_strengths(effect)].tolist())
         return replace(self, onsets=(*self.onsets, Onset(effect, number, since_s, strengths)))
 
     def with_nuisances(self, nuisances: Sequence[Nuisance], z: Floats) -> "ParameterSet":
         """With nuisances ``z`` prior standard deviations off, (nuisances,)."""
         p, disc, late, tooth = self.p.copy(), self.disc_offset_k, list(self.latency_s), self.tooth_share
         theta, window = self.theta.copy(), self.window_rows2
+        rows = self.nonparametric_rows
+        if any(nuisance.kind is NuisanceKind.LEARNED_CURVE for nuisance in nuisances):
+            rows = rows.copy()
+        change = np.zeros(THETA.size) if self.change is None else self.change.theta.copy()
+        disc_change = 0.0 if self.change is None else self.change.disc_offset_k
         for nuisance, amount in zip(nuisances, z, strict=True):
             for at, step in zip(nuisance.at, nuisance.step, strict=True):
                 match nuisance.kind:
@@ -94,8 +147,14 @@ class ParameterSet:
                         p[at] = _positive(p[at], amount, step)
                     case NuisanceKind.SIGNED:
                         p[at] += amount * step
-                    case NuisanceKind.SENSOR | NuisanceKind.SIDE_TO_SIDE | NuisanceKind.LINE_LAG:
+                    case NuisanceKind.SENSOR | NuisanceKind.SIDE_TO_SIDE | NuisanceKind.LINE_LAG | NuisanceKind.LEARNED:
                         theta[at] += amount * step
+                    case NuisanceKind.LEARNED_CURVE:
+                        rows.flat[at] += amount * step
+                    case NuisanceKind.OF_THE_DAY:
+                        change[at] += amount * step
+                    case NuisanceKind.DISC_TEMPERATURE_OF_THE_DAY:
+                        disc_change += amount * step
                     case NuisanceKind.LATENCY:
                         late[at] += amount * step
                     case NuisanceKind.DISC_TEMPERATURE:
@@ -105,13 +164,18 @@ class ParameterSet:
                     case NuisanceKind.TOOTH_WINDOW:
                         window += amount * step
         moved = theta - self.theta  # also before an onset: what single wheels are off
+        if self.change is not None:
+            moved = moved + (change - self.change.theta)
         onsets = tuple(
             replace(one, before=tuple(np.add(one.before, moved[_strengths(one.effect)]).tolist()))
             for one in self.onsets
         )
+        since = None
+        if self.change is not None:
+            since = replace(self.change, theta=change, disc_offset_k=disc_change)
         return replace(
             self, p=p, theta=theta, disc_offset_k=disc, latency_s=tuple(late), tooth_share=tooth, window_rows2=window,
-            onsets=onsets,
+            onsets=onsets, change=since, nonparametric_rows=rows,
         )  # fmt: skip
 
     def with_extension(self, extension: Extension, logs: Sequence[str] = ()) -> "ParameterSet":

@@ -155,8 +155,9 @@ class Simulator:
         """With this parameter set simulated once: others are simulated only where they can differ from it."""
 
         def simulated(recording: Recording) -> tuple[Replay, Stack]:
-            replay = self._replay(recording, at, self._columns)
-            return replay, self.measurement_model.measure(recording, at, replay.table)
+            own = at.in_recording(recording.number)
+            replay = self._replay(recording, own, self._columns)
+            return replay, self.measurement_model.measure(recording, own, replay.table)
 
         replays, channels = zip(*parallel_map(simulated, self.dataset.recordings), strict=True)
         return replace(self, _baseline=_Baseline(at, replays, channels))
@@ -186,6 +187,7 @@ class Simulator:
         """A recording with the inputs of `denoised`; these as sensors give them, and taken back again (`_Denoised`)."""
         groups, tracked = self.dataset.groups, self.dataset.tracked_actuators
         wanted = [one for one in _INPUTS if one[0] in groups and one[0] in tracked]
+        at = at.in_recording(recording.number)
         measured = self._setups[recording.number].raw_inputs
         recording = replace(recording, inputs=measured)
         simulated = self.measurement_model.split(self._replay(recording, at, self._columns).table)
@@ -211,7 +213,7 @@ class Simulator:
         """Inputs of the plant of a parameter set whose sensors and nodes gave the logs, (rows, INPUT.size)."""
         if self._denoised is None:
             return _true_inputs(recording.inputs, recording, parameters)
-        if same_sensors(parameters, self._denoised.parameters):
+        if same_sensors(parameters, self._denoised.parameters.in_recording(recording.number)):
             return recording.inputs
         sensed, back = self._denoised.inputs[recording.number]
         return np.asarray(recording.inputs + (_true_inputs(sensed, recording, parameters) - back))
@@ -228,7 +230,10 @@ class Simulator:
 
     def _plant_columns(self, parameters: ParameterSet) -> Stack:
         """Columns of the plant by group over all recordings, before any sensor."""
-        tables = [self._replay(one, parameters, self._columns).table for one in self.dataset.recordings]
+        tables = [
+            self._replay(one, parameters.in_recording(one.number), self._columns).table
+            for one in self.dataset.recordings
+        ]
         parts = [self.measurement_model.split(table) for table in tables]
         return {group: np.concatenate([part[group] for part in parts]) for group in self.dataset.groups}
 
@@ -255,16 +260,19 @@ class Simulator:
     def states(self, parameters: ParameterSet, names: Sequence[str]) -> Floats:
         """States and outputs by name (`plant.model.column_indices`) over all recordings, (rows, names)."""
         columns = column_indices(list(names))
-        return np.concatenate([self._replay(one, parameters, columns).table for one in self.dataset.recordings])
+        recordings = self.dataset.recordings
+        each = (self._replay(one, parameters.in_recording(one.number), columns).table for one in recordings)
+        return np.concatenate(list(each))
 
     def _channels(self, recording: Recording, parameters: ParameterSet) -> Stack:
         """Simulated channels of one recording; those of the baseline where the parameter sets cannot differ."""
-        baseline = self._baseline
+        baseline, parameters = self._baseline, parameters.in_recording(recording.number)
         if baseline is None:
             table = self._replay(recording, parameters, self._columns).table
             return self.measurement_model.measure(recording, parameters, table)
-        needed = excitation_that_separates(parameters, baseline.parameters, recording)
-        alike = same_sensors(parameters, baseline.parameters)
+        before = baseline.parameters.in_recording(recording.number)
+        needed = excitation_that_separates(parameters, before, recording)
+        alike = same_sensors(parameters, before)
         differs = [bool(needed & present) for present in self._setups[recording.number].excitations]
         if alike and not any(differs):
             return baseline.channels[recording.number]

@@ -48,6 +48,14 @@ class NuisanceKind(StrEnum):
     """Lag of a toothed wheel's speed."""
     TOOTH_WINDOW = "tooth_window"
     """Time over which a toothed wheel's speed is a mean; not negative."""
+    LEARNED = "learned"
+    """Strength of a listed effect that reference logs and the others share, in theta."""
+    LEARNED_CURVE = "learned_curve"
+    """Coefficient of a nonparametric term that they share, in its rows, row by row."""
+    OF_THE_DAY = "of_the_day"
+    """What differs from the day of the reference logs to that of the others, in theta."""
+    DISC_TEMPERATURE_OF_THE_DAY = "disc_temperature_of_the_day"
+    """Temperature of the discs at the start, beside that of the reference logs."""
 
 
 _NOT_NEGATIVE = (NuisanceKind.TOOTH_WINDOW, NuisanceKind.LINE_LAG)
@@ -350,3 +358,53 @@ def recording_nuisances(disc_measured: bool, latencies: Sequence[Latency]) -> li
         *late,
         *(_in_theta(f"zero_{name}", "imu_bias", name, sd) for name, sd in ZERO_SD.items()),
     ]
+
+
+_TWO_DAYS = 2.0**0.5
+"""Each of two days is off by itself."""
+_OF_THE_DAY = (
+    ("headwind", "wind_mps", 1.0), ("headwind", "drag_gain", 0.03), ("road_grade", "grade", 0.0025),
+    ("rolling_resistance", "gain", 0.05), ("imu_bias", "ax_mps2", 0.025), ("imu_bias", "ay_mps2", 0.01),
+    ("imu_bias", "yaw_rate_rad_s", 0.0005), ("steer_lateral", "offset_rad", 0.0005), ("imu_gain", "gain", 0.004),
+    ("speed_scale", "gain", 0.002),
+)  # fmt: skip
+"""Effect, parameter and standard deviation on one day, of the whole car: wind and slope as in `INSTRUMENTS`, density of
+the air (10 K and 10 hPa), rolling resistance (10 K of air: SAE J1263 corrects 0.6 % a kelvin), zeros of the inertial
+unit (`INSTRUMENTS`, `ZERO_SD`), steering wheel straight ahead (a tenth of `_STRAIGHT_AHEAD_RAD`), scales
+(`_DAY_SHARE`)."""
+_DAY_SHARE = 0.4
+"""Share of what parts differ by from one to the other (`_SIDE_TO_SIDE`, `INSTRUMENTS`) that one part differs by from
+day to day: a tyre of 0.05 % other radius has 1 to 2 kPa more."""
+_PHASE_SD_S = 0.003
+"""Of the time between a node's sample and its frame, which each start draws anew: cycles of 10 ms, evenly."""
+
+
+def of_the_day(nuisances: Sequence[Nuisance], p: Floats, disc_measured: bool) -> list[Nuisance]:
+    """What differs between the day of reference logs and that of the others, with a car unchanged.
+
+    Load and the road's friction vary within the tolerances of ``nuisances``, the car's own; temperature of the discs,
+    wind, slope, air, single wheels, sensors and the phases of their frames as they usually do.
+    """
+    whole = list(_OF_THE_DAY)
+    steps = {one.name: one.step[0] for one in nuisances}
+    if mass := steps.get("vehicle_mass_kg"):
+        whole.append(("mass_offset", "mass_kg", mass / _TWO_DAYS))
+    if grip := steps.get("tyre_lmux"):
+        whole.append(("mu_road", "scale", grip / float(p[P.tyre_lmux]) / _TWO_DAYS))
+    single = [(*one, _DAY_SHARE * _sd(*one)) for one in _SIDE_TO_SIDE] + [("timestamp_offset", "delay_s", _PHASE_SD_S)]
+    rows = [(*row, False) for row in whole] + [(*row, True) for row in single]
+    found = []
+    for effect, parameter, sd, each in rows:
+        own, step = THETA.slice(effect, parameter), _TWO_DAYS * sd
+        declared = THETA.effect(effect).parameter(parameter)
+        members = [(at,) for at in range(own.start, own.stop)] if each else [tuple(range(own.start, own.stop))]
+        found += [
+            Nuisance(
+                f"{effect}.{parameter}_of_the_day_{k}", at, (step,) * len(at), NuisanceKind.OF_THE_DAY,
+                upper_bound=declared.high / step, lower_bound=declared.low / step,
+            )
+            for k, at in enumerate(members)
+        ]  # fmt: skip
+    disc_sd_k = _TWO_DAYS * (DISC_MEASURED_SD_K if disc_measured else DISC_ASSUMED_SD_K)
+    kind = NuisanceKind.DISC_TEMPERATURE_OF_THE_DAY
+    return [*found, Nuisance("disc_temperature_of_the_day", (0,), (disc_sd_k,), kind)]

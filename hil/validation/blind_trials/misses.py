@@ -21,6 +21,8 @@ _RIGHT: Mapping[str, Callable[[Record], bool]] = {
     "not_testable": reading.called_not_testable,
     "strangers": lambda r: not reading.answers(r),
     "strangers_single": lambda r: strangers.is_right(r) and not strangers.something_false(r),
+    "strangers_reference": lambda r: not reading.answers(r),
+    "strangers_reference_single": lambda r: strangers.is_right(r) and not strangers.something_false(r),
 }
 
 

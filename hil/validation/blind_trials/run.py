@@ -112,8 +112,12 @@ def run_stranger(case: strangers.Case, seed: int, settings: Settings | None = No
     """
     sources = state(STRANGERS)
     with TemporaryDirectory() as folder:
+        before = None
+        if case.reference is not None:
+            before = Path(folder) / "reference"
+            strangers.write(case.car, case.reference, None, before)
         _, said = _explained(
-            lambda logs: strangers.write(case.car, case.seed, case.hidden, logs), Path(folder), settings
+            lambda logs: strangers.write(case.car, case.seed, case.hidden, logs), Path(folder), settings, before
         )
     hidden, cause = case.hidden, case.cause
     causes: list[Record] = []
@@ -128,13 +132,14 @@ def run_stranger(case: strangers.Case, seed: int, settings: Settings | None = No
 
 
 def _explained(
-    written: Callable[[Path], object], folder: Path, settings: Settings | None
+    written: Callable[[Path], object], folder: Path, settings: Settings | None, reference: Path | None = None
 ) -> tuple[Answer | None, Record]:
     """What `explain` says of the logs written; data that nothing can be concluded from are an answer too."""
     logs = folder / "logs"
     written(logs)
     try:
-        answered = explain(logs, logs / "vehicle.toml", out=folder / "out", settings=settings)
+        vehicle = logs / "vehicle.toml"
+        answered = explain(logs, vehicle, out=folder / "out", reference=reference, settings=settings)
     except UnusableError as error:
         return None, {
             "verdict": "unusable", "why": str(error), "named": [], "causes": [], "rivals": [], "rivals_at": [],

@@ -145,4 +145,5 @@ _SCORED: dict[str, Callable[[Records], Metrics]] = {
     "confounded": _confounded, "twin": _twin, "not_testable": _not_testable,
     "parameters": lambda records: parameters(_reached(records)), "gain": gain, "calibration": calibration,
     "strangers": strangers.null, "strangers_single": strangers.single,
+    "strangers_reference": strangers.null, "strangers_reference_single": strangers.single,
 }  # fmt: skip

@@ -18,14 +18,18 @@ from hil.validation.strangers.snr import Visibility
 
 _CARS: tuple[StrangerCar, ...] = (DeadTime(), HydraulicSaloon(), BrakeByWireVan())
 CARS = {car.name: car for car in _CARS}
-FAMILIES = ("strangers", "strangers_single")
+FAMILIES = ("strangers", "strangers_single", "strangers_reference", "strangers_reference_single")
 SNR, REACHED = 15.0, 0.02
 """Signal-to-noise ratio of what is hidden, and by which share it may be off."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A drive of a car; ``hidden`` None is nothing. ``reached`` False: the cause's range ends before the ratio."""
+    """A drive of a car; ``hidden`` None is nothing. ``reached`` False: the cause's range ends before the ratio.
+
+    ``reference`` is the seed of a drive before with nothing hidden, None where there is none: of manoeuvres, noise,
+    road and sensors of its own, and of single wheels that differ from this one's by half of what wheels differ by.
+    """
 
     family: str
     index: int
@@ -34,6 +38,7 @@ class Case:
     hidden: Hidden | None = None
     snr: float | None = None
     reached: bool = True
+    reference: int | None = None
 
     @property
     def cause(self) -> Cause | None:
@@ -52,13 +57,15 @@ def draw(family: str, index: int, seed: int, cars: Sequence[StrangerCar] = tuple
     if family not in FAMILIES:
         raise BrakebenchError(f"family {family!r}: expected one of {', '.join(FAMILIES)}")
     car, nth = cars[index % len(cars)], index // len(cars)
-    own = int(np.random.default_rng([seed, index, FAMILIES.index(family)]).integers(2**31))
-    if family == "strangers":
-        return Case(family, index, car, own)
+    rng = np.random.default_rng([seed, index, FAMILIES.index(family)])
+    own = int(rng.integers(2**31))
+    reference = int(rng.integers(2**31)) if "reference" in family else None
+    if not family.endswith("single"):
+        return Case(family, index, car, own, reference=reference)
     order = np.random.default_rng([seed, index % len(cars)]).permutation(len(car.causes))
     cause = car.causes[list(car.causes)[order[nth % len(order)]]]
     hidden, snr = Visibility(car, own, stated(car, own)).sized(cause, SNR)
-    return Case(family, index, car, own, hidden, snr, abs(snr / SNR - 1.0) <= REACHED)
+    return Case(family, index, car, own, hidden, snr, abs(snr / SNR - 1.0) <= REACHED, reference)
 
 
 def stated(car: StrangerCar, seed: int) -> dict[str, float | list[float]]:

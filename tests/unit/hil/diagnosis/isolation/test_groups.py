@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hil.diagnosis.detection.threshold import ISOLABILITY_SIGMA
-from hil.diagnosis.estimation.terms import candidates, columns
-from hil.diagnosis.isolation.groups import imitation, isolability_group, remaining, summed
+from hil.diagnosis.estimation.terms import candidates, columns, summed
+from hil.diagnosis.isolation.groups import imitation, isolability_group, remaining
 
 COLUMNS = columns()
 CANDIDATES = candidates(COLUMNS)

@@ -31,7 +31,7 @@ def _written(folder, *, already=0.0):
     weak.theta[PADS] += already - 0.1
     weak = weak.with_onset("pad_mu_gain", 1, 4.25, before)
     final = SimpleNamespace(z=np.zeros(0), terms=())
-    fitter = SimpleNamespace(parameter_set=lambda z, terms: weak)
+    fitter = SimpleNamespace(parameter_set=lambda z, terms: weak, nuisances=())
     diagnosis = SimpleNamespace(fitter=fitter, final=final, dataset=_dataset("a.csv", "b.csv", "c.csv"), vehicle=car)
     write_extended_car(diagnosis, folder)
     return folder / "extension.toml"

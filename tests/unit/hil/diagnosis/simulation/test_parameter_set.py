@@ -7,9 +7,9 @@ import pytest
 
 from hil.diagnosis.data.log import make_log
 from hil.diagnosis.data.prepare import prepare
-from hil.diagnosis.simulation.parameter_set import nominal
+from hil.diagnosis.simulation.parameter_set import Change, nominal
 from hil.diagnosis.vehicle.load import load_vehicle, paper_car
-from hil.diagnosis.vehicle.priors import ZERO_SD, recording_nuisances
+from hil.diagnosis.vehicle.priors import ZERO_SD, Nuisance, NuisanceKind, of_the_day, recording_nuisances
 from plant.injection.theta import THETA
 
 SIX = {
@@ -77,3 +77,24 @@ def test_an_inertial_unit_has_zeros_across():
     assert theta[THETA.slice("imu_bias", "yaw_rate_rad_s")] == pytest.approx(ZERO_SD["yaw_rate_rad_s"])
     assert np.flatnonzero(theta != base.theta).size == 2
     assert (base.with_nuisances(nuisances, 0.0 * z).theta == base.theta).all()
+
+
+def test_what_has_changed_since_a_reference_acts_in_later_logs_alone():
+    """Values of causes go to the change, numbers of the car to all logs, what differs from day to day to later ones."""
+    base = replace(nominal(load_vehicle(SIX)), change=Change(2))
+    pads, wind = THETA.slice("pad_mu_gain", "gain"), THETA.slice("headwind", "wind_mps")
+    common = Nuisance("pad_mu_gain@front", (pads.start, pads.start + 1), (0.1, 0.1), NuisanceKind.LEARNED)
+    days = of_the_day((), base.p, disc_measured=False)
+    at = [one.name for one in days].index("headwind.wind_mps_of_the_day_0")
+    moved = base.with_nuisances((common, *days), np.append(0.5, np.eye(len(days))[at] + np.eye(len(days))[-1]))
+    moved = moved.adding([pads.start], -0.2)
+    assert moved.in_recording(1).theta[pads] == pytest.approx([0.05, 0.05, 0.0, 0.0])
+    assert moved.in_recording(2).theta[pads] == pytest.approx([-0.15, 0.05, 0.0, 0.0])
+    assert moved.in_recording(1).theta[wind] == 0.0
+    assert moved.in_recording(2).theta[wind] == pytest.approx(2.0**0.5)
+    assert moved.in_recording(1).disc_offset_k == 0.0
+    assert moved.in_recording(2).disc_offset_k == pytest.approx(15.0 * 2.0**0.5)
+    begun = moved.adding([pads.start + 3], -0.1).with_onset("pad_mu_gain", 3, 2.0, before=moved)
+    assert begun.in_recording(1).onsets == ()
+    (onset,) = begun.in_recording(2).onsets
+    assert onset.before[: pads.stop - pads.start] == pytest.approx([-0.15, 0.05, 0.0, 0.0])

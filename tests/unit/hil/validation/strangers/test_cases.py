@@ -19,6 +19,14 @@ def test_drives_with_nothing_hidden_are_spread_over_the_cars() -> None:
     assert draw("strangers", 2, 9) == cases[2]
 
 
+def test_a_reference_is_another_drive_of_the_same_car() -> None:
+    cases = [draw("strangers_reference", k, 9) for k in range(2 * len(CARS))]
+    assert Counter(case.car.name for case in cases) == dict.fromkeys(CARS, 2)
+    assert all(case.hidden is None for case in cases)
+    assert len({seed for case in cases for seed in (case.seed, case.reference)}) == 2 * len(cases)
+    assert draw("strangers", 2, 9).reference is None
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("index", [0, *(pytest.param(k, marks=pytest.mark.long) for k in range(1, len(CARS)))])
 def test_a_single_cause_shows_fifteen_times_the_noise(index) -> None:
