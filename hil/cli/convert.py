@@ -18,7 +18,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "convert",
-        help="convert a log to another format",
         description=f"Convert a CAN log; the suffix names the format: {', '.join(WRITABLE)} (.log is candump's).",
         epilog="The written file is read back and compared with the frames of IN before it appears as OUT. "
         "Exit codes: 0 all of IN is in OUT; 1 something of IN was cut off or rejected; 2 unusable.",

@@ -27,7 +27,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "diff",
-        help="which signals of two logs differ",
         description="Compare the signals of two logs, frame by frame: which differ, from when, by how much.",
         epilog="Frames are paired by their stamps, within half a cycle. Tolerance is one raw step, and none for single "
         "bits and named values. Exit codes: 0 equal within the tolerances, 1 they differ, or something of a log was "

@@ -6,6 +6,7 @@ import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from hil.cli.columns import listing, say, terminal_width
 from hil.cli.options import add_bus
 from hil.errors import BrakebenchError
 
@@ -18,7 +19,7 @@ _LISTEN_S = 1.0  # nodes tell of themselves on the bench bus a hundred times a s
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = subparsers.add_parser("inject", help="arm a fault on a running bench, or list the faults")
+    parser = subparsers.add_parser("inject")
     parser.add_argument("fault", nargs="?", metavar="NAME", help="the fault; left out: list all of them")
     parser.add_argument("--on", metavar="TARGET", help="MESSAGE, MESSAGE.SIGNAL, node, ALL, or wheels (fl,rr; front)")
     parser.add_argument("--for", dest="for_s", type=float, metavar="S", help="how long (default: for good)")
@@ -34,8 +35,7 @@ def run(args: argparse.Namespace) -> int:
     from hil.faults.catalogue import FAULTS, fault_named
 
     if args.fault is None:
-        for one in FAULTS:
-            print(f"{one.name:24} {one.takes.value:24} {one.text}")
+        say(listing([(one.name, one.takes.value, one.text) for one in FAULTS], terminal_width()))
         return 0
     kind = fault_named(args.fault)
     values = dict(_pair(text) for text in args.set) | ({} if args.for_s is None else {"for_s": args.for_s})

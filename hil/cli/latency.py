@@ -23,7 +23,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "latency",
-        help="timing on the wire: stimulus to response, and jitter of every cyclic message",
         description="Measure stimulus to response and the jitter of every cyclic message against its cycle time, on a "
         "live bus, to which nothing is sent, or in a log.",
         epilog="Age: from the newest frame of the stimulus to each frame of the response. Reaction: from the frame "

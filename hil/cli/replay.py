@@ -29,7 +29,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "replay",
-        help="send a recorded log back on a bus",
         description="Send a recorded log back on a bus, each frame at its own time. The channels vehicle and bench of "
         "our own recordings go to the buses of these names, a foreign log's only channel goes to the vehicle bus. "
         "More: docs/logs.md.",
