@@ -11,6 +11,7 @@ from hil.cli.log_options import LOGS, add_force, add_timezone
 from hil.cli.progress import Progress
 from hil.log.convert import Conversion, convert
 from hil.log.formats import WRITABLE
+from hil.log.samples import log_path
 from hil.log.source import ReadOptions
 
 
@@ -34,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     """Convert and say what happened."""
     with Progress() as progress:
         progress.part(0, "converting")
-        done = convert(Path(args.source), args.target, args.force, ReadOptions(timezone=args.timezone), progress)
+        done = convert(log_path(args.source), args.target, args.force, ReadOptions(timezone=args.timezone), progress)
     account = done.account
     if args.json:
         result = {

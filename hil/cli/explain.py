@@ -7,6 +7,7 @@ from pathlib import Path
 
 from hil.cli.options import add_json, out_folder
 from hil.diagnosis.data.log import UnusableError
+from hil.log.samples import log_path
 from hil.rt.clock import monotonic_ns
 
 
@@ -20,9 +21,9 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "logs",
         nargs="+",
-        type=Path,
+        type=log_path,
         metavar="LOG",
-        help="CAN log, CSV, Parquet, MF4 or .mat table, or a folder of them",
+        help="CAN log, CSV, Parquet, MF4 or .mat table, or a folder of them; sample:weak_brake comes with brakebench",
     )
     parser.add_argument(
         "--vehicle", type=Path, metavar="SET.toml", help="the vehicle's parameters (default: the shipped car)"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from hil.cli.log_options import LOGS, add_databases
 from hil.cli.options import add_json
 from hil.errors import BrakebenchError
+from hil.log.samples import log_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -70,11 +71,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _read(log: str) -> "FrameTable":
-    from pathlib import Path
-
     from hil.log.read import read_log
 
-    return read_log(Path(log)).frames
+    return read_log(log_path(log)).frames
 
 
 def _listen(spec: str, for_s: float) -> "FrameTable":
