@@ -13,8 +13,10 @@ def pip_install(extra: str) -> str:
     """
     try:
         needed = requires("brakebench") or []
-    except PackageNotFoundError:  # started from its sources, without an installation
-        return shlex.join([sys.executable, "-m", "pip", "install", "--editable", f".[{extra}]"])
+    except PackageNotFoundError:
+        needed = []
     marked = [text.partition(";") for text in needed]
     names = [name.strip() for name, _, marker in marked if re.search(rf"extra == ['\"]{extra}['\"]", marker)]
+    if not names:  # started from a clone that is not installed, or was before it had this extra
+        names = ["--editable", f".[{extra}]"]
     return shlex.join([sys.executable, "-m", "pip", "install", *names])

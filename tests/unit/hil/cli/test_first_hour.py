@@ -133,3 +133,5 @@ def test_a_missing_extra_is_installed_by_the_names_of_its_packages(monkeypatch):
         importlib.metadata.Distribution, "requires", ["numpy>=1", "asammdf>=8; extra == 'mdf'"], raising=False
     )
     assert pip_install("mdf").endswith("-m pip install 'asammdf>=8'")
+    monkeypatch.setattr(importlib.metadata.Distribution, "requires", [], raising=False)
+    assert pip_install("mdf").endswith("-m pip install --editable '.[mdf]'")
