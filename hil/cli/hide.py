@@ -5,7 +5,7 @@ import json
 import sys
 from typing import TYPE_CHECKING
 
-from hil.cli.options import add_json, out_folder
+from hil.cli.options import add_json, out_folder, seed
 from hil.errors import BrakebenchError
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--manoeuvres", metavar="SET", default="full", help="full, stops, cold or decide (default: full)"
     )
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="true car, noise and bus (default: 1)")
+    parser.add_argument("--seed", type=seed, default=1, metavar="N", help="true car, noise and bus (default: 1)")
     parser.add_argument("--out", type=out_folder, metavar="DIR", help="folder for the logs; must be empty or not exist")
     add_json(parser)
     parser.set_defaults(run=run)

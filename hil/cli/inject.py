@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from hil.cli.columns import listing, say, terminal_width
-from hil.cli.options import add_bus
+from hil.cli.options import add_bus, seed
 from hil.errors import BrakebenchError
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--on", metavar="TARGET", help="MESSAGE, MESSAGE.SIGNAL, node, ALL, or wheels (fl,rr; front)")
     parser.add_argument("--for", dest="for_s", type=float, metavar="S", help="how long (default: for good)")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter of the fault, SI")
-    parser.add_argument("--seed", type=int, default=1, help="seed of what is random (default: 1)")
+    parser.add_argument("--seed", type=seed, default=1, help="seed of what is random (default: 1)")
     parser.add_argument("--clear", action="store_true", help="end the fault instead")
     add_bus(parser)
     parser.set_defaults(run=run)

@@ -66,7 +66,7 @@ def add_realtime(parser: argparse.ArgumentParser) -> None:
 
 def add_seed(parser: argparse.ArgumentParser) -> None:
     """``--seed``: of all noise."""
-    parser.add_argument("--seed", type=int, default=1, help="seed of all noise (default: 1)")
+    parser.add_argument("--seed", type=seed, default=1, help="seed of all noise (default: 1)")
 
 
 def add_node_options(parser: argparse.ArgumentParser) -> None:
@@ -114,3 +114,15 @@ def out_folder(text: str) -> Path:
     if why:
         raise argparse.ArgumentTypeError(f"{text}: cannot be written: {why}; name another folder")
     return path
+
+
+def seed(text: str) -> int:
+    """Read a seed, a whole number from 0.
+
+    Raises
+    ------
+    argparse.ArgumentTypeError : it is none.
+    """
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"expected a whole number, 0 or more, got {text!r}")
+    return int(text)

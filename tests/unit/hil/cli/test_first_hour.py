@@ -97,6 +97,15 @@ def test_an_unwritable_out_is_refused_before_the_work(words, capsys, tmp_path, m
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
+@pytest.mark.parametrize(
+    "words", [["run", "--virtual"], ["compare"], ["trials"], ["hide"], ["faults"], ["inject", "lost"]]
+)
+@pytest.mark.parametrize("seed", ["-1", "x", "1.5"])
+def test_a_seed_that_is_none_is_refused(words, seed, capsys):
+    assert run(*words, f"--seed={seed}") == 2
+    assert "expected a whole number, 0 or more" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("command", LISTS)
 def test_lists_fit_a_narrow_terminal(command, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "60")
