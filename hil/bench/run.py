@@ -5,6 +5,7 @@ import json
 import math
 import os
 import platform
+import signal
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -111,20 +112,20 @@ def run_scenario(
     """
     scenario = name if isinstance(name, Scenario) else load_scenario(name)
     started_ns = wall_time_ns()
-    stop = StopSignal()
     folder = Path(out) if out else new_folder(scenario.name)
     bench_run: BenchRun
     try:
-        if virtual:
-            bit_rate = contract(BusName.VEHICLE).bit_rate
-            line = open_line(bus, bit_rate, seed) if is_timed(bus) else None
-            node = None if plant is None else plant.node(scenario)
-            bench_run = VirtualBench(scenario, folder, seed, say, stop, node, line=line)
-        else:
-            bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without, transmit, live)
-        with bench_run:
-            say(f"bus {bench_run.spec}" + (f" ({bench_run.note})" if bench_run.note else ""))
-            bench_run.run()
+        with _stop_signal() as stop:
+            if virtual:
+                bit_rate = contract(BusName.VEHICLE).bit_rate
+                line = open_line(bus, bit_rate, seed) if is_timed(bus) else None
+                node = None if plant is None else plant.node(scenario)
+                bench_run = VirtualBench(scenario, folder, seed, say, stop, node, line=line)
+            else:
+                bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without, transmit, live)
+            with bench_run:
+                say(f"bus {bench_run.spec}" + (f" ({bench_run.note})" if bench_run.note else ""))
+                bench_run.run()
     except BrakebenchError:
         with contextlib.suppress(OSError):  # a folder in which nothing is
             folder.rmdir()
@@ -136,6 +137,17 @@ def run_scenario(
     if plant is not None:
         provenance["plant"] = str(plant)
     return finish(bench_run, seed, provenance)
+
+
+@contextlib.contextmanager
+def _stop_signal() -> Iterator[StopSignal]:
+    """Signals end the bench in order meanwhile, and do afterwards what they did before."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
+    try:
+        yield StopSignal()
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def explained(bench_run: BenchRun) -> str:

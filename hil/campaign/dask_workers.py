@@ -4,6 +4,7 @@ from concurrent.futures import Executor
 from typing import Any
 
 from hil.errors import BrakebenchError
+from hil.extras import pip_install
 
 _CONNECT_S = 10
 
@@ -30,7 +31,7 @@ class DaskWorkers:
         try:
             import distributed
         except ImportError as error:
-            raise ClusterError("--scheduler needs Dask: pip install distributed") from error
+            raise ClusterError(f"--scheduler needs Dask: {pip_install('campaign')}") from error
         client: Any = distributed.Client
         try:
             self._client = client(address, timeout=_CONNECT_S, set_as_default=False)

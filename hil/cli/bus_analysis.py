@@ -20,7 +20,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "bus-analysis",
-        help="bus load and worst-case response of each message of a database",
         description="Bus load, and by which time each message arrives at the latest (Davis et al. 2007), for any "
         "database with cycle times. The deadline of a message is its cycle time.",
         epilog="Exit codes: 0 every deadline is met, 1 one is missed, 2 unusable. More: docs/bus-timing.md.",

@@ -13,7 +13,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "calibrate",
-        help="fit a vehicle set to reference logs, with uncertainties and held-out error",
         description="Fits the uncertain numbers of a vehicle set to drives of the car as explain does, with no cause "
         "allowed, and writes them with what is left of their tolerances; all other keys stay as they are.",
     )

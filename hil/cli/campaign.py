@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hil.cli.options import add_json
+from hil.cli.options import add_json, out_folder
 
 if TYPE_CHECKING:
     from hil.campaign.plan import Plan
@@ -17,7 +17,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "campaign",
-        help="thousands of runs over parameters, effects, faults and seeds; sensitivities and worst cases",
         description="Runs every point of CAMPAIGN.toml in virtual time on all processors, or on a Dask cluster, and "
         "keeps inputs, verdict and figures of every run in DIR/results (Parquet). Nothing is lost: stopped at any "
         "time, the same command goes on.",
@@ -25,7 +24,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "2 wrong use. More: docs/campaigns.md.",
     )
     parser.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml", help="what is run and varied")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="results and report (default: campaigns/NAME)")
+    parser.add_argument("--out", type=out_folder, metavar="DIR", help="results and report (default: campaigns/NAME)")
     parser.add_argument("--workers", type=_positive, metavar="N", help="processes (default: one a processor)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler in place of own processes")
     parser.add_argument("--repeat", type=int, metavar="RUN", help="instead: one run again, with recording and report")

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import textwrap
 from collections.abc import Iterable, Sequence
 
 from hil.log.account import printable
@@ -73,3 +74,23 @@ def wrapped(text: str, width: int, indent: str = "  ") -> list[str]:
         else:
             line = f"{line} {word}" if line.strip() else line + word
     return [*lines, line]
+
+
+def listing(rows: Sequence[Sequence[str]], width: int) -> list[str]:
+    """Lines of a list: columns aligned on the left, the last one broken between words below itself.
+
+    Where the others leave it less than a third of ``width``, it stands on lines of its own.
+    """
+    sizes = [max(len(row[k]) for row in rows) for k in range(len(rows[0]) - 1)]
+    lead = sum(sizes) + 2 * len(sizes)
+    indent = lead if 3 * (width - lead) >= width else 4
+    lines = []
+    for row in rows:
+        head = "  ".join(cell.ljust(size) for cell, size in zip(row, sizes, strict=False))
+        told = textwrap.wrap(printable(row[-1]), width - indent, break_on_hyphens=False) or [""]
+        if indent == lead:
+            lines.append(f"{head}  {told.pop(0)}".rstrip())
+        else:
+            lines.append(head.rstrip())
+        lines += [" " * indent + line for line in told]
+    return lines

@@ -11,7 +11,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "compare",
-        help="run a scenario in virtual and in real time and report the difference",
         description="Run a scenario in virtual and in real time; report signals, stopping distance and latencies.",
     )
     add_scenario(parser)

@@ -11,6 +11,7 @@ from hil.cli.log_options import LOGS, add_force, add_timezone
 from hil.cli.progress import Progress
 from hil.log.convert import Conversion, convert
 from hil.log.formats import WRITABLE
+from hil.log.samples import log_path
 from hil.log.source import ReadOptions
 
 
@@ -18,7 +19,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "convert",
-        help="convert a log to another format",
         description=f"Convert a CAN log; the suffix names the format: {', '.join(WRITABLE)} (.log is candump's).",
         epilog="The written file is read back and compared with the frames of IN before it appears as OUT. "
         "Exit codes: 0 all of IN is in OUT; 1 something of IN was cut off or rejected; 2 unusable.",
@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     """Convert and say what happened."""
     with Progress() as progress:
         progress.part(0, "converting")
-        done = convert(Path(args.source), args.target, args.force, ReadOptions(timezone=args.timezone), progress)
+        done = convert(log_path(args.source), args.target, args.force, ReadOptions(timezone=args.timezone), progress)
     account = done.account
     if args.json:
         result = {

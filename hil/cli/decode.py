@@ -41,7 +41,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "decode",
-        help="what a log holds, and its signals as tables",
         description="Summarise a CAN log and decode it into signals; every frame is accounted for.",
         epilog="Without --dbc our own databases are used: bench.dbc for a channel named bench, brake.dbc for others. "
         "Exit codes: 0 the whole log was read; 1 something of it was cut off, rejected or shorter than its message; "

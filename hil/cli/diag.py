@@ -9,6 +9,7 @@ from hil.cli.columns import say
 from hil.cli.diag_actions import ACTIONS, session_number
 from hil.cli.options import add_bus, add_json, add_transmit
 from hil.errors import BrakebenchError, Verdict
+from hil.extras import pip_install
 from hil.log.account import printable
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "diag",
-        help="ask an ECU by UDS: trouble codes, data, routines",
         description="Ask an ECU by UDS (ISO 14229 over ISO-TP), ours by default, and print its answers in words.",
         epilog="Exit codes: 0 answered; 1 the ECU refuses; 2 wrong use; 3 no answer. A tutorial: docs/diagnose-it.md.",
     )
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
         from hil.uds.transport import IsoTpConnection
     except ImportError as error:
         raise BrakebenchError(
-            f"brakebench diag needs udsoncan and can-isotp ({error}); install them with: pip install 'brakebench[diag]'"
+            f"brakebench diag needs udsoncan and can-isotp ({error}); install them with: {pip_install('diag')}"
         ) from error
     from dbc.frame import BusName
     from hil.bus.channel import resolve

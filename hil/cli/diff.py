@@ -4,7 +4,6 @@ import argparse
 import json
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from dbc.database import Signal
@@ -16,6 +15,7 @@ from hil.errors import BrakebenchError
 from hil.log.choice import Choice, matches
 from hil.log.compare.diff import LogDifference, MessageDifference, Tolerance, diff_logs
 from hil.log.compare.diff_signals import SignalDifference
+from hil.log.samples import log_path
 from hil.log.several import Logs
 from hil.log.signals.databases import Databases
 from hil.log.source import ReadOptions
@@ -27,14 +27,13 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "diff",
-        help="which signals of two logs differ",
         description="Compare the signals of two logs, frame by frame: which differ, from when, by how much.",
         epilog="Frames are paired by their stamps, within half a cycle. Tolerance is one raw step, and none for single "
         "bits and named values. Exit codes: 0 equal within the tolerances, 1 they differ, or something of a log was "
         "cut off or rejected, 2 unusable.",
     )
-    parser.add_argument("first", metavar="A", type=Path, help=LOGS)
-    parser.add_argument("second", metavar="B", type=Path, help="the other one")
+    parser.add_argument("first", metavar="A", type=log_path, help=LOGS)
+    parser.add_argument("second", metavar="B", type=log_path, help="the other one")
     add_databases(parser)
     parser.add_argument("--messages", metavar="GLOB,...", action="append", default=[], help="only these messages")
     parser.add_argument(

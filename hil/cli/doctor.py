@@ -17,7 +17,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "doctor",
-        help="what this machine can do for the bench, with the command for what is missing",
         description="Look at buses, adapters, scheduling and software; print what is missing or unwise, each with the "
         "command that mends it. Nothing is changed.",
         epilog="The exit code is 0 whatever was found. --json prints {lines: [{topic, status, finding, fix}]}, status "

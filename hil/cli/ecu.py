@@ -8,7 +8,7 @@ from hil.cli.options import add_node_options, add_seed
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = subparsers.add_parser("ecu", help="run the controller alone on a bus, until Ctrl-C")
+    parser = subparsers.add_parser("ecu")
     add_node_options(parser)
     add_seed(parser)
     parser.set_defaults(run=run)

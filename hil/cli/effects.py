@@ -1,15 +1,17 @@
 """``brakebench effects``: what a real car has and the baseline has not."""
 
 import argparse
+import difflib
 import json
 from typing import Any
 
+from hil.cli.columns import listing, say, terminal_width
 from hil.cli.options import add_json
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = subparsers.add_parser("effects", help="list the effects that scenarios can switch on")
+    parser = subparsers.add_parser("effects")
     parser.add_argument("name", nargs="?", help="one effect, with all it declares")
     add_json(parser)
     parser.set_defaults(run=run)
@@ -22,9 +24,11 @@ def run(args: argparse.Namespace) -> int:
 
     effects = [described(effect) for effect in layout().effects]
     if args.name is not None:
+        near = difflib.get_close_matches(args.name, [effect["name"] for effect in effects])
         effects = [effect for effect in effects if effect["name"] == args.name]
         if not effects:
-            raise EffectError(f"no effect {args.name!r}; `brakebench effects` lists them")
+            hint = f"did you mean {', '.join(near)}?" if near else "`brakebench effects` lists them"
+            raise EffectError(f"no effect {args.name!r}; {hint}")
     if args.json:
         print(json.dumps({"effects": effects}, indent=2))
     elif args.name is not None:
@@ -35,6 +39,5 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _list(effects: list[dict[str, Any]]) -> None:
-    width = max(len(effect["name"]) for effect in effects)
-    for effect in effects:
-        print(f"{effect['row']:3d}  {effect['name']:{width}}  {effect['scope']:5}  {effect['title']}")
+    rows = [(f"{one['row']:3d}", one["name"], one["scope"], one["title"]) for one in effects]
+    say(listing(rows, terminal_width()))

@@ -5,8 +5,9 @@ import json
 import sys
 from pathlib import Path
 
-from hil.cli.options import add_json
+from hil.cli.options import add_json, out_folder
 from hil.diagnosis.data.log import UnusableError
+from hil.log.samples import log_path
 from hil.rt.clock import monotonic_ns
 
 
@@ -14,16 +15,15 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "explain",
-        help="measured logs against the simulation: what is wrong, why, and what an extension gains",
         description="Replays measured manoeuvres, shows what the simulation misses, names the cause with interval, "
         "probability and rivals, writes the extended model and measures its gain on held-out manoeuvres.",
     )
     parser.add_argument(
         "logs",
         nargs="+",
-        type=Path,
+        type=log_path,
         metavar="LOG",
-        help="CAN log, CSV, Parquet, MF4 or .mat table, or a folder of them",
+        help="CAN log, CSV, Parquet, MF4 or .mat table, or a folder of them; sample:weak_brake comes with brakebench",
     )
     parser.add_argument(
         "--vehicle", type=Path, metavar="SET.toml", help="the vehicle's parameters (default: the shipped car)"
@@ -39,7 +39,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     )  # fmt: skip
     parser.add_argument("--extend", type=Path, metavar="FILE", help="extension to start from")
     parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="write report.html, report.png, result.json, extension.toml"
+        "--out", type=out_folder, metavar="DIR", help="write report.html, report.png, result.json, extension.toml"
     )
     add_json(parser)
     parser.set_defaults(run=run)

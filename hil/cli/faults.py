@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.cli.columns import columns, say, terminal_width, wrapped
-from hil.cli.options import add_json, add_seed
+from hil.cli.options import add_json, add_seed, out_folder
 from hil.errors import BrakebenchError
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "faults",
-        help="every fault at many instants of a stop, beside the stop without it, against the budgets",
         description="Drives a stop from 72 km/h with every fault of the library on its usual targets at many instants, "
         "in virtual time, beside the same stop without the fault; then two faults at once, the rows that depend on "
         "the time-out at longer ones, and faults of real processes. Prints what was missed, and what physics forbids.",
@@ -36,7 +35,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "may be given again"
     )  # fmt: skip
     parser.add_argument("--no-processes", action="store_true", help="leave out the faults of real processes")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write report.html")
+    parser.add_argument("--out", type=out_folder, metavar="DIR", help="write report.html")
     add_seed(parser)
     add_json(parser)
     parser.set_defaults(run=run)

@@ -8,7 +8,7 @@ from hil.cli.columns import say
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = subparsers.add_parser("fmu", help="plant or controller as an FMU (FMI 3.0) for other simulators")
+    parser = subparsers.add_parser("fmu")
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True)
     export = actions.add_parser(
         "export",

@@ -9,7 +9,7 @@ from hil.cli.options import add_bus, add_force, add_realtime, add_transmit
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = subparsers.add_parser("gateway", help="translate between our bus and one with another car's database")
+    parser = subparsers.add_parser("gateway")
     parser.add_argument("map", type=Path, metavar="MAP.toml", help="database and signals, see docs/gateway.md")
     add_bus(parser)
     parser.add_argument("--to", required=True, metavar="BUS", help="the other car's bus, named as --bus")

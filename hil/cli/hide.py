@@ -3,10 +3,9 @@
 import argparse
 import json
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hil.cli.options import add_json
+from hil.cli.options import add_json, out_folder, seed
 from hil.errors import BrakebenchError
 
 if TYPE_CHECKING:
@@ -17,7 +16,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "hide",
-        help="write measured-like logs with something hidden in them",
         description="Drive a manoeuvre set with a car that is not the bench's own plant (other equations, integrator, "
         "sensors; numbers off by their tolerances), with something hidden in it. DIR gets logs, logs.toml and "
         "vehicle.toml; the answer goes to DIR.sealed/answer.json, which `brakebench explain` never opens.",
@@ -40,8 +38,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--manoeuvres", metavar="SET", default="full", help="full, stops, cold or decide (default: full)"
     )
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="true car, noise and bus (default: 1)")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the logs; must be empty or not exist")
+    parser.add_argument("--seed", type=seed, default=1, metavar="N", help="true car, noise and bus (default: 1)")
+    parser.add_argument("--out", type=out_folder, metavar="DIR", help="folder for the logs; must be empty or not exist")
     add_json(parser)
     parser.set_defaults(run=run)
 

@@ -9,7 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hil.cli.options import add_json
+from hil.cli.options import add_json, out_folder
 from hil.errors import BrakebenchError
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ _AXLES = ("front", "rear")
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = subparsers.add_parser("identify", help="identify a model from measured records")
+    parser = subparsers.add_parser("identify")
     what = parser.add_subparsers(title="what", metavar="WHAT", required=True)
     friction = what.add_parser(
         "friction",
@@ -39,7 +39,9 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     friction.add_argument(
         "--validate", type=Path, metavar="OTHER.csv", help="record to predict, e.g. at twice the frequency"
     )
-    friction.add_argument("--out", type=Path, metavar="DIR", help="write report, figures, result.json and pad.toml")
+    friction.add_argument(
+        "--out", type=out_folder, metavar="DIR", help="write report, figures, result.json and pad.toml"
+    )
     add_json(friction)
     friction.add_argument(
         "--heating", choices=("printed", "friction"),

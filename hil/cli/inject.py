@@ -6,7 +6,8 @@ import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from hil.cli.options import add_bus
+from hil.cli.columns import listing, say, terminal_width
+from hil.cli.options import add_bus, seed
 from hil.errors import BrakebenchError
 
 if TYPE_CHECKING:
@@ -18,12 +19,12 @@ _LISTEN_S = 1.0  # nodes tell of themselves on the bench bus a hundred times a s
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = subparsers.add_parser("inject", help="arm a fault on a running bench, or list the faults")
+    parser = subparsers.add_parser("inject")
     parser.add_argument("fault", nargs="?", metavar="NAME", help="the fault; left out: list all of them")
     parser.add_argument("--on", metavar="TARGET", help="MESSAGE, MESSAGE.SIGNAL, node, ALL, or wheels (fl,rr; front)")
     parser.add_argument("--for", dest="for_s", type=float, metavar="S", help="how long (default: for good)")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter of the fault, SI")
-    parser.add_argument("--seed", type=int, default=1, help="seed of what is random (default: 1)")
+    parser.add_argument("--seed", type=seed, default=1, help="seed of what is random (default: 1)")
     parser.add_argument("--clear", action="store_true", help="end the fault instead")
     add_bus(parser)
     parser.set_defaults(run=run)
@@ -34,8 +35,7 @@ def run(args: argparse.Namespace) -> int:
     from hil.faults.catalogue import FAULTS, fault_named
 
     if args.fault is None:
-        for one in FAULTS:
-            print(f"{one.name:24} {one.takes.value:24} {one.text}")
+        say(listing([(one.name, one.takes.value, one.text) for one in FAULTS], terminal_width()))
         return 0
     kind = fault_named(args.fault)
     values = dict(_pair(text) for text in args.set) | ({} if args.for_s is None else {"for_s": args.for_s})

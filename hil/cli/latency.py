@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from hil.cli.log_options import LOGS, add_databases
 from hil.cli.options import add_json
 from hil.errors import BrakebenchError
+from hil.log.samples import log_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,7 +24,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "latency",
-        help="timing on the wire: stimulus to response, and jitter of every cyclic message",
         description="Measure stimulus to response and the jitter of every cyclic message against its cycle time, on a "
         "live bus, to which nothing is sent, or in a log.",
         epilog="Age: from the newest frame of the stimulus to each frame of the response. Reaction: from the frame "
@@ -71,11 +71,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _read(log: str) -> "FrameTable":
-    from pathlib import Path
-
     from hil.log.read import read_log
 
-    return read_log(Path(log)).frames
+    return read_log(log_path(log)).frames
 
 
 def _listen(spec: str, for_s: float) -> "FrameTable":

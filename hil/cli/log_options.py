@@ -13,6 +13,7 @@ from hil.errors import BrakebenchError
 from hil.log.account import printable
 from hil.log.choice import Choice
 from hil.log.foreign.database_files import read_database
+from hil.log.samples import log_path
 from hil.log.several import UNDATED_NS, Logs
 from hil.log.signals.databases import Databases
 from hil.log.source import STDIN
@@ -84,6 +85,8 @@ def _local() -> tzinfo:
 def paths(words: list[str]) -> list[Path]:
     """Files of the arguments, each once; a pattern (``drive_*.blf``) stands for all files that match it.
 
+    ``sample:NAME`` is a log that comes with brakebench.
+
     Raises
     ------
     BrakebenchError
@@ -92,7 +95,7 @@ def paths(words: list[str]) -> list[Path]:
     found: list[Path] = []
     for word in words:
         if word == STDIN or Path(word).exists() or not glob.has_magic(word):
-            found.append(Path(word))
+            found.append(log_path(word))
             continue
         names = glob.glob(word, recursive=True)  # noqa: PTH207 (Path.glob takes no absolute pattern)
         matched = sorted(path for name in names if (path := Path(name)).is_file())

@@ -2,6 +2,8 @@
 
 import argparse
 import math
+import os
+from pathlib import Path
 
 
 def add_bus(parser: argparse.ArgumentParser) -> None:
@@ -64,7 +66,7 @@ def add_realtime(parser: argparse.ArgumentParser) -> None:
 
 def add_seed(parser: argparse.ArgumentParser) -> None:
     """``--seed``: of all noise."""
-    parser.add_argument("--seed", type=int, default=1, help="seed of all noise (default: 1)")
+    parser.add_argument("--seed", type=seed, default=1, help="seed of all noise (default: 1)")
 
 
 def add_node_options(parser: argparse.ArgumentParser) -> None:
@@ -92,3 +94,35 @@ def seconds(text: str, most_s: float = math.inf) -> float:
         such = f"0 to {most_s:.10g}" if most_s < math.inf else "0 or more"
         raise argparse.ArgumentTypeError(f"expected seconds, {such}, got {text!r}")
     return value
+
+
+def out_folder(text: str) -> Path:
+    """Read a folder to write into; it is made later, and refused here, before anything long is done.
+
+    Raises
+    ------
+    argparse.ArgumentTypeError : it cannot be made, or nothing can be written into it.
+    """
+    path = Path(text)
+    try:
+        place = next(one for one in (path, *path.parents) if one.exists())
+        why = "" if place.is_dir() else f"{place} is no folder"
+        if not why and not os.access(place, os.W_OK | os.X_OK):
+            why = f"{place} may not be written into"
+    except OSError as error:
+        why = error.strerror or str(error)
+    if why:
+        raise argparse.ArgumentTypeError(f"{text}: cannot be written: {why}; name another folder")
+    return path
+
+
+def seed(text: str) -> int:
+    """Read a seed, a whole number from 0.
+
+    Raises
+    ------
+    argparse.ArgumentTypeError : it is none.
+    """
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"expected a whole number, 0 or more, got {text!r}")
+    return int(text)

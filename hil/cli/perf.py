@@ -14,7 +14,7 @@ MEASUREMENTS = ("rt", "plant", "ecu", "codec", "loop", "decode", "explain", "liv
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = subparsers.add_parser("perf", help="measure beside a peer or a limit, as ratios of one run")
+    parser = subparsers.add_parser("perf")
     parser.add_argument("name", choices=MEASUREMENTS, help="what to measure")
     parser.add_argument("--beside", metavar="FOLDER", help="loop: compare with another checkout of the project instead")
     add_json(parser)

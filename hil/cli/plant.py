@@ -8,7 +8,7 @@ from hil.cli.options import add_node_options, add_seed
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = subparsers.add_parser("plant", help="run the vehicle alone on a bus, until Ctrl-C")
+    parser = subparsers.add_parser("plant")
     add_node_options(parser)
     add_seed(parser)
     parser.add_argument(

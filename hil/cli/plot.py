@@ -47,7 +47,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "plot",
-        help="signals of a log over time, as a picture or a page",
         description="Draw signals of a CAN log over one time axis; long logs are thinned, peaks stay.",
         epilog="Signals of one unit share a plot; signals whose values have names are drawn as steps with the names "
         "at the axis. Exit codes: 0 drawn, 1 drawn, but something of the log was cut off or rejected, 2 unusable.",

@@ -11,7 +11,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "prepare",
-        help="draft the channel map and the vehicle set that explain needs, from another car's logs",
         description="Chooses a signal for each channel by name, unit, range and data, with unit and sign, and says "
         "beside each guess what was measured, what the data cannot tell and what to check. Writes CHANNELS.toml and "
         "SET.toml; what only the car's sheet knows stays open, and explain refuses the set until it is filled in.",

@@ -28,7 +28,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "record",
-        help="append every frame on a bus to a candump file, or write what surrounds a condition",
         description="Append every frame on a bus to a candump file. With --trigger the last seconds are kept in "
         "memory, and each time the condition begins to hold they are written, with the next ones, to FILE-1.log, "
         "FILE-2.log, ...",

@@ -6,7 +6,6 @@ import math
 import re
 import sys
 from contextlib import ExitStack
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from hil.cli.log_options import add_databases
 from hil.cli.options import add_bus, add_json, add_transmit, seconds
 from hil.errors import INTERRUPTED_EXIT_CODE, Verdict
 from hil.log.frames import MAX_EXTENDED_ID
+from hil.log.samples import log_path
 
 if TYPE_CHECKING:
     from hil.log.signals.databases import Databases
@@ -29,7 +29,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "replay",
-        help="send a recorded log back on a bus",
         description="Send a recorded log back on a bus, each frame at its own time. The channels vehicle and bench of "
         "our own recordings go to the buses of these names, a foreign log's only channel goes to the vehicle bus. "
         "More: docs/logs.md.",
@@ -37,7 +36,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "the start; during the replay that sender's messages are no longer sent: exit code 5, incomplete, at the end). "
         "After a stall overdue frames are sent at once, but no more than 20 ms of the past of each cyclic message.",
     )
-    parser.add_argument("log", type=Path, metavar="LOG", help="candump, ASC, BLF, TRC, MF4, CSV or Parquet log")
+    parser.add_argument("log", type=log_path, metavar="LOG", help="candump, ASC, BLF, TRC, MF4, CSV or Parquet log")
     add_bus(parser)
     parser.add_argument(
         "--role",

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hil.cli.options import add_json
+from hil.cli.options import add_json, out_folder
 from hil.errors import BrakebenchError
 
 if TYPE_CHECKING:
@@ -19,14 +19,13 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "reproduce",
-        help="regenerate the paper's numbers and figures",
         description="Drive the paper's manoeuvres in virtual time with the paper's observer and with ours, under the "
         "nominal and nine other conditions, and print every number beside the paper's and its goal.",
         epilog="20 seeds are two hours of processor time; --keep lets it be stopped and gone on with. --json prints "
         "{rows: [{figure, claim, unit, paper, paper_method, median, p95, goal, statistic, met, conditions, seeds, "
         "degradation}]}.",
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write the report and the figures")
+    parser.add_argument("--out", type=out_folder, metavar="DIR", help="write the report and the figures")
     parser.add_argument("--seeds", type=int, default=20, metavar="N", help="seeds of the noise (default: 20)")
     parser.add_argument("--keep", type=Path, metavar="FILE", help="keep what is measured, go on from what is there")
     parser.add_argument(

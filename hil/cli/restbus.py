@@ -9,7 +9,7 @@ from hil.cli.options import add_bus, add_force, add_realtime, add_transmit
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = subparsers.add_parser("restbus", help="send the messages of a database's nodes, edited live")
+    parser = subparsers.add_parser("restbus")
     parser.add_argument("database", type=Path, metavar="FILE.dbc")
     parser.add_argument("--node", nargs="+", required=True, metavar="NAME", help="nodes whose messages are sent")
     parser.add_argument(

@@ -10,7 +10,7 @@ from hil.cli.options import add_bus, add_json, add_realtime, add_scenario, add_s
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = subparsers.add_parser("run", help="run a scenario: ECU and plant as two processes on one CAN bus")
+    parser = subparsers.add_parser("run")
     add_scenario(parser)
     add_bus(parser)
     parser.add_argument(

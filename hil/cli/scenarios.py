@@ -4,6 +4,7 @@ import argparse
 import json
 from typing import Any
 
+from hil.cli.columns import listing, say, terminal_width, wrapped
 from hil.cli.options import add_json
 
 
@@ -11,7 +12,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "scenarios",
-        help="list the scenarios that come with brakebench",
         description="List the scenarios that come with brakebench; each is a commented TOML file to copy.",
     )
     add_json(parser)
@@ -24,11 +24,9 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({"scenarios": rows}, indent=2))
         return 0
-    width = max(len(row["name"]) for row in rows)
-    for row in rows:
-        print(f"{row['name']:{width}}  {row['duration_s']:6.0f} s  {row['title']}")
-    print("\nDurations are the longest; most end when the car has stopped.")
-    print(f"Copy one to begin with: {rows[0]['file'].rpartition('/')[0]}")
+    lines = listing([(row["name"], f"{row['duration_s']:6.0f} s", row["title"]) for row in rows], terminal_width())
+    lines += ["", *wrapped("Durations are the longest; most end when the car has stopped.", terminal_width())]
+    say([*lines, f"Copy one to begin with: {rows[0]['file'].rpartition('/')[0]}"])
     return 0
 
 

@@ -2,18 +2,15 @@
 
 import argparse
 import json
-from pathlib import Path
 
-from hil.cli.options import add_json
+from hil.cli.options import add_json, out_folder
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = subparsers.add_parser(
-        "sensitivities", help="every effect's signature in every channel of a manoeuvre, against the noise"
-    )
+    parser = subparsers.add_parser("sensitivities")
     parser.add_argument("scenario", help="scenario by name or path, or a manoeuvre of `brakebench effects`")
-    parser.add_argument("--out", type=Path, help="folder for figure (PNG) and table (CSV)")
+    parser.add_argument("--out", type=out_folder, help="folder for figure (PNG) and table (CSV)")
     add_json(parser)
     parser.set_defaults(run=run)
 

@@ -10,7 +10,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "share",
-        help="open an adapter once and share it on a loopback",
         description="Open an adapter that only one process can open, and share it on a loopback for recorder, nodes "
         "and tools, until Ctrl-C. `brakebench run` does so by itself.",
     )

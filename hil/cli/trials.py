@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from hil.cli.options import add_json, add_seed
+from hil.cli.options import add_json, add_seed, out_folder
 from hil.validation.blind_trials import FAMILIES
 
 
@@ -15,7 +15,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "trials",
-        help="blind trials of explain: hide, explain, open the answer, score",
         description="Draws cases of a family from a car that shares no code with the plant, lets explain look at the "
         "logs alone, opens the sealed answer and scores it. Every finished case is appended to DIR/cases.jsonl; a "
         "second run goes on where the first one ended, and families may run side by side. DIR/table.json has scores "
@@ -53,7 +52,11 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="instead: measure how far apart (d') the reference car holds all effects into FILE",
     )
     parser.add_argument(
-        "--out", type=Path, default=Path("trials"), metavar="DIR", help="cases, table and figure (default: trials)"
+        "--out",
+        type=out_folder,
+        default=Path("trials"),
+        metavar="DIR",
+        help="cases, table and figure (default: trials)",
     )
     add_json(parser)
     parser.set_defaults(run=run)

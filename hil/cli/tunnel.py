@@ -10,7 +10,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "tunnel",
-        help="join a loopback with one on another machine",
         description="One end of a tunnel between two loopbacks, vehicle bus and bench bus, until Ctrl-C. There is no "
         "authentication and no encryption: listen on 127.0.0.1, and cross to another machine with ssh -L.",
     )

@@ -1,16 +1,15 @@
 """``brakebench verify plant``: the vehicle model held against what is not ours."""
 
 import argparse
-from pathlib import Path
 
-from hil.cli.options import add_json
+from hil.cli.options import add_json, out_folder
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = subparsers.add_parser("verify", help="hold the vehicle model against closed forms and others' code")
+    parser = subparsers.add_parser("verify")
     parser.add_argument("what", choices=("plant",), help="what to verify")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write report.html and a figure for each topic")
+    parser.add_argument("--out", type=out_folder, metavar="DIR", help="write report.html and a figure for each topic")
     add_json(parser)
     parser.set_defaults(run=run)
 

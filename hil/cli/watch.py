@@ -16,7 +16,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command."""
     parser = subparsers.add_parser(
         "watch",
-        help="show a running bus on a page of this machine, and command a bench from it",
         description="Listen to a running bus and serve a page on 127.0.0.1 that shows it live, until Ctrl-C: signals, "
         "the car, trouble codes, every message with its cycle and protection. Where a bench runs the page also has its "
         "controls and faults. Nothing is sent on the vehicle bus. `brakebench run --live` starts it by itself.",

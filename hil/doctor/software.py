@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from hil.doctor.line import Line, Status
+from hil.extras import pip_install
 
 SHOWN = ("numpy", "numba", "python-can", "cantools")
 
@@ -52,7 +53,7 @@ def mdf_line(present: bool) -> Line:
     if present:
         return Line("MF4 logs", Status.OK, "read by every command (asammdf for explain)")
     return Line(
-        "MF4 logs", Status.MISSING, "explain needs asammdf for them; every other command works", _pip("brakebench[mdf]")
+        "MF4 logs", Status.MISSING, "explain needs asammdf for them; every other command works", pip_install("mdf")
     )
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from hil.extras import pip_install
 from hil.fmu.model import FmuError
 from hil.rt.process import Piped
 
@@ -44,7 +45,7 @@ class ForeignFmu:
         if not path.is_file():
             raise FmuError(f"{path}: no such FMU")
         if find_spec("fmpy") is None:
-            raise FmuError(f"{path}: reading FMUs needs FMPy: pip install 'brakebench[fmu]'")
+            raise FmuError(f"{path}: reading FMUs needs FMPy: {pip_install('fmu')}")
         self._step_timeout_s = step_timeout_s
         self._folder = TemporaryDirectory(prefix="brakebench-fmu-")
         self._line, other = socket.socketpair()

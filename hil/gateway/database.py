@@ -61,7 +61,7 @@ def load(path: Path) -> UserDatabase:
         content = path.read_bytes()
         database = parse_database(content, str(path))
     except (OSError, DatabaseError) as error:
-        raise GatewayError(f"{path}: {error}" if isinstance(error, OSError) else str(error)) from error
+        raise GatewayError(f"{path}: {error.strerror}" if isinstance(error, OSError) else str(error)) from error
     classical = {m.name: m for m in database.messages.values() if m.length <= MOST_BYTES and not m.is_fd}
     return UserDatabase(
         path=path,

@@ -35,7 +35,7 @@ def read_toml(path: Path, tables: Collection[str]) -> dict[str, Any]:
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise GatewayError(f"{path}: cannot be read as TOML: {error}") from error
+        raise GatewayError(f"{path}: cannot be read as TOML: {getattr(error, 'strerror', None) or error}") from error
     only(content, tables, str(path))
     return content
 

@@ -1,5 +1,6 @@
 """A scenario: one TOML file, validated, as one value."""
 
+import difflib
 import hashlib
 import math
 import tomllib
@@ -167,9 +168,9 @@ def find_scenario(name: str) -> Path | Traversable:
         return path
     if name in scenario_names():
         return _library() / f"{name}.toml"
-    raise ScenarioError(
-        f"no scenario {name!r}; the library has {', '.join(scenario_names())}; a file of your own ends in .toml"
-    )
+    near = difflib.get_close_matches(name, scenario_names())
+    hint = f"did you mean {', '.join(near)}?" if near else f"the library has {', '.join(scenario_names())};"
+    raise ScenarioError(f"no scenario {name!r}; {hint} a file of your own ends in .toml")
 
 
 def _set(package: str, name: str) -> Path | Traversable:

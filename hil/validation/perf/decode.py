@@ -14,6 +14,7 @@ from dbc.contract import database_text
 from dbc.database import Database, parse_database
 from dbc.frame import BusName
 from hil.bench.virtual import simulate
+from hil.extras import pip_install
 from hil.log.builder import ROWS
 from hil.log.frames import FrameTable
 from hil.log.read import open_log
@@ -177,7 +178,7 @@ def _mf4(files: Files) -> list[Row]:
     try:
         import asammdf
     except ImportError:
-        print("asammdf is not installed (pip install 'brakebench[mdf]'): its row is left out", file=sys.stderr)
+        print(f"asammdf is not installed ({pip_install('mdf')}): its row is left out", file=sys.stderr)
     else:
         dbc = files.folder / "vehicle.dbc"
         dbc.write_text(database_text(BusName.VEHICLE), encoding="utf-8")

@@ -18,6 +18,7 @@ from typing import Any
 from hil.diagnosis.explain import explain
 from hil.diagnosis.result.answer import Answer
 from hil.errors import BrakebenchError
+from hil.extras import pip_install
 from hil.rt.clock import process_cpu_time_ns
 from hil.validation.perf.rivals import NONE, RIVALS, Guess
 from hil.validation.perf.row import Row
@@ -104,7 +105,7 @@ def _require_pysindy() -> None:
         importlib.import_module("pysindy.optimizers")
     except ImportError as error:
         raise BrakebenchError(
-            "perf explain: pysindy is not installed; install it with: pip install 'brakebench[perf]'"
+            f"perf explain: pysindy is not installed; install it with: {pip_install('perf')}"
         ) from error
 
 

@@ -85,5 +85,5 @@ def test_sizes_are_positive(value, capsys):
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
     first, _ = shipped_records()
-    with pytest.raises(BrakebenchError, match="cannot be written"):
+    with pytest.raises(SystemExit):
         run(first, "--heating", "printed", "--out", tmp_path / "file" / "dir")
