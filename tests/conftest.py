@@ -5,7 +5,7 @@ import os
 import pytest
 from hypothesis import HealthCheck, settings
 
-pytest_plugins = ["drawn", "shared"]
+pytest_plugins = ["drawn", "engine", "shared"]
 SLOW_LIMIT_S = 3600.0  # ends what hangs; a busy machine takes ten times as long as an idle one
 
 for name in ("COLUMNS", "LINES"):  # readline, which pytest imports, sets them for child processes, terminal or not

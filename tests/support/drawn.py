@@ -94,7 +94,7 @@ class Verdict:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Let a passing run be noted."""
-    parser.addoption("--write-passed", action="store_true", help="note that drawn cases or SocketCAN lab pass")
+    parser.addoption("--write-passed", action="store_true", help="note that what CI may leave out from now on passes")
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -5,6 +5,7 @@
 Only a run that passes writes its file, and only with ``--write-passed``:
 
     pytest -n 2 -m drawn --write-passed tests/hidden/test_drawn.py
+    pytest -n 2 --dist worksteal -m 'engine and not long' --write-passed
     .ci/vcan-lab python -m pytest tests/vcan tests/contract/test_bus.py tests/contract/test_clock.py --write-passed
     .ci/adapter-lab python -m pytest tests/adapter --write-passed
 """
@@ -19,6 +20,7 @@ from hil.validation.blind_trials.sources import digest
 ROOT = Path(__file__).parents[2]
 FILES = {
     "drawn": "tests/hidden/drawn.passed",
+    "engine": "tests/pinned/engine.passed",
     "lab": "tests/vcan/lab.passed",
     "adapter": "tests/adapter/adapter.passed",
 }
@@ -27,6 +29,14 @@ SOURCES = {
         "dbc", "plant", "hil/diagnosis", "hil/validation/reference_car", "hil/validation/blind_trials/run.py",
         "hil/validation/blind_trials/separable.py",
         "hil/validation/blind_trials/separability.toml", "tests/hidden/test_drawn.py", "tests/support/drawn.py",
+    ),
+    "engine": (
+        "dbc", "plant", "hil/diagnosis", "hil/log", "hil/report", "hil/validation/reference_car",
+        "hil/validation/strangers", "tests/hidden", "tests/pinned", "tests/unit/hil/diagnosis",
+        "tests/support/engine.py", "tests/support/motion_logs.py", "tests/support/one_log.py",
+        "tests/support/outsider.py", "tests/support/pinned.py", "tests/support/plant_logs.py",
+        "tests/support/pulses.py", "tests/support/shared.py", "tests/support/single_track.py",
+        *sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("tests/pinned/records/*.json")),
     ),
     "lab": (
         "dbc", "hil/bus", "hil/rt", "hil/bench/node_process.py", "hil/bench/real.py", "hil/bench/bench_run.py",
