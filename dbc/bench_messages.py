@@ -23,6 +23,11 @@ class PhysicalFault(IntEnum):
     MOTOR_STUCK_ON = 5
     EHB_CIRCUIT_FAILED = 6
     ACCUMULATOR_EMPTY = 7
+    PAD_FRICTION = 8
+
+
+PAD_FACTOR = (77, 4)
+"""Fault and index in FAULT_PARAMETER of what PAD_FRICTION makes of the pads' friction: a factor, left out 0.5."""
 
 
 class FaultAction(IntEnum):
@@ -63,7 +68,7 @@ class FaultCommand(NamedTuple):
 
 
 class FaultParameter(NamedTuple):
-    """One parameter of the fault that the next FAULT_SELECT of its number starts: mantissa times 10 to the exponent."""
+    """One parameter of the fault that the next command for it starts: mantissa times 10 to the exponent."""
 
     fault: int | None
     parameter: int | None

@@ -4,6 +4,29 @@ import re
 import shlex
 import sys
 from importlib.metadata import PackageNotFoundError, requires
+from importlib.util import find_spec
+
+EXTRA_OF = {
+    "SALib": "campaign",
+    "asammdf": "mdf",
+    "can_isotp": "diag",
+    "distributed": "campaign",
+    "fmpy": "fmu",
+    "isotp": "diag",
+    "matplotlib": "figures",
+    "pysindy": "perf",
+    "udsoncan": "diag",
+    "vehiclemodels": "verify",
+    "websockets": "live",
+}
+"""Modules that are no requirement of every command, and the extra that brings each."""
+
+
+def missing(module: str) -> str:
+    """Say that a module of an extra is not installed, and what installs it; empty where it is there."""
+    if find_spec(module) is not None:
+        return ""
+    return f"needs {module}, which is not installed; install it with: {pip_install(EXTRA_OF[module])}"
 
 
 def pip_install(extra: str) -> str:

@@ -11,7 +11,7 @@ from plant.compiled import equation
 from plant.friction import mu_rate, temperature_rate
 from plant.hydraulics import pad_force, pressure_jerk, sliding_torque, windup_held
 from plant.inject import J, inject_wheel
-from plant.vectors import C, P, U, X, Y
+from plant.vectors import C, P, S, U, X, Y
 
 Vector = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ def per_axle(i: int, p: Vector, name: int) -> float:
 
 
 @equation
-def brakes(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, wheels: int) -> None:
+def brakes(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, y: Vector, wheels: int) -> None:
     """Rates of pressure, wind-up, pad and disc, and ``y.friction_torque_nm``."""
     ambient = p[P.friction_brake_ambient_k]
     stiffness, windup_s = p[P.wheel_brake_windup_nm_rad], p[P.wheel_brake_windup_time_s]
@@ -50,7 +50,8 @@ def brakes(x: Vector, u: Vector, cut: Vector, p: Vector, y: Vector, wheels: int)
         )  # fmt: skip
         radius = per_axle(i, p, P.friction_brake_effective_radius_m)
         mu = x[X.pad_friction + i]
-        sliding = sliding_torque(max(inject_wheel(mu, y, J.friction_mu, i), 0.0), force, radius)
+        acting = inject_wheel(mu * switch[S.pad_friction + i], y, J.friction_mu, i)
+        sliding = sliding_torque(max(acting, 0.0), force, radius)
         limit = max(inject_wheel(sliding, y, J.brake_torque, i), 0.0) / stiffness
         held = windup_held(x[X.windup_rad + i], omega, windup_s, limit)
         sticks = abs(held) < limit

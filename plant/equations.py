@@ -156,7 +156,7 @@ def derivative(x: Vector, u: Vector, cut: Vector, switch: Vector, p: Vector, roa
     yaw, steer = x[X.yaw_rad], road_wheel_angle(u, p, y)
     cos_yaw, sin_yaw, cos_steer, sin_steer = cos(yaw), sin(yaw), cos(steer), sin(steer)
     over_the_road(x, p, road, y, cos_yaw, sin_yaw, cos_steer, sin_steer)
-    brakes(x, u, cut, p, y, wheels)
+    brakes(x, u, cut, switch, p, y, wheels)
     motors(x, u, cut, switch, p, y, wheels)
     contacts(x, u, cut, p, y, cos_grade, wheels)
     body(x, p, y, cos_grade, slope * cos_grade, cos_yaw, sin_yaw, cos_steer, sin_steer)

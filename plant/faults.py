@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 
-from dbc.bench_messages import FaultCommand, PhysicalFault
+from dbc.bench_messages import PAD_FACTOR, FaultCommand, FaultParameter, PhysicalFault
 from dbc.messages import EhbState
 from plant.layout import Vector
 from plant.vectors import STATE, S
 
 WEAK_SHARE = 0.5  # torque of a weak motor over what it is asked: a choice, half a machine's windings
+PAD_SHARE = 0.5  # friction of weak pads over that of pads that are well, where no command says it: a choice
+MOST_PAD_SHARE = 2.0
 _MOTOR = (PhysicalFault.MOTOR_DEAF, PhysicalFault.MOTOR_WEAK, PhysicalFault.MOTOR_STUCK_ON)
 _TORQUE, _PRESSURE = STATE.slice("motor_torque_nm"), STATE.slice("pressure_pa")
 _AXLES = (0b0011, 0b1100)
@@ -34,6 +36,13 @@ class PhysicalFaults:
         self._announced = False  # and not yet enforced
         self._wheels = dict.fromkeys(PhysicalFault, 0)
         self._stuck_nm = [0.0] * 4
+        self._pad_factor = PAD_SHARE
+
+    def note(self, parameter: FaultParameter) -> None:
+        """Take a number of the fault that the next command switches on; what is no factor of pads is passed over."""
+        fault, index, mantissa, exponent = parameter
+        if (fault, index) == PAD_FACTOR and mantissa is not None and exponent is not None:
+            self._pad_factor = min(max(float(f"{mantissa}e{exponent}"), 0.0), MOST_PAD_SHARE)
 
     def take(self, now_ns: int, command: FaultCommand, x: Vector) -> None:
         """Switch one fault on or off; a motor that sticks keeps the torque in ``x`` (``STATE``)."""
@@ -44,6 +53,11 @@ class PhysicalFaults:
             for i in range(4):
                 if wheels >> i & 1:
                     self._switch[S.motor_alive + i] = well
+        elif fault is PhysicalFault.PAD_FRICTION:
+            for i in range(4):
+                if wheels >> i & 1:
+                    self._switch[S.pad_friction + i] = self._pad_factor if command.active else 1.0
+            self._pad_factor = PAD_SHARE
         elif fault is PhysicalFault.BATTERY_REFUSES_CHARGE:
             if self._switch[S.battery_announces] != well:
                 self._switch[S.battery_announces] = well

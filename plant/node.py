@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dbc.bench_messages import FaultCommand, ManoeuvreState, StimulusDriver, StimulusRoad
+from dbc.bench_messages import FaultCommand, FaultParameter, ManoeuvreState, StimulusDriver, StimulusRoad
 from dbc.commands import CommandReader
 from dbc.compiled import writer
 from dbc.contract import Message
@@ -100,7 +100,7 @@ class PlantNode:
         self._receiver = Receiver((*DEMANDS, StimulusDriver, StimulusRoad))
         self._live_driver, self._live_road = (self._receiver.receptions[k] for k in (StimulusDriver, StimulusRoad))
         self._broken = PhysicalFaults(self._switch, parameters.battery.notice_s)
-        self._commands = CommandReader((FaultCommand,))
+        self._commands = CommandReader((FaultParameter, FaultCommand))
         self._demands = Demands(self._receiver, parameters.ehb)
         self._direct = manoeuvre.direct != DirectDemands()
         self._pedal = 0.0
@@ -162,7 +162,10 @@ class PlantNode:
 
     def _take_faults(self, now_ns: int, inbox: Sequence[Received]) -> None:
         for command in self._commands.read(inbox):
-            self._broken.take(now_ns, FaultCommand(*command), self._x)
+            if isinstance(command, FaultParameter):
+                self._broken.note(command)
+            elif isinstance(command, FaultCommand):
+                self._broken.take(now_ns, command, self._x)
 
     def _follow_manoeuvre(self, now_ns: int, elapsed_ns: int) -> None:
         manoeuvre = self._manoeuvre

@@ -40,13 +40,16 @@ from plant.compiled import exact_entry
 from plant.demands import DEMANDS
 from plant.layout import Layout, Vector
 from plant.sensors import SENSED, N
-from plant.vectors import OUTPUT, STATE, P, S, Y
+from plant.vectors import OUTPUT, STATE, P, S, X, Y
 
 DERIVED = Layout(
     "Derived",
-    {"current_a": 4, "motor_state": 4, "ehb_state": 2, "manoeuvre": 1, "demand_counter": 4, "lost": 1, "corrupt": 1},
-)
-"""What a node says beside what is measured: of it follows the first half, the plant's nodes set the second."""
+    {
+        "current_a": 4, "motor_state": 4, "pad_friction": 4,
+        "ehb_state": 2, "manoeuvre": 1, "demand_counter": 4, "lost": 1, "corrupt": 1,
+    },
+)  # fmt: skip
+"""What a node says beside what is measured: of it follows the first part, the plant's nodes set the rest."""
 D = DERIVED.at
 _FAILED, _OK, _DERATED = float(MotorState.FAILED), float(MotorState.OK), float(MotorState.DERATED)
 
@@ -89,7 +92,7 @@ TRUTH: dict[type[Message], list[int]] = {
     TruthMotion: _X("speed_mps") + _Y("acceleration_mps2") + _X("distance_m") + _D("manoeuvre"),
     TruthWheelTorque: _Y("wheel_torque_nm"),
     TruthFrictionTorque: _Y("friction_torque_nm"),
-    TruthPadFriction: _X("pad_friction"),
+    TruthPadFriction: _D("pad_friction"),
     TruthDiscTemperature: _X("disc_temperature_k"),
     TruthLongitudinalForce: _Y("longitudinal_force_n"),
     TruthWheelLoad: _Y("wheel_load_n"),
@@ -109,13 +112,14 @@ def gather(
     Parameters
     ----------
     x, y, switch, p, sensed : vectors ``STATE``, ``OUTPUT``, ``SWITCH``, ``PARAMETER``, ``SENSED``.
-    derived : vector ``DERIVED``, its first half written.
+    derived : vector ``DERIVED``, its first part written.
     sources : place of each value, as in `OF_NODES`.  values : written.
     """
     for i in range(4):
         derived[D.current_a + i] = sensed[N.motor_nm + i] / p[P.motor_torque_constant_nm_a]
         running = _OK if y[Y.motor_derating + i] >= 1.0 else _DERATED
         derived[D.motor_state + i] = _FAILED if switch[S.motor_alive + i] == 0.0 else running
+        derived[D.pad_friction + i] = x[X.pad_friction + i] * switch[S.pad_friction + i]
     measured = x.size + y.size
     for k in range(sources.size):
         place = sources[k]

@@ -65,7 +65,7 @@ INPUTS = {
 }
 CUTS = {"pressure": 4, "motor_torque": 4, "wheel_torque": 4, "force": 4, "motor_speed": 4}
 CUT_PARTS = len(CUTS)
-SWITCHES = {"motor_alive": 4, "battery_accepts": 1, "battery_announces": 1}
+SWITCHES = {"motor_alive": 4, "battery_accepts": 1, "battery_announces": 1, "pad_friction": 4}
 BASE_RATES = Layout("BaseRates", CONTINUOUS)
 RATES = Layout("Rates", CONTINUOUS | EXTRA_STATES)
 OUTPUTS = {

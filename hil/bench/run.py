@@ -29,6 +29,7 @@ from hil.log.export.tables import export
 from hil.log.frames import FrameTable, Recording
 from hil.report.figure import write_figure
 from hil.report.html import write_html
+from hil.report.pictures import can_draw, no_pictures
 from hil.report.report import Number, Report
 from hil.report.text import print_text
 from hil.rt.clock import wall_time_ns
@@ -77,6 +78,8 @@ class Outcome:
         for name in _FILES:
             if self.facts[name] is not None:
                 stream.write(f"{name:8} {self.facts[name]}\n")
+        if not can_draw():
+            stream.write(f"figure   {no_pictures()}\n")
         for line in self.facts["missing"]:
             stream.write(f"missing  {line}\n")
 

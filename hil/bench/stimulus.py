@@ -236,7 +236,7 @@ class StimulusNode:
         for one in self._waiting:
             if one.at_s == FROM_THE_FIRST_TICK:
                 due = True
-            elif self.time_s is None or (opens and type(one.messages[0]) is FaultCommand):
+            elif self.time_s is None or (opens and type(one.messages[-1]) is FaultCommand):
                 due = False
             else:
                 due = one.at_s <= (self.time_s if one.for_controller else self.next_s) + 1e-9
@@ -250,7 +250,7 @@ class StimulusNode:
 
 
 def _switched(event: FaultEvent) -> _Planned:
-    return _Planned(event.at_s, (FaultCommand(event.fault, int(event.active), event.wheels),))
+    return _Planned(event.at_s, event.messages)
 
 
 def _same_fault(one: _Planned, other: _Planned) -> bool:

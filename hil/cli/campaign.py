@@ -38,7 +38,8 @@ def run(args: argparse.Namespace) -> int:
     from hil.campaign.report import build_report
     from hil.campaign.store import Store
     from hil.cli.origin import with_origin
-    from hil.errors import INTERRUPTED_EXIT_CODE, Verdict
+    from hil.errors import INTERRUPTED_EXIT_CODE, BrakebenchError, Verdict
+    from hil.extras import missing
     from hil.report.html import write_html
     from hil.report.text import print_text
     from hil.rt.process import StopSignal
@@ -46,6 +47,8 @@ def run(args: argparse.Namespace) -> int:
     plan = load_plan(args.campaign)
     if args.repeat is not None:
         return _repeat(plan, args.repeat, args.out)
+    if plan.method == "saltelli" and (why := missing("SALib")):  # not at the end of thousands of runs
+        raise BrakebenchError(f"{args.campaign}: method saltelli {why}")
     stop = StopSignal()
     store = Store(args.out or Path("campaigns") / args.campaign.stem, plan)
     with store.alone():

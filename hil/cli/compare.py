@@ -26,6 +26,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 def run(args: argparse.Namespace) -> int:
     """Run twice and compare."""
     from hil.bench.compare import compare_scenario
+    from hil.report.pictures import can_draw, no_pictures
     from hil.report.text import print_text
 
     comparison = compare_scenario(
@@ -43,5 +44,8 @@ def run(args: argparse.Namespace) -> int:
         return comparison.exit_code
     print_text(replace(comparison.report, sections=()), sys.stdout, brief=True)  # the tables are on the page
     for name in ("figure", "page"):
-        print(f"{name:8} {comparison.facts[name]}")
+        if comparison.facts[name] is not None:
+            print(f"{name:8} {comparison.facts[name]}")
+    if not can_draw():
+        print(f"figure   {no_pictures()}")
     return comparison.exit_code

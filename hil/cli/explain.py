@@ -84,10 +84,12 @@ def run(args: argparse.Namespace) -> int:
         from hil.cli.origin import with_origin
         from hil.report.figure import write_figure
         from hil.report.html import write_html
+        from hil.report.pictures import no_pictures
 
         args.out.mkdir(parents=True, exist_ok=True)
         write_html(with_origin(report), args.out / "report.html")
-        write_figure(report, args.out / "report.png")
+        if not write_figure(report, args.out / "report.png"):
+            print(no_pictures(), file=sys.stderr)
         (args.out / "result.json").write_text(json.dumps(answer.json, indent=2), encoding="utf-8")
     if args.json:
         print(json.dumps(answer.json, indent=2, allow_nan=False))

@@ -123,14 +123,15 @@ def _write(args: argparse.Namespace, study: "Study", parameters: "FrictionBrakeP
     from hil.identify.summary import figures
     from hil.report.figure import write_figure
     from hil.report.html import write_html
+    from hil.report.pictures import no_pictures
     from hil.scenario.parameters import ParameterError, load_set
     from plant.parameters.brakes import OstermeyerParameters
 
     try:
         args.out.mkdir(parents=True, exist_ok=True)
         write_html(with_origin(report), args.out / "report.html")
-        for name, figure in figures(study).items():
-            write_figure(figure, args.out / name)
+        if not all(write_figure(figure, args.out / name) for name, figure in figures(study).items()):
+            print(no_pictures(), file=sys.stderr)
         (args.out / "result.json").write_text(json.dumps(as_json(study), indent=2, allow_nan=False), encoding="utf-8")
         table = pad_toml(study, _AXLES.index(args.axle), parameters)
         (args.out / "pad.toml").write_text(table, encoding="utf-8")

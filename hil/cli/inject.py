@@ -59,7 +59,6 @@ def _pair(text: str) -> tuple[str, float]:
 
 
 def _inject(injection: "Injection", bus: str, clear: bool) -> None:
-    from dbc.bench_messages import FaultCommand
     from dbc.exchange import Transmitter
     from dbc.frame import BusName
     from hil.bus.channel import bench_channel
@@ -75,7 +74,7 @@ def _inject(injection: "Injection", bus: str, clear: bool) -> None:
     if injection.kind.side is Side.PLANT:
         events = events_of(injection)
         chosen = [replace(events[0], at_s=0.0, active=False)] if clear else events
-        planned += [(e.at_s, [FaultCommand(e.fault, int(e.active), e.wheels)]) for e in chosen]
+        planned += [(e.at_s, list(e.messages)) for e in chosen]
     else:
         planned.append((0.0, stop_messages(injection) if clear else start_messages(injection)))
     transmitter, clock = Transmitter(), WallClock()

@@ -17,6 +17,7 @@ if sys.version_info < (3, 11):  # noqa: UP036  a clone is started without pip, w
     sys.exit(f"brakebench needs Python 3.11 or newer; this is {sys.version.split()[0]} ({sys.executable})")
 
 from hil.errors import INTERRUPTED_EXIT_CODE, BrakebenchError
+from hil.extras import EXTRA_OF, missing
 
 COMMANDS = {
     "run": "run a scenario: ECU and plant as two processes on one CAN bus",
@@ -118,6 +119,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 0
         except OSError as error:
             return INTERRUPTED_EXIT_CODE if came else _complain(_told(error), BrakebenchError.exit_code)
+        except ModuleNotFoundError as error:
+            if came or (error.name or "").partition(".")[0] not in EXTRA_OF:
+                raise
+            return _complain(f"{words[0]} {missing((error.name or '').partition('.')[0])}", BrakebenchError.exit_code)
         except Exception:
             if came:  # a library may turn the interrupt into an error of its own
                 return INTERRUPTED_EXIT_CODE

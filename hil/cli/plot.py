@@ -34,6 +34,7 @@ from hil.log.wall_clock import wall_clock_of
 from hil.report.courses import Course, Courses
 from hil.report.courses_page import courses_page
 from hil.report.courses_picture import write_picture
+from hil.report.pictures import can_draw, no_pictures
 from hil.report.thin import thinned
 
 SUFFIXES = (".html", ".png", ".svg", ".pdf")
@@ -69,6 +70,8 @@ def run(args: argparse.Namespace) -> int:
     if suffix not in SUFFIXES:
         got = f"the suffix {args.out.suffix!r}" if suffix else "no suffix"
         raise BrakebenchError(f"{args.out}: plots are written as {', '.join(SUFFIXES)}; got {got}")
+    if suffix != ".html" and not can_draw():
+        raise BrakebenchError(f"{args.out}: {no_pictures()}; .html needs nothing")
     check_folder(args.out)
     databases_, files = databases(args.dbc)
     begin, end = (None if text is None else Moment.parse(text, args.timezone) for text in (args.begin, args.end))

@@ -71,6 +71,7 @@ def _write(out: Path, rows: "list[Row]") -> None:
     from hil.cli.origin import with_origin
     from hil.report.figure import write_figure
     from hil.report.html import write_html
+    from hil.report.pictures import no_pictures
     from hil.validation.reproduce.figures import figures
     from hil.validation.reproduce.summary import build_report
 
@@ -78,8 +79,8 @@ def _write(out: Path, rows: "list[Row]") -> None:
         out.mkdir(parents=True, exist_ok=True)
         drawn = figures()
         write_html(with_origin(build_report(rows, drawn)), out / "report.html")
-        for name, figure in drawn.items():
-            write_figure(figure, out / name)
+        if not all(write_figure(figure, out / name) for name, figure in drawn.items()):
+            print(no_pictures(), file=sys.stderr)
         (out / "result.json").write_text(
             json.dumps({"rows": [asdict(row) for row in rows]}, indent=2, allow_nan=False), encoding="utf-8"
         )

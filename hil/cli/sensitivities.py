@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import sys
 
 from hil.cli.options import add_json, out_folder
 
@@ -31,10 +32,15 @@ def run(args: argparse.Namespace) -> int:
         name, title, plan = scenario.name, scenario.title, recorded(scenario)
     found = signatures(plan)
     if args.out is not None:
-        from hil.validation.doc_pages.sensitivities_figure import draw
+        from hil.report.pictures import can_draw, no_pictures
 
         args.out.mkdir(parents=True, exist_ok=True)
-        draw(title, found, args.out / f"sensitivities_{name}.png")
+        if can_draw():
+            from hil.validation.doc_pages.sensitivities_figure import draw
+
+            draw(title, found, args.out / f"sensitivities_{name}.png")
+        else:
+            print(no_pictures(), file=sys.stderr)
         rows = [",".join(["effect", "member", "total_sigma", *NAMES])]
         rows += [",".join([s.effect.name, s.member, f"{s.total:.6g}", *[f"{v:.6g}" for v in s.sizes]]) for s in found]
         (args.out / f"sensitivities_{name}.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")

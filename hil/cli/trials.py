@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the trials and print the table."""
     from hil.cli.origin import with_origin
     from hil.report.html import write_html
-    from hil.validation.blind_trials.confusion import draw
+    from hil.report.pictures import can_draw, no_pictures
     from hil.validation.blind_trials.page import build_report
     from hil.validation.blind_trials.run import run_family
     from hil.validation.blind_trials.score import table_of
@@ -89,7 +89,12 @@ def run(args: argparse.Namespace) -> int:
         scored[family] = table_of(family, records)
         singles |= {(r["index"], r["size"]): r for r in records if r["family"] == "single"}
         _keep(args.out / "table.json", args.seed, scored)
-    draw(list(singles.values()), args.out / "confusion.png")
+    if can_draw():
+        from hil.validation.blind_trials.confusion import draw
+
+        draw(list(singles.values()), args.out / "confusion.png")
+    else:
+        print(no_pictures(), file=sys.stderr)
     table = json.loads((args.out / "table.json").read_text(encoding="utf-8"))
     write_html(with_origin(build_report(args.seed, table["families"])), args.out / "report.html")
     if args.json:

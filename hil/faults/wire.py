@@ -1,7 +1,6 @@
 """Armed faults on the bench bus: FAULT_PARAMETER and FAULT_SELECT, and what a process reads from them."""
 
 from collections.abc import Iterable, Sequence
-from decimal import Decimal
 from typing import NamedTuple
 
 from dbc.bench_messages import FaultAction, FaultParameter, FaultSelect
@@ -10,10 +9,10 @@ from dbc.contract import Message, spec_of
 from dbc.frame import Received
 from hil.faults.catalogue import BY_NUMBER
 from hil.faults.fault import FaultError, Injection
+from hil.faults.parameters import parameters
 from hil.faults.targets import WHOLE_MESSAGE, target_coded
 
 SELECT_ID = spec_of(FaultSelect).can_id
-_DIGITS = 8
 STOP_ALL = FaultSelect(0, FaultAction.STOP, 0, WHOLE_MESSAGE, 0)
 
 
@@ -26,29 +25,15 @@ class Command(NamedTuple):
 
 def start_messages(injection: Injection) -> list[Message]:
     """The messages that start an armed fault; it begins ``lead_s`` before it acts and lasts that much longer."""
-    kind = injection.kind
-    out: list[Message] = []
-    for index, parameter in enumerate(kind.all_parameters):
-        value = injection.values.get(parameter.name)
-        if value is not None:
-            out.append(FaultParameter(kind.number, index, *_decimal(value)))
-    target = injection.target
-    return [*out, FaultSelect(kind.number, FaultAction.START, target.code, target.signal, injection.seed or 0)]
+    number, target = injection.kind.number, injection.target
+    start = FaultSelect(number, FaultAction.START, target.code, target.signal, injection.seed or 0)
+    return [*parameters(injection), start]
 
 
 def stop_messages(injection: Injection) -> list[Message]:
     """The message that stops an armed fault."""
     number, code, signal = injection.key
     return [FaultSelect(number, FaultAction.STOP, code, signal, 0)]
-
-
-def _decimal(value: float) -> tuple[int, int]:
-    """Mantissa and exponent of a number of eight significant digits."""
-    digits = Decimal(f"{value:.{_DIGITS - 1}e}").normalize()
-    sign, numbers, exponent = digits.as_tuple()
-    assert isinstance(exponent, int)
-    mantissa = int("".join(map(str, numbers)))
-    return (-mantissa if sign else mantissa), exponent
 
 
 class Commands:

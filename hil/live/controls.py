@@ -1,7 +1,7 @@
 """What a page may do: stimulate driver, road and blending, and arm and end faults, all of it over the bench bus."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from dbc.bench_messages import FaultCommand, FaultParameter, FaultSelect, StimulusDriver, StimulusEcu, StimulusRoad
@@ -157,8 +157,7 @@ class Controls:
         injection = kind.on(on, at_s=0.0, seed=1)
         key = f"{kind.name} on {injection.target}"
         if kind.side is Side.PLANT:
-            event = events_of(injection)[0]
-            self._once.append(FaultCommand(event.fault, int(not ends), event.wheels))
+            self._once += replace(events_of(injection)[0], active=not ends).messages
         else:
             self._once += stop_messages(injection) if ends else start_messages(injection)
         if ends:

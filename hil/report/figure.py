@@ -13,6 +13,7 @@ import numpy as np
 
 from hil.report.figure_head import EDGE_IN, SOFT, WIDTH_IN, head_height, write, write_head
 from hil.report.palette import INK, SEVERITY_COLOURS, Stroke, strokes
+from hil.report.pictures import can_draw
 from hil.report.report import Chart, Curve, Event, Floats, Lane, Panel, Report, Section, Span
 from hil.report.units import Unit, shown, symbol
 from hil.report.words import clean
@@ -29,12 +30,15 @@ _DOT = 5.0  # points: marker of a named row
 _LETTERS = 74  # of 7 points that the narrowest timeline holds
 
 
-def write_figure(report: Report, path: Path, dpi: int = 130) -> None:
-    """Draw the report and write it in the format of ``path``'s suffix."""
+def write_figure(report: Report, path: Path, dpi: int = 130) -> bool:
+    """Draw the report and write it in the format of ``path``'s suffix; False without matplotlib, and no file."""
+    if not can_draw():
+        return False
     with warnings.catch_warnings():
         # a sign that the font lacks is drawn as a box, which is what a reader should see of it
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
         draw(report).savefig(path, dpi=dpi, facecolor="white", metadata={"Title": clean(report.title)})
+    return True
 
 
 class _Cell:

@@ -69,6 +69,11 @@ def motor(wheel):
     return f"plots[3].traces.find((trace) => trace.name === '{wheel.lower()}').course.last"
 
 
+def pads(kind, wheel):
+    """Pad friction of a wheel, true or estimated, as the page draws it."""
+    return f"plots[5].traces.find((trace) => trace.name === '{kind} {wheel}').course.last"
+
+
 def test_values_move_and_a_fault_from_the_page_is_seen_found_and_on_record(live, tmp_path):
     process, out, url = live
     assert (out / "live.txt").stat().st_mode & 0o077 == 0  # the token is for nobody else
@@ -106,10 +111,18 @@ def test_values_move_and_a_fault_from_the_page_is_seen_found_and_on_record(live,
         page.wait("[...document.querySelectorAll('tr.active')].some((r) => r.textContent.includes('motor_rl_failed'))")
         page.wait("byId('mode').textContent === 'DEGRADED'")
 
-        page.run("byId('set-pedal').value = 0.5; byId('set-pedal').oninput()")
-        page.wait("Math.abs(store.value('BRAKE_PEDAL.PEDAL_TRAVEL_1') - 50) < 2")
+        page.run("byId('set-pedal').value = 0.35; byId('set-pedal').oninput()")
+        page.wait("Math.abs(store.value('BRAKE_PEDAL.PEDAL_TRAVEL_1') - 35) < 2")
         page.run("byId('set-blending').value = 0; byId('set-blending').oninput()")  # the run sends it, too
         page.wait("store.value('BRAKE_STATUS.BLENDING_FACTOR') === 0")
+
+        # pads of one wheel: true at once, then as the controller finds it and takes more pressure for that wheel
+        page.wait(f"Math.abs({pads('true', 'fr')} / {pads('true', 'fl')} - 1) < 0.05")
+        page.run("byId('fault-pad_friction').nextElementSibling.value = 'fr'")
+        page.run("byId('fault-pad_friction').click()")
+        page.wait(f"Math.abs({pads('true', 'fr')} / {pads('true', 'fl')} - 0.5) < 0.05")
+        page.wait(f"{pads('estimate', 'fr')} / {pads('estimate', 'fl')} < 0.75")
+        page.wait("store.value('EHB_PRESSURE_FRONT.PRESSURE_FR') > 1.3 * store.value('EHB_PRESSURE_FRONT.PRESSURE_FL')")
         page.run("send({ do: 'fault', name: 'no_such', on: 'fl' })")
         page.wait("document.querySelector('#said p.wrong')?.textContent.includes('no_such')")
         assert page.complaints == []
@@ -128,7 +141,15 @@ def test_values_move_and_a_fault_from_the_page_is_seen_found_and_on_record(live,
         torque_nm = 1.75 * np.interp(chosen, current_s, current_a)
         assert len(chosen) > 10
         assert np.median(torque_nm / np.interp(chosen, t_s, asked_nm)) == pytest.approx(share, abs=0.07)
-    assert signals.get("STIMULUS_DRIVER.PEDAL_TRAVEL")[1][-1] == pytest.approx(0.5, abs=0.01)
+    assert signals.get("STIMULUS_DRIVER.PEDAL_TRAVEL")[1][-1] == pytest.approx(0.35, abs=0.01)
+    halved_s = at_s[np.flatnonzero(fault == 8)[0]]
+    t_s, fr = signals.get("TRUTH_PAD_FRICTION.PAD_FRICTION_FR")
+    ratio = fr / signals.get("TRUTH_PAD_FRICTION.PAD_FRICTION_FL")[1]
+    assert ratio[t_s < halved_s] == pytest.approx(1.0, abs=0.05)
+    assert ratio[t_s > halved_s + 0.02] == pytest.approx(0.5, abs=0.05)
+    assert signals.get("TRUTH_PAD_FRICTION.PAD_FRICTION_RR")[1].min() > 0.3
+    t_s, estimated = signals.get("BRAKE_ESTIMATE_FRONT.PAD_FRICTION_FR")
+    assert estimated[-1] < 0.75 * np.interp(halved_s, t_s, estimated)
 
 
 def test_a_stopped_or_closed_browser_disturbs_nobody(live, tmp_path):

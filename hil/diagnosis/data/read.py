@@ -17,6 +17,7 @@ from hil.diagnosis.data.hints import expected_instead
 from hil.diagnosis.data.log import CHANNELS, Floats, Log, Origin, UnusableError, make_log
 from hil.diagnosis.data.table_text import read_text_table
 from hil.diagnosis.data.time_column import NAMES, times_s
+from hil.extras import missing
 from hil.log import DecodedLog, decode_log, log_format, read_log
 
 _GRID_S = 0.01
@@ -274,7 +275,7 @@ def _mdf(path: Path) -> list[tuple[str, Column]] | None:
     try:
         import asammdf
     except ImportError as error:
-        raise UnusableError(f"{path}: MF4 needs asammdf; install it with: pip install 'brakebench[mdf]'") from error
+        raise UnusableError(f"{path}: explain {missing('asammdf')}") from error
     try:
         with asammdf.MDF(path) as mdf:
             if any("CAN_DataFrame" in {c.name for c in group.channels} for group in mdf.groups):

@@ -47,6 +47,7 @@ ORIGINS = {
 
 STANDS = "the car stands within 0.3 s"
 GONE = "the brake's own pressure is gone: nobody else can give it"
+WORN = "the pads give a part of what their pressure stands for: known only from how the wheels slow down"
 LATE_ACTUATOR = f"the actuator itself shows nothing before {_TOLD_MS:g} ms (its own time-out and a cycle)"
 NO_FASTER = "a brake that is asked for exactly what is lost is no faster (6 Hz, 20 ms dead time)"
 JOLT = "a jolt of the road moves the sensor alike: only what lasts is a fault (acceleration_s of evidence)"
@@ -126,6 +127,8 @@ def _stale(m: Measured, fault: Injection) -> list[Miss]:
 
 def _released(m: Measured, faults: Sequence[Injection], ecu: EcuParameters) -> str:
     """Why braking is lost whatever the controller does; empty where it is not."""
+    if any(fault.kind.name == "pad_friction" for fault in faults):
+        return WORN
     if any(fault.expected.braking and fault.kind.family == "physical" for fault in faults):
         return GONE
     if m.stale_in_all and any(fault.kind.name == "replayed" for fault in faults):

@@ -34,6 +34,7 @@ IN_TURN: dict[str, tuple[dict[str, float], ...]] = {
     "counter_value": ({"value": 15.0}, {"value": 0.0}, {"value": 7.0}),
     "counter_offset": tuple({"offset": float(k)} for k in range(1, 15)),
     "counter_jump": tuple({"step": float(k)} for k in range(2, 15)),
+    "pad_friction": ({"factor": 0.5}, {"factor": 0.25}, {"factor": 1.5}),
     "length_wrong": tuple({"length": float(k)} for k in range(8)),
     "bus_off": ({"for_s": 0.3}, {"for_s": 0.05}, {}),
     "unplugged": ({"for_s": 0.3}, {"for_s": 0.05}, {}),

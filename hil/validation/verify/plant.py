@@ -8,6 +8,8 @@ from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
+from hil.errors import BrakebenchError
+from hil.extras import missing
 from hil.report.report import Report, Verdict
 from hil.validation.verify import balances, closed_forms, handling, limits, pads, standstill, steps, tyre
 from hil.validation.verify.topic import Topic
@@ -52,6 +54,8 @@ def main(args: argparse.Namespace) -> int:
     -------
     0 when every number is within its limit, 1 when one is not.
     """
+    if why := missing("vehiclemodels"):
+        raise BrakebenchError(f"verify plant {why}")
     topics = {}
     for name, make in TOPICS.items():
         print(f"verifying: {name}", file=sys.stderr)
@@ -78,8 +82,9 @@ def main(args: argparse.Namespace) -> int:
 def _write(report: Report, topics: dict[str, Topic], out: Path) -> None:
     from hil.report.figure import write_figure
     from hil.report.html import write_html
+    from hil.report.pictures import no_pictures
 
     out.mkdir(parents=True, exist_ok=True)
     write_html(report, out / "report.html")
-    for name, topic in topics.items():
-        write_figure(single(topic), out / f"{name}.png")
+    if not all(write_figure(single(topic), out / f"{name}.png") for name, topic in topics.items()):
+        print(no_pictures(), file=sys.stderr)

@@ -7,6 +7,7 @@ import pytest
 
 from dbc.bench_messages import (
     FaultCommand,
+    FaultParameter,
     ManoeuvreState,
     PhysicalFault,
     PlantReception,
@@ -15,6 +16,7 @@ from dbc.bench_messages import (
     TruthFrictionTorque,
     TruthLongitudinalForce,
     TruthMotion,
+    TruthPadFriction,
     TruthWheelTorque,
 )
 from dbc.contract import contract
@@ -54,6 +56,7 @@ READ = (
     TruthFrictionTorque,
     TruthLongitudinalForce,
     PlantReception,
+    TruthPadFriction,
 )
 STOP = Manoeuvre(20.0, 20.0, pedal=((0.0, 0.0), (0.2, 0.6)))
 
@@ -180,6 +183,24 @@ def test_dead_motor(make):
     rig.extra = [FaultCommand(PhysicalFault.MOTOR_DEAD, 0, 0b0001)]
     rig.for_seconds(0.15)
     assert rig[MotorStatusFront].current_fl_a < -100.0
+
+
+def test_pads_have_the_share_of_their_friction_that_is_asked_for_or_half(make):
+    rig = make(pressure_pa=20e5)
+    rig.for_seconds(1.0)
+    well, beside = rig[TruthPadFriction].pad_friction_fl, rig[TruthPadFriction].pad_friction_fr
+    torque_nm = rig[TruthFrictionTorque].friction_torque_fl_nm
+    for numbers, share in (([], 0.5), ([FaultParameter(77, 4, 25, -2)], 0.25), ([], 0.5)):
+        rig.extra = [*numbers, FaultCommand(PhysicalFault.PAD_FRICTION, 1, 0b0001)]
+        rig.for_seconds(0.01)
+        rig.extra = []
+        rig.for_seconds(0.05)
+        assert rig[TruthPadFriction].pad_friction_fl == pytest.approx(share * well, rel=0.02)
+        assert rig[TruthPadFriction].pad_friction_fr == pytest.approx(beside, rel=0.02)
+        assert rig[TruthFrictionTorque].friction_torque_fl_nm == pytest.approx(share * torque_nm, rel=0.03)
+    rig.extra = [FaultCommand(PhysicalFault.PAD_FRICTION, 0, 0b0001)]
+    rig.for_seconds(0.05)
+    assert rig[TruthFrictionTorque].friction_torque_fl_nm == pytest.approx(torque_nm, rel=0.03)
 
 
 def test_a_battery_announces_before_it_refuses(make):

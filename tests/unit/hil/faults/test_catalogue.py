@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dbc.bench_messages import FaultSelect
+from dbc.bench_messages import PAD_FACTOR, FaultSelect
 from dbc.contract import database_text
 from dbc.exchange import Transmitter
 from dbc.frame import BusName
@@ -16,6 +16,7 @@ from hil.faults.fault import Side
 from hil.faults.targets import NodeCode, target_names
 from hil.faults.wire import Commands, start_messages, stop_messages
 from hil.validation.doc_pages.faults_page import page
+from plant.faults import MOST_PAD_SHARE, PAD_SHARE
 
 PAGE = Path(__file__).parents[4] / "docs" / "faults.md"
 ON_THE_BUS = [(kind, target) for kind in FAULTS if kind.side not in (Side.PLANT, Side.HOST) for target in kind.usual]
@@ -26,6 +27,13 @@ def test_numbers_and_names_are_one_fault_each():
     assert all(0 < kind.number < 256 and len(kind.all_parameters) <= 16 for kind in FAULTS)
     assert names() == tuple(kind.name for kind in FAULTS)
     assert sum(len(names(family)) for family in FAMILIES) == len(FAULTS)
+
+
+def test_the_plant_takes_the_factor_of_pads_where_the_catalogue_has_it():
+    kind = fault_named("pad_friction")
+    assert (kind.number, [p.name for p in kind.all_parameters].index("factor")) == PAD_FACTOR
+    (factor,) = kind.parameters
+    assert (factor.default, factor.high) == (PAD_SHARE, MOST_PAD_SHARE)
 
 
 def test_every_row_of_the_table_has_a_fault():

@@ -2,6 +2,7 @@
 
 import pytest
 
+from dbc.bench_messages import TruthPadFriction
 from dbc.contract import spec_of
 from dbc.frame import BusName
 from dbc.messages import BrakePedal, MotorState, MotorStatusFront
@@ -131,6 +132,23 @@ def test_a_fault_lasts_as_long_as_its_block_and_a_cleared_one_never_comes(sessio
     session.clear("motor_dead", wheel="fl", after=0.1)
     session.run(0.5)
     assert session.latest(MotorStatusFront).fault_fl is MotorState.OK
+
+
+def test_pads_of_one_wheel_are_halved_or_as_asked_and_well_again_at_the_end(session):
+    session.drive("20 m/s")
+    session.pedal(0.5)
+    session.run(1.0)
+    well, _, rear, _ = session.latest(TruthPadFriction)
+    with session.inject("pad_friction", wheel="fl"):
+        session.run(0.1)
+        now = session.latest(TruthPadFriction)
+        assert (now[0], now[2]) == (pytest.approx(0.5 * well, rel=0.02), pytest.approx(rear, rel=0.02))
+    session.inject("pad_friction", wheel="fl,rl", factor=0.8, for_s=0.1)
+    session.run(0.08)
+    now = session.latest(TruthPadFriction)
+    assert (now[0], now[2]) == (pytest.approx(0.8 * well, rel=0.02), pytest.approx(0.8 * rear, rel=0.02))
+    session.run(0.1)
+    assert session.latest(TruthPadFriction)[0] == pytest.approx(well, rel=0.02)
 
 
 def test_an_armed_fault_may_be_handed_over(session):
