@@ -100,6 +100,7 @@ def run_scenario(
     transmit: bool = False,
     plant: "OpenPlant | None" = None,
     live: bool = False,
+    terminal: bool = False,
     mcap: bool = False,
 ) -> Outcome:
     """Run one scenario in real or in virtual time and measure it.
@@ -109,6 +110,7 @@ def run_scenario(
     name : of the library, a path, or a scenario that was read already (in virtual time alone: nodes read a file).
     plant : in virtual time, somebody else's FMU in the place of our car.
     live : in real time, serve a page that shows the run and commands it.
+    terminal : in real time, draw the run on standard error.
     mcap : write the signals as MCAP beside the recording, too.
 
     Raises
@@ -129,7 +131,9 @@ def run_scenario(
                 node = None if plant is None else plant.node(scenario)
                 bench_run = VirtualBench(scenario, folder, seed, say, stop, node, line=line)
             else:
-                bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without, transmit, live)
+                bench_run = RealBench(
+                    scenario, bus, folder, seed, realtime, say, stop, without, transmit, live, terminal
+                )
             with bench_run:
                 say(f"bus {bench_run.spec}" + (f" ({bench_run.note})" if bench_run.note else ""))
                 bench_run.run()
