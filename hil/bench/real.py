@@ -31,6 +31,31 @@ SETTLE_NS = 500_000_000  # how long a bench keeps recording after a process died
 NODES = ("plant", "ecu")
 
 
+class HeldWords:
+    """Says lines, or keeps them while something else has the terminal."""
+
+    def __init__(self, say: Say) -> None:
+        self._say = say
+        self._kept: list[str] | None = None
+
+    def __call__(self, line: str) -> None:
+        """Say a line, now or later."""
+        if self._kept is None:
+            self._say(line)
+        else:
+            self._kept.append(line)
+
+    def hold(self) -> None:
+        """Keep lines from now on."""
+        self._kept = []
+
+    def go_on(self) -> None:
+        """Say what was kept, and lines as they come again."""
+        kept, self._kept = self._kept, None
+        for line in kept or ():
+            self._say(line)
+
+
 class RealBench(BenchRun):
     """Starts, watches and stops recorder, plant and ECU for one scenario.
 
@@ -42,6 +67,7 @@ class RealBench(BenchRun):
     without : nodes that somebody else puts on the bus: ``plant``, ``ecu``.
     transmit : whether a bus with hardware may be sent to; it is refused else.
     live : whether a page shows the run and commands it (`hil.live`).
+    terminal : whether it is shown on standard error; what is to be said meanwhile follows when it has ended.
 
     Attributes
     ----------
@@ -64,11 +90,13 @@ class RealBench(BenchRun):
         without: Sequence[str] = (),
         transmit: bool = False,
         live: bool = False,
+        terminal: bool = False,
     ) -> None:
+        self._held = HeldWords(say)
         check_transmit(bus, transmit, "a run sends")
         with contextlib.ExitStack() as stack:
             claim = stack.enter_context(claim_channel(bus))
-            super().__init__(scenario, out, seed, say, stop)
+            super().__init__(scenario, out, seed, self._held, stop)
             self._stack = stack.pop_all()
         self.spec, self.note = claim.spec, claim.note
         self._joined = self.spec  # what recorder and nodes join
@@ -76,6 +104,7 @@ class RealBench(BenchRun):
         self.state = BenchState.CLAIMED
         self._viewer: list[Child] = []  # none, or the one that serves the page: whatever becomes of it, the run goes on
         self._live = live
+        self._terminal = terminal
         self._realtime = realtime
         self._node_options = ["--transmit", *(["--realtime"] if realtime else [])]
         self._without = frozenset(without)
@@ -122,6 +151,8 @@ class RealBench(BenchRun):
             self._waiting.append((round(order[name] * 1e9), self._children[-1]))
         if not self._await_ready(self._children[1:]) or (self._live and not self._open_page()):
             return
+        if self._terminal and not self._open_terminal():
+            return
         self.punctuality = self._granted()
         self._say(self.punctuality)
         self._release(0)
@@ -163,6 +194,16 @@ class RealBench(BenchRun):
         self._viewer[0].release()
         return True
 
+    def _open_terminal(self) -> bool:
+        """Have a process of its own draw the run on standard error; False where somebody asks to stop before."""
+        arguments = ["watch", "--terminal", "--scenario", self.scenario.source]
+        self._held.hold()
+        self._spawn(VIEWER, arguments, self._viewer, self._joined, output=2)
+        if not self._await_ready(self._viewer):
+            return False
+        self._viewer[0].release()
+        return True
+
     def _listen(self) -> None:
         """Refuse a bus on which somebody sends what is ours to send."""
         senders = [sender for role in (PLANT, ECU) if role.name not in self._without for sender in role.senders]
@@ -185,11 +226,11 @@ class RealBench(BenchRun):
     def _join(self, name: BusName, spec: str) -> None:
         self._buses[name] = self._stack.enter_context(open_bus(spec, name))
 
-    def _spawn(self, name: str, arguments: list[str], into: list[Child], spec: str) -> None:
+    def _spawn(self, name: str, arguments: list[str], into: list[Child], spec: str, output: int | None = None) -> None:
         words = self.out / f"{name}.txt"
         try:
             with interrupts_held():  # else a process could be started that nobody ends
-                into.append(Child(name, [*arguments, "--bus", spec], words))
+                into.append(Child(name, [*arguments, "--bus", spec], words, output))
         except OSError as error:
             raise BenchError(f"{name} cannot be started: {error}") from error
 
@@ -259,6 +300,7 @@ class RealBench(BenchRun):
             wait_for_end(group)
             for child in group:
                 child.stop()
+        self._held.go_on()
         for child in self.processes:
             if child.failed:
                 self._break(self._fallen(child))

@@ -25,8 +25,10 @@ from hil.bench.virtual import VirtualBench
 from hil.bench.watch import MOST_MISSED, Finding
 from hil.bus.timed.line import is_timed, open_line
 from hil.errors import INTERRUPTED_EXIT_CODE, BrakebenchError, Verdict
+from hil.log.export.blocks import block_of, layout_of
 from hil.log.export.tables import export
 from hil.log.frames import FrameTable, Recording
+from hil.log.signals.decoded import DecodedLog
 from hil.report.figure import write_figure
 from hil.report.html import write_html
 from hil.report.pictures import can_draw, no_pictures
@@ -40,7 +42,10 @@ if TYPE_CHECKING:
     from hil.fmu.foreign_plant import OpenPlant
 
 EXPECTED = "Expected: "
-_FILES = {"log": "recording.log", "signals": "signals.parquet", "figure": "figure.png", "page": "report.html"}
+_FILES = {
+    "log": "recording.log", "signals": "signals.parquet", "figure": "figure.png", "page": "report.html",
+    "mcap": "recording.mcap",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +81,7 @@ class Outcome:
         if self.facts["real_time"] is not None:
             stream.write(f"on time  {self.facts['real_time']}\n")
         for name in _FILES:
-            if self.facts[name] is not None:
+            if self.facts.get(name) is not None:
                 stream.write(f"{name:8} {self.facts[name]}\n")
         if not can_draw():
             stream.write(f"figure   {no_pictures()}\n")
@@ -98,6 +103,8 @@ def run_scenario(
     transmit: bool = False,
     plant: "OpenPlant | None" = None,
     live: bool = False,
+    terminal: bool = False,
+    mcap: bool = False,
 ) -> Outcome:
     """Run one scenario in real or in virtual time and measure it.
 
@@ -106,6 +113,8 @@ def run_scenario(
     name : of the library, a path, or a scenario that was read already (in virtual time alone: nodes read a file).
     plant : in virtual time, somebody else's FMU in the place of our car.
     live : in real time, serve a page that shows the run and commands it.
+    terminal : in real time, draw the run on standard error.
+    mcap : write the signals as MCAP beside the recording, too.
 
     Raises
     ------
@@ -125,7 +134,9 @@ def run_scenario(
                 node = None if plant is None else plant.node(scenario)
                 bench_run = VirtualBench(scenario, folder, seed, say, stop, node, line=line)
             else:
-                bench_run = RealBench(scenario, bus, folder, seed, realtime, say, stop, without, transmit, live)
+                bench_run = RealBench(
+                    scenario, bus, folder, seed, realtime, say, stop, without, transmit, live, terminal
+                )
             with bench_run:
                 say(f"bus {bench_run.spec}" + (f" ({bench_run.note})" if bench_run.note else ""))
                 bench_run.run()
@@ -139,7 +150,7 @@ def run_scenario(
     provenance = {"realtime asked for": realtime, "command line": command_line, "started": started_ns // 1_000_000_000}
     if plant is not None:
         provenance["plant"] = str(plant)
-    return finish(bench_run, seed, provenance)
+    return finish(bench_run, seed, provenance, mcap=mcap)
 
 
 @contextlib.contextmanager
@@ -164,7 +175,9 @@ def explained(bench_run: BenchRun) -> str:
     return "".join(traceback.format_exception(cause)).rstrip() + f"\n{error.reason}"
 
 
-def finish(bench_run: BenchRun, seed: int, provenance: Mapping[str, object], failure: str = "") -> Outcome:
+def finish(
+    bench_run: BenchRun, seed: int, provenance: Mapping[str, object], failure: str = "", mcap: bool = False
+) -> Outcome:
     """Measure a run that has ended, judge it, and write its files.
 
     There is a verdict whatever fails on the way: what could not be read or written is listed as missing.
@@ -173,6 +186,7 @@ def finish(bench_run: BenchRun, seed: int, provenance: Mapping[str, object], fai
     ----------
     provenance : what the caller knows of how it came about.
     failure : why a test on this bench failed; empty where the scenario's expectations decide.
+    mcap : as of `run_scenario`.
     """
     scenario = bench_run.scenario
     missing: list[str] = []
@@ -185,12 +199,14 @@ def finish(bench_run: BenchRun, seed: int, provenance: Mapping[str, object], fai
         scenario.title, signals, result, verdict, reason, _provenance(scenario, bench_run, seed) | dict(provenance)
     )
     report = replace(report, numbers=report.numbers + tuple(met))
-    paths = {name: bench_run.out / file for name, file in _FILES.items()}
+    paths = {name: bench_run.out / file for name, file in _FILES.items() if mcap or name != "mcap"}
     writers: dict[str, Callable[[Path], object]] = {
         "signals": lambda path: export(signals.decoded, path, overwrite=True),
         "figure": partial(write_figure, report),
         "page": partial(write_html, report),
     }
+    if mcap:
+        writers["mcap"] = partial(_write_mcap, signals.decoded)
     files = write_files(writers, paths, missing)
     facts = {
         "scenario": scenario.name,
@@ -213,6 +229,13 @@ def finish(bench_run: BenchRun, seed: int, provenance: Mapping[str, object], fai
         missing.append(f"result.json: {error.strerror}")
         outcome = _outcome(bench_run, result, report, facts | files)
     return outcome
+
+
+def _write_mcap(decoded: DecodedLog, path: Path) -> None:
+    """Write the signals of a recording for Foxglove, PlotJuggler and Rerun."""
+    from hil.log.export.mcap_file import write_mcap
+
+    write_mcap([block_of(decoded)], layout_of(decoded), path, overwrite=True)
 
 
 def _outcome(bench_run: BenchRun, result: RunResult, report: Report, facts: dict[str, Any]) -> Outcome:

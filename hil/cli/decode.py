@@ -48,7 +48,9 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     )
     parser.add_argument("log", metavar="LOG", nargs="+", help=f"{LOGS}; several, or a quoted pattern, are one log")
     add_databases(parser)
-    parser.add_argument("--out", metavar="FILE", help="write signals: FILE.csv, FILE.parquet, FILE.mf4 or FOLDER/")
+    parser.add_argument(
+        "--out", metavar="FILE", help="write signals: FILE.csv, FILE.parquet, FILE.mf4, FILE.mcap or FOLDER/"
+    )
     add_force(parser)
     parser.add_argument("--messages", metavar="GLOB,...", action="append", default=[], help="only these messages")
     parser.add_argument(

@@ -55,6 +55,7 @@ COMMANDS = {
     "faults": "every fault at many instants of a stop, beside the stop without it, against the budgets",
     "campaign": "thousands of runs over parameters, effects, faults and seeds; sensitivities and worst cases",
     "fmu": "plant or controller as an FMU (FMI 3.0) for other simulators",
+    "completion": "a script that completes the command line in bash, zsh or fish",
 }
 """Subcommands in the order of the help, what each does in a line; each is a module of this package."""
 

@@ -31,6 +31,12 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         action="store_true",
         help="serve a page on 127.0.0.1 that shows the run and commands it; see docs/live.md",
     )
+    parser.add_argument("--terminal", action="store_true", help="show the run on this terminal while it goes on")
+    parser.add_argument(
+        "--mcap",
+        action="store_true",
+        help="write recording.mcap beside the recording, for Foxglove, PlotJuggler and Rerun; see docs/logs.md",
+    )
     parser.add_argument("--extend", type=Path, metavar="FILE", help="extension that `explain` wrote: the car it taught")
     parser.add_argument(
         "--plant",
@@ -61,12 +67,19 @@ def run(args: argparse.Namespace) -> int:
         )
     if timed and not args.virtual:
         raise BrakebenchError(f"--bus {args.bus}: a timed bus is in virtual time; add --virtual")
-    if args.live:
+    if args.live or args.terminal:
         from hil.cli.watch import check_extra
 
+        option = "--live" if args.live else "--terminal"
         if args.virtual:
-            raise BrakebenchError("--live shows a run in real time: leave out --virtual")
-        check_extra()
+            raise BrakebenchError(f"{option} shows a run in real time: leave out --virtual")
+        if args.live and args.terminal:
+            raise BrakebenchError("--live and --terminal: give one of them; `brakebench watch` shows the bus as well")
+        check_extra(args.terminal)
+    if args.mcap:
+        from hil.log.export.mcap_file import check_extra as check_mcap
+
+        check_mcap(Path("recording.mcap"))
     if (args.plant is None) != (args.map is None) or (args.plant is not None and not args.virtual):
         raise BrakebenchError("--plant FMU: give it with --map MAP.toml and --virtual")
     scenario, out = args.scenario, args.out
@@ -100,6 +113,8 @@ def run(args: argparse.Namespace) -> int:
             say=lambda line: print(line, file=sys.stderr, flush=True),
             plant=foreign,
             live=args.live,
+            terminal=args.terminal,
+            mcap=args.mcap,
         )
     if args.json:
         print(outcome.json_text())

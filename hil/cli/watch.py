@@ -1,4 +1,4 @@
-"""``brakebench watch``: a page that shows a running bus, and commands a bench."""
+"""``brakebench watch``: a page that shows a running bus, and commands a bench; or a view on the terminal."""
 
 import argparse
 import sys
@@ -24,6 +24,11 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     add_bus(parser)
     parser.add_argument("--dbc", metavar="FILE", type=Path, action="append", default=[],
                         help="database of the vehicle bus (DBC, ARXML, KCD, SYM; default: our own)")  # fmt: skip
+    parser.add_argument(
+        "--terminal",
+        action="store_true",
+        help="show it on this terminal instead of a page; where the output is none, a view a second as plain text",
+    )
     parser.add_argument("--port", type=_port, default=0, help="port of the page (default: any that is free)")
     parser.add_argument("--scenario", default="stop72", metavar="SCENARIO",
                         help="whose car's wheel radius and torque constant are used (default: stop72)")  # fmt: skip
@@ -40,8 +45,7 @@ def _port(text: str) -> int:
 
 def run(args: argparse.Namespace) -> int:
     """Serve the page until told to stop."""
-    check_extra()
-    from hil.live.view import serve_view
+    check_extra(args.terminal)
     from hil.scenario.scenario import load_scenario
 
     plant = load_scenario(args.scenario).plant
@@ -54,18 +58,26 @@ def run(args: argparse.Namespace) -> int:
         print(text, file=sys.stderr, flush=True)
 
     databases, wait_ns = _databases(args.dbc), round(args.wait * 1e9)
+    if args.terminal:
+        from hil.live.terminal import show_view
+
+        show_view(args.bus, databases, car, args.ready_fd)
+        return 0
+    from hil.live.view import serve_view
+
     serve_view(args.bus, databases, car, port=args.port, ready_fd=args.ready_fd, wait_ns=wait_ns, say=say)
     return 0
 
 
-def check_extra() -> None:
-    """Refuse to go on without the library of the server; BrakebenchError says how to get it."""
+def check_extra(terminal: bool = False) -> None:
+    """Refuse to go on without the library of page or terminal; BrakebenchError says how to get it."""
     import importlib.util
 
     from hil.extras import pip_install
 
-    if importlib.util.find_spec("websockets") is None:
-        raise BrakebenchError(f"the live view needs websockets; install it with: {pip_install('live')}")
+    name = "rich" if terminal else "websockets"
+    if importlib.util.find_spec(name) is None:
+        raise BrakebenchError(f"the live view needs {name}; install it with: {pip_install('live')}")
 
 
 def _databases(files: list[Path]) -> "Databases | None":

@@ -124,20 +124,21 @@ class Child:
     name : what people call it.
     arguments : command line behind ``brakebench``.
     error_path : file that takes what it prints.
+    output : file descriptor that takes its standard output instead.
     """
 
-    def __init__(self, name: str, arguments: Sequence[str], error_path: Path) -> None:
+    def __init__(self, name: str, arguments: Sequence[str], error_path: Path, output: int | None = None) -> None:
         self.name = name
         self.error_path = error_path
         self._ready, child_end = socket.socketpair()
         command = [sys.executable, "-m", "hil.cli.main", *arguments, "--ready-fd", str(child_end.fileno())]
         try:
-            with error_path.open("wb") as output:
+            with error_path.open("wb") as words:
                 self._process = subprocess.Popen(
                     command,
                     stdin=subprocess.DEVNULL,
-                    stdout=output,
-                    stderr=output,
+                    stdout=words if output is None else output,
+                    stderr=words,
                     pass_fds=(child_end.fileno(),),
                     start_new_session=True,
                 )

@@ -78,6 +78,14 @@ def block_of(log: DecodedLog) -> Block:
     return Block(frames.time_ns, frames.channel, frames.channels, columns, log.rows)
 
 
+def layout_of(log: DecodedLog) -> Layout:
+    """Return what is written of decoded frames: all columns that they have."""
+    fields = tuple(
+        Field(name.rpartition(".")[0], column.signal, column.values.dtype) for name, column in log.columns.items()
+    )
+    return Layout(fields, log.several_channels, rows=len(log.recording.frames))
+
+
 def blocks_of(tables: Iterable[FrameTable], decoder: Decoder) -> Iterator[Block]:
     """Yield the signals of tables as rows to be written, one row per frame."""
     for table in tables:

@@ -1,4 +1,4 @@
-"""Decoded signals message by message: a folder of Parquet files, or an MF4 file with a group each."""
+"""Decoded signals message by message: a folder of Parquet files, an MF4 file with a group or MCAP with a topic each."""
 
 import re
 import shutil
@@ -27,8 +27,8 @@ def write_signals(
 
     Parameters
     ----------
-    target : ``NAME.csv`` and ``NAME.parquet`` are wide tables, ``NAME.mf4`` has one group and ``NAME/`` one Parquet
-        file for each message.
+    target : ``NAME.csv`` and ``NAME.parquet`` are wide tables, ``NAME.mf4`` has one group, ``NAME.mcap`` one topic
+        and ``NAME/`` one Parquet file for each message.
     overwrite, read : as of `hil.log.export.tables.export`; in a folder, files of other names are left alone.
 
     Raises
@@ -38,9 +38,13 @@ def write_signals(
     """
     check_target(target)
     path = Path(target)
-    if not target.endswith("/") and path.suffix != ".mf4":
+    if not target.endswith("/") and path.suffix not in (".mf4", ".mcap"):
         return export_blocks(blocks, layout, path, overwrite, read)
     rows = 0
+    if path.suffix == ".mcap" and not target.endswith("/"):
+        from hil.log.export.mcap_file import write_mcap
+
+        return write_mcap(blocks, layout, path, overwrite, read)
     if path.suffix == ".mf4" and not target.endswith("/"):
         from hil.log.export.mf4_file import Mf4Groups
 
@@ -59,7 +63,11 @@ def write_signals(
 def check_target(target: str) -> None:
     """Refuse a target whose suffix names no known kind of output."""
     if not target.endswith("/"):
-        check_suffix(Path(target), (".csv", ".parquet", ".mf4"))
+        check_suffix(Path(target), (".csv", ".parquet", ".mf4", ".mcap"))
+        if target.endswith(".mcap"):
+            from hil.log.export.mcap_file import check_extra
+
+            check_extra(Path(target))
 
 
 @contextmanager

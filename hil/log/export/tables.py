@@ -17,7 +17,7 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from hil.log.atomic_write import atomic_write
-from hil.log.export.blocks import Block, Field, Layout, block_of
+from hil.log.export.blocks import Block, Field, Layout, block_of, layout_of
 from hil.log.frames import LogError
 from hil.log.signals.decoded import Column, DecodedLog, Rows, Values
 
@@ -43,11 +43,7 @@ def export(log: DecodedLog, path: Path, overwrite: bool = False, read: Iterable[
     LogError
         For a suffix that is neither .parquet nor .csv, when the file exists, and when it cannot be written.
     """
-    fields = tuple(
-        Field(name.rpartition(".")[0], column.signal, column.values.dtype) for name, column in log.columns.items()
-    )
-    layout = Layout(fields, log.several_channels, rows=len(log.recording.frames))
-    export_blocks([block_of(log)], layout, path, overwrite, read)
+    export_blocks([block_of(log)], layout_of(log), path, overwrite, read)
 
 
 def export_blocks(
