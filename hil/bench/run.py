@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from hil.fmu.foreign_plant import OpenPlant
 
 EXPECTED = "Expected: "
+_UNITS = {"stop_distance_m": "m", "stop_time_s": "s", "mean_decel_mps2": "m/s²", "energy_recuperated_j": "J"}
+"""Of what a scenario expects; counts have none."""
 _FILES = {
     "log": "recording.log", "signals": "signals.parquet", "figure": "figure.png", "page": "report.html",
     "mcap": "recording.mcap",
@@ -279,7 +281,9 @@ def expected(scenario: Scenario, result: RunResult, signals: Signals) -> Iterato
     for e in scenario.expectations:
         value = values[e.name]
         met = value is not None and e.minimum <= value <= e.maximum
-        yield Number(f"{EXPECTED}{e.name}", value, limit=f"{e.minimum:g} to {e.maximum:g}", met=met)
+        yield Number(
+            f"{EXPECTED}{e.name}", value, _UNITS.get(e.name, ""), limit=f"{e.minimum:g} to {e.maximum:g}", met=met
+        )
     for x in scenario.signal_expectations:
         t_s, samples = signals.get(x.signal)
         inside = samples[(t_s >= x.from_s - 1e-6) & (t_s <= x.to_s + 1e-6)]

@@ -46,7 +46,7 @@ def _numbers(result: RunResult) -> tuple[Number, ...]:
         Number("Energy recuperated", result.energy_recuperated_j, KJ),
         Number("Frames on the vehicle bus", result.frames_sent, ""),
         Number("Frames lost", result.frames_lost, "", _BORNE),
-        Number("Frames corrupt", result.frames_corrupt, "", "likewise"),
+        Number("Frames corrupt", result.frames_corrupt, "", _BORNE),
         Number("Link events", ", ".join(f"{name} {count}" for name, count in result.link_states.items()) or "none"),
         Number("Bus load", result.bus_load, PERCENT, "with worst-case stuff bits"),
         Number("Overruns", result.overruns, "", "ticks skipped by ECU and plant"),

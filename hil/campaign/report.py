@@ -12,6 +12,7 @@ from hil.campaign.sample import sensitivities
 from hil.campaign.tasks import KILLED, REFUSED
 from hil.errors import Verdict
 from hil.report.report import Cell, Chart, Curve, Number, Report, Section, Table
+from hil.report.units import symbol
 from hil.report.words import float_text
 
 _WORST = 5  # runs listed for a figure, and for a verdict
@@ -53,7 +54,7 @@ def build_report(plan: Plan, table: pa.Table, rate_per_s: float | None) -> Repor
     counts = verdict_counts(table)
     verdict, reason = verdict_of(counts, plan.size)
     numbers = [Number("Runs", table.num_rows, note=f"of {plan.size}")]
-    numbers += [Number(f"Runs {name}", n, note=f"{n / table.num_rows:.2%}") for name, n in counts.items()]
+    numbers += [Number(f"Runs {name}", n, note=f"{100.0 * n / table.num_rows:.4g} %") for name, n in counts.items()]
     if rate_per_s is not None:
         numbers.append(Number("Rate of this command", rate_per_s, "runs/s"))
     sections = [_figures(plan, table), *_sensitivities(plan, table), *_bad(plan, table)]
@@ -98,7 +99,9 @@ def _figures(plan: Plan, table: pa.Table) -> Section:
         if not known.size or np.ptp(values[known]) == 0.0:
             continue
         order = known[np.argsort(values[known], kind="stable")]
-        rows.append((name, unit_of(name), known.size, *(float(q) for q in np.quantile(values[known], _QUANTILES))))
+        rows.append(
+            (name, symbol(unit_of(name)), known.size, *(float(q) for q in np.quantile(values[known], _QUANTILES)))
+        )
         if name not in _OF_THE_BUS:
             worst.append(_extreme(table, name, "least", order[:_WORST]))
             worst.append(_extreme(table, name, "greatest", order[: -_WORST - 1 : -1]))

@@ -17,6 +17,8 @@ from hil.report.words import clean, number_text, outline, value_text
 _ONE_LINE = 20  # letters of a cell that are never broken: numbers with unit or interval, names
 _TABLES_OPEN = 4  # of a section; more are folded
 _PAIR = re.compile(r"\d (?:(?:to|±|/|of) (?=[-+]?\d)|(?=%))")  # stays on one line: 0.2 to 0.3, 5 ± 1, 1 / 596, 18 %
+_NUMBERS = re.compile(r"(?:[-+−]?[\d.]+(?:e[-+]?\d+)?(?:/[-+−]?[\d.]+|/never)?|never|–)?")
+_JOINT = re.compile(r"(?<=\w)[._](?=\w)")
 _VERDICT_MARKS = {"passed": "✓", "failed": "✗", "inconclusive": "?", "incomplete": "!", "broken": "✗"}
 
 
@@ -168,23 +170,29 @@ def _folded(table: Table) -> str:
 
 def _table(table: Table) -> str:
     title = f"<h3>{_text(table.title)}</h3>" if table.title else ""
-    right = [
-        all(not isinstance(row[i], (str, bool)) for row in table.rows) and bool(table.rows)
-        for i in range(len(table.columns))
-    ]
+    right = [all(_is_number(row[i]) for row in table.rows) and bool(table.rows) for i in range(len(table.columns))]
     heads = "".join(f"<th{' class=n' if r else ''}>{_text(h)}</th>" for r, h in zip(right, table.columns, strict=True))
     rows = "".join(
-        "<tr>" + "".join(_cell(cell, r) for cell, r in zip(row, right, strict=True)) + "</tr>" for row in table.rows
+        "<tr>" + "".join(_cell(*cell) for cell in zip(row, right, range(len(row)), strict=True)) + "</tr>"
+        for row in table.rows
     )
     note = f'<p class="note">{_text(table.note)}</p>' if table.note else ""
     body = f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>"
     return f'<div class="table">{title}<div class="scroll" tabindex="0">{body}</div>{note}</div>'
 
 
-def _cell(cell: Cell, right: bool) -> str:
+def _is_number(cell: Cell) -> bool:
+    """Whether a cell holds a number, several beside each other (35/90), or nothing in a column of such."""
+    return _NUMBERS.fullmatch(cell) is not None if isinstance(cell, str) else not isinstance(cell, bool)
+
+
+def _cell(cell: Cell, right: bool, column: int) -> str:
     text = value_text(cell)
     kind = "n" if right else "s" if len(text) <= _ONE_LINE else "t"
-    return f"<td class={kind}>{_PAIR.sub(_together, escape(text))}</td>"
+    shown = _PAIR.sub(_together, escape(text))
+    if column == 0 and not right:  # a long name breaks at its joints where the page is narrow
+        shown = _JOINT.sub(r"\g<0><wbr>", shown)
+    return f"<td class={kind}>{shown}</td>"
 
 
 def _prose(text: str) -> str:

@@ -37,7 +37,7 @@ KJ = Display("kJ", 1e-3)  # from J
 KN = Display("kN", 1e-3)  # from N
 
 
-_PRINTED = {"1": "", "m/s2": "m/s²"}
+_PRINTED = {"1": "", "m/s2": "m/s²", "m/s^2": "m/s²"}
 
 
 def symbol(unit: Unit) -> str:

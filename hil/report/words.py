@@ -45,7 +45,7 @@ def float_text(value: float) -> str:
     if value == 0.0:
         return "0"
     rounded = float(f"{value:.4g}")
-    if not 1e-3 <= abs(rounded) < 1e6:
+    if not 1e-4 <= abs(rounded) < 1e6:
         return f"{value:.3e}"
     decimals = max(0, 3 - math.floor(math.log10(abs(rounded))))
     return f"{value:.{decimals}f}"

@@ -8,7 +8,8 @@ from hil.validation.fault_campaign.campaign import Campaign
 from hil.validation.fault_campaign.table import Found, Row
 
 HEADS = (
-    "", "runs", "found ms", "motor 0", "friction", "back ms", "dip m/s2", "stop", "stale", "wrong", "miss", "bound",
+    "", "runs", "found ms", "motor 0 ms", "friction ms", "back ms", "dip m/s²", "stop", "stale", "wrong", "miss",
+    "bound",
 )  # fmt: skip
 """Heads of the table."""
 _TIMES = ("detect_ms", "motor_zero_ms", "friction_back_ms", "recovery_ms")

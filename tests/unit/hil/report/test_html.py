@@ -40,11 +40,14 @@ class Page(HTMLParser):
         self.text: list[str] = []
         self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.scripts: list[str] = []
-        self._in_script = False
+        self._in_script = self._in_word = False
         self.feed(source)
         self.close()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag == "wbr" and not attrs:  # where a word may break
+            self._in_word = True
+            return
         self.tags.append((tag, dict(attrs)))
         self._in_script = tag == "script"
 
@@ -52,7 +55,9 @@ class Page(HTMLParser):
         self._in_script = False
 
     def handle_data(self, data: str) -> None:
-        (self.scripts if self._in_script else self.text).append(data)
+        into = self.scripts if self._in_script else self.text
+        into.append(into.pop() + data if self._in_word else data)
+        self._in_word = False
 
     @property
     def _data(self) -> dict:
