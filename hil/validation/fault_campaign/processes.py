@@ -16,7 +16,7 @@ from dbc.messages import BrakeMode, EhbState
 from hil.bench.bench_run import BenchState
 from hil.bench.real import RealBench
 from hil.bench.result import Signals
-from hil.errors import BrakebenchError
+from hil.errors import BrakebenchError, in_words
 from hil.faults.catalogue import fault_named
 from hil.faults.fault import FROM_THE_FIRST_TICK
 from hil.scenario.scenario import load_scenario
@@ -88,7 +88,7 @@ def _run(case: Case) -> tuple[Measured, list[Miss]]:
         try:
             signals = Signals(bench.log)
         except (OSError, BrakebenchError) as error:
-            return m, [*misses, Miss("exceptions", 1.0, 0.0, text=f"the recording cannot be read: {error}")]
+            return m, [*misses, Miss("exceptions", 1.0, 0.0, text=f"the recording cannot be read: {in_words(error)}")]
         misses += _measure(m, signals, armed, case.seed, bench.state)
     return m, misses
 
