@@ -1,5 +1,7 @@
 """What the bench says when it cannot go on, and how every command judges: verdicts and exit codes."""
 
+from collections.abc import Collection, Iterable
+from difflib import get_close_matches
 from enum import StrEnum
 
 INTERRUPTED_EXIT_CODE = 130
@@ -45,3 +47,26 @@ class BrakebenchError(Exception):
     """
 
     exit_code = 2
+
+
+def in_words(error: BaseException) -> str:
+    """What a system error says, without its number and the file, which the message names; others as they are."""
+    if isinstance(error, UnicodeDecodeError):
+        return f"no text in UTF-8 (byte {error.start} is 0x{error.object[error.start]:02x})"
+    return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+
+
+_MOST_KNOWN = 40  # keys that a message lists
+
+
+def unknown_keys(found: Iterable[str], known: Collection[str]) -> str | None:
+    """Say which keys of a file nobody knows, what may have been meant, and what is known; None where all are known."""
+    odd = [key for key in found if key not in known]
+    if not odd:
+        return None
+    near = get_close_matches(odd[0], known, 1)
+    meant = f"; did you mean {near[0]!r}?" if near else ""
+    listed = sorted(known) if isinstance(known, set) else list(known)
+    shown = f"{', '.join(listed[:_MOST_KNOWN]) or 'none'}"
+    more = f" and {len(listed) - _MOST_KNOWN} more" if len(listed) > _MOST_KNOWN else ""
+    return f"unknown key {', '.join(map(repr, odd))}; known here: {shown}{more}{meant}"

@@ -14,6 +14,7 @@ from hil.bus.channel import bench_channel, claim_channel, shared_channel
 from hil.bus.listen import refuse_others
 from hil.bus.open import open_bus
 from hil.bus.transmit import check_transmit
+from hil.errors import in_words
 from hil.rt.clock import WallClock
 from hil.rt.loop import Loop, Tick
 from hil.rt.process import Child, StopSignal, interrupts_held, wait_for_end
@@ -232,7 +233,7 @@ class RealBench(BenchRun):
             with interrupts_held():  # else a process could be started that nobody ends
                 into.append(Child(name, [*arguments, "--bus", spec], words, output))
         except OSError as error:
-            raise BenchError(f"{name} cannot be started: {error}") from error
+            raise BenchError(f"{name} cannot be started: {in_words(error)}") from error
 
     def _await_ready(self, children: Sequence[Child], meanwhile: Callable[[], None] = lambda: None) -> bool:
         """Wait until all are ready; False where somebody asks to stop before."""

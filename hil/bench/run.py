@@ -24,7 +24,7 @@ from hil.bench.run_report import build_report
 from hil.bench.virtual import VirtualBench
 from hil.bench.watch import MOST_MISSED, Finding
 from hil.bus.timed.line import is_timed, open_line
-from hil.errors import INTERRUPTED_EXIT_CODE, BrakebenchError, Verdict
+from hil.errors import INTERRUPTED_EXIT_CODE, BrakebenchError, Verdict, in_words
 from hil.log.export.blocks import block_of, layout_of
 from hil.log.export.tables import export
 from hil.log.frames import FrameTable, Recording
@@ -256,7 +256,7 @@ def _recorded(bench_run: BenchRun, missing: list[str]) -> Signals:
     try:
         return Signals(bench_run.log)
     except (OSError, BrakebenchError) as error:
-        missing.append(f"{bench_run.log.name}: {error}")
+        missing.append(f"{bench_run.log.name}: {in_words(error)}")
         return Signals(Recording(bench_run.log, "candump", FrameTable.empty()))
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dbc.frame import Received
 from hil.bus.tunnel_end import TunnelCounts, TunnelEnd
 from hil.bus.tunnel_wire import HELLO
-from hil.errors import BrakebenchError
+from hil.errors import BrakebenchError, in_words
 from hil.rt.clock import monotonic_ns
 
 SILENCE_NS = 1_000_000_000
@@ -49,7 +49,7 @@ def _addresses(place: tuple[str, int]) -> list[tuple[socket.AddressFamily, tuple
     try:
         return [(one[0], one[4]) for one in socket.getaddrinfo(*place, type=socket.SOCK_STREAM)]
     except (OSError, UnicodeError) as error:
-        raise PlaceError(f"tunnel: {place[0]}: {error}") from error
+        raise PlaceError(f"tunnel: {place[0]}: {in_words(error)}") from error
 
 
 def _name(address: tuple[object, ...]) -> str:

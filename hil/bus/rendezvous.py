@@ -20,6 +20,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from hil.bus.bus import BusError
+from hil.errors import in_words
 from hil.rt.clock import WallClock
 
 _CHANNEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,47}")
@@ -91,7 +92,7 @@ class Rendezvous:
             except OSError as error:
                 for one in (listener, *present):
                     one.close()
-                raise BusError(f"cannot bind {self._path}: {error}") from error
+                raise BusError(f"cannot bind {self._path}: {in_words(error)}") from error
         return listener, present
 
     def leave(self, listener: socket.socket) -> None:
@@ -156,7 +157,7 @@ class Rendezvous:
         except FileNotFoundError:
             return None
         except OSError as error:
-            raise BusError(f"cannot use {self._directory} for a loopback channel: {error}") from error
+            raise BusError(f"cannot use {self._directory} for a loopback channel: {in_words(error)}") from error
 
 
 def _make(directory: Path) -> None:

@@ -3,7 +3,7 @@
 from concurrent.futures import Executor
 from typing import Any
 
-from hil.errors import BrakebenchError
+from hil.errors import BrakebenchError, in_words
 from hil.extras import pip_install
 
 _CONNECT_S = 10
@@ -37,8 +37,8 @@ class DaskWorkers:
             self._client = client(address, timeout=_CONNECT_S, set_as_default=False)
         except (OSError, ValueError) as error:
             raise ClusterError(
-                f"--scheduler {address}: nobody answers there ({error}); start one with `dask scheduler --host "
-                "127.0.0.1`, and workers with `dask worker ADDRESS`"
+                f"--scheduler {address}: nobody answers there ({in_words(error)}); start one with `dask scheduler "
+                "--host 127.0.0.1`, and workers with `dask worker ADDRESS`"
             ) from error
         self.count = sum(self._client.nthreads().values())
         if not self.count:

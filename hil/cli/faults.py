@@ -3,7 +3,6 @@
 import argparse
 import json
 import os
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -56,7 +55,8 @@ def run(args: argparse.Namespace) -> int:
         progress.part(0, "stops with faults")
         campaign = drive_campaign(args.instants, args.seed, os.cpu_count() or 1, progress, args.only)
     if not (args.no_processes or args.only):
-        campaign = replace(campaign, processes=drive_processes(args.seed, _tell))
+        with Progress().part(0, "faults of real processes") as progress:
+            campaign = replace(campaign, processes=drive_processes(args.seed, progress))
     if args.out is not None:
         _write(campaign, args.out)
     if args.json:
@@ -72,10 +72,6 @@ def _write(campaign: "Campaign", out: Path) -> None:
     from hil.validation.fault_campaign.page import build_report
 
     write_html(with_origin(build_report(campaign)), out / "report.html")
-
-
-def _tell(text: str) -> None:
-    print(text, file=sys.stderr)
 
 
 def _lines(campaign: "Campaign", by_target: bool, width: int) -> list[str]:

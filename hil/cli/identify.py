@@ -95,6 +95,7 @@ def _identify(args: argparse.Namespace, brake: "Brake", parameters: "FrictionBra
 
 
 def _coverage(args: argparse.Namespace, brake: "Brake") -> int:
+    from hil.cli.progress import Progress
     from hil.identify.coverage import LEVEL, coverage
     from hil.identify.files import coverage_json
 
@@ -102,16 +103,14 @@ def _coverage(args: argparse.Namespace, brake: "Brake") -> int:
         raise BrakebenchError("--coverage makes its own records; leave DYNO.csv, --validate and --out away")
     if args.coverage < 1:
         raise BrakebenchError(f"--coverage: expected at least 1 record, got {args.coverage}")
-    rows = []
     print(f"{100 * LEVEL:g} % joint region of (a, b, c, gamma, eps), {args.coverage} seeds a row", file=sys.stderr)
-    for row in coverage(brake, range(args.coverage)):
-        rows.append(row)
-        if not args.json:
-            print(
-                f"heating {row.heating:8}  noise {row.noise:11}  truth inside {row.inside} of {row.seeds} "
-                f"(at least {row.least} asked)  heating form found {row.form_found} of {row.seeds}",
-                flush=True,
-            )
+    with Progress().part(0, "fitting records of known truth") as progress:
+        rows = list(coverage(brake, range(args.coverage), progress))
+    for row in () if args.json else rows:
+        print(
+            f"heating {row.heating:8}  noise {row.noise:11}  truth inside {row.inside} of {row.seeds} "
+            f"(at least {row.least} asked)  heating form found {row.form_found} of {row.seeds}"
+        )
     if args.json:
         print(json.dumps(coverage_json(rows), indent=2))
     return 0 if all(row.met for row in rows) else 1

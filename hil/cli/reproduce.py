@@ -43,6 +43,7 @@ def run(args: argparse.Namespace) -> int:
     """Drive, print, draw."""
     if args.seeds < 1:
         raise BrakebenchError(f"--seeds: expected at least 1, got {args.seeds}")
+    from hil.cli.progress import Progress
     from hil.validation.reproduce.identification import identification_rows, shipped_study
     from hil.validation.reproduce.store import Store
     from hil.validation.reproduce.study import conditions_of, measure
@@ -53,9 +54,9 @@ def run(args: argparse.Namespace) -> int:
     conditions_of(args.extend)  # refuses a file that no car can have before anything is driven
     store = Store(args.keep, args.extend)
     say("identifying the pad friction (Figures 3 to 5) ...")
-    rows = identification_rows(shipped_study()) + measure(
-        args.seeds, len(os.sched_getaffinity(0)), say, store, args.extend
-    )
+    rows = identification_rows(shipped_study())
+    with Progress().part(0, "driving the cases") as progress:
+        rows += measure(args.seeds, len(os.sched_getaffinity(0)), progress.tell, store, args.extend, progress)
     if args.out is not None:
         _write(args.out, rows)
     if args.json:

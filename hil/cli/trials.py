@@ -65,6 +65,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 def run(args: argparse.Namespace) -> int:
     """Run the trials and print the table."""
     from hil.cli.origin import with_origin
+    from hil.cli.progress import Progress
     from hil.report.html import write_html
     from hil.report.pictures import can_draw, no_pictures
     from hil.validation.blind_trials.page import build_report
@@ -85,7 +86,8 @@ def run(args: argparse.Namespace) -> int:
     scored: dict[str, Any] = {}
     singles: dict[tuple[int, float], Any] = {}
     for family in families:
-        records = run_family(family, args.count, args.seed, args.out, _say)
+        with Progress().part(0, family) as progress:
+            records = run_family(family, args.count, args.seed, args.out, progress.tell, progress=progress)
         scored[family] = table_of(family, records)
         singles |= {(r["index"], r["size"]): r for r in records if r["family"] == "single"}
         _keep(args.out / "table.json", args.seed, scored)

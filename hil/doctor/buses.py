@@ -11,6 +11,7 @@ from hil.bus.channel import claim_channel
 from hil.bus.open import open_bus
 from hil.bus.rendezvous import base_directory
 from hil.doctor.line import Line, Status
+from hil.errors import in_words
 from hil.rt.clock import monotonic_ns
 from hil.rt.process import output_of
 
@@ -39,7 +40,7 @@ def loopback_line() -> Line:
                 times_ns.append(monotonic_ns() - start_ns)
     except (BusError, OSError) as error:
         fix = "" if os.access(directory.parent, os.W_OK) else "export XDG_RUNTIME_DIR=$(mktemp -d)"
-        return Line("loopback", Status.MISSING, f"not usable in {directory}: {error}", fix)
+        return Line("loopback", Status.MISSING, f"not usable in {directory}: {in_words(error)}", fix)
     trip_us = statistics.median(times_ns) * 1e-3
     return Line("loopback", Status.OK, f"usable in {directory}; round trip {trip_us:.0f} us within one process")
 

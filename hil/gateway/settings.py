@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from dbc.database import Message, Signal
+from hil.errors import unknown_keys
 from hil.gateway.database import UserDatabase
 from hil.gateway.error import GatewayError
 from hil.gateway.protection import (
@@ -44,9 +45,8 @@ def only(table: Any, keys: Collection[str], where: str) -> Table:
     """Return a table that has no other keys than these."""
     if not isinstance(table, dict):
         raise GatewayError(f"{where}: expected a table with {', '.join(keys)}, got {table!r}")
-    unknown = [key for key in table if key not in keys]
-    if unknown:
-        raise GatewayError(f"{where}: unknown {', '.join(unknown)}; expected {', '.join(keys)}")
+    if odd := unknown_keys(table, keys):
+        raise GatewayError(f"{where}: {odd}")
     return table
 
 

@@ -1,6 +1,6 @@
 """Does the joint region hold the truth as often as it says? Records made from equations (3) and (4) themselves."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -53,9 +53,12 @@ class Covered:
         return self.inside >= self.least
 
 
-def coverage(brake: Brake, seeds: Sequence[int]) -> Iterator[Covered]:
-    """Fit records of known truth; one outcome for each heating form and noise."""
+def coverage(
+    brake: Brake, seeds: Sequence[int], progress: Callable[[float], None] = lambda _: None
+) -> Iterator[Covered]:
+    """Fit records of known truth; one outcome for each heating form and noise. ``progress`` takes the share done."""
     colours: tuple[Colour, ...] = ("white", "first-order")
+    done, count = 0, len(TRUTHS) * len(colours) * len(seeds)
     for heating, truth in TRUTHS.items():
         clean = noiseless(brake, truth, heating)
         other: Heating = "friction" if heating == "printed" else "printed"
@@ -66,6 +69,8 @@ def coverage(brake: Brake, seeds: Sequence[int]) -> Iterator[Covered]:
                 fitted = fit(record, brake, heating)
                 inside += joint_statistic(fitted, truth) <= joint_limit(fitted, LEVEL)
                 found += fitted.log_likelihood > fit(record, brake, other).log_likelihood
+                done += 1
+                progress(done / count)
             least = int(binom.ppf(1e-3, len(seeds), LEVEL))
             yield Covered(heating, colour, len(seeds), inside, least, found)
 

@@ -9,6 +9,7 @@ from datetime import UTC, tzinfo
 from pathlib import Path
 from typing import IO, Any, Self
 
+from hil.errors import in_words
 from hil.log.account import Account
 from hil.log.frames import LogError
 
@@ -121,7 +122,7 @@ class Source:
             self.account.note(f"damaged gzip file: {error}")
             self.account.cut_at(self._position)
         except OSError as error:
-            raise LogError(self.path, f"cannot be read: {error}", self._position) from error
+            raise LogError(self.path, f"cannot be read: {in_words(error)}", self._position) from error
         self._position += len(content)
         return content
 

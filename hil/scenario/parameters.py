@@ -15,7 +15,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from hil.errors import BrakebenchError
+from hil.errors import BrakebenchError, unknown_keys
 
 T = TypeVar("T")
 _ENTRY_KEYS = {"value", "unit", "tolerance", "source"}
@@ -53,8 +53,8 @@ def override(value: T, changes: Mapping[str, Any], where: str) -> T:
     hints = typing.get_type_hints(type(value), include_extras=True)
     new: dict[str, Any] = {}
     for key, change in changes.items():
-        if key not in hints:
-            raise ParameterError(f"{where}: unknown key {key!r}; known here: {', '.join(sorted(hints))}")
+        if odd := unknown_keys([key], set(hints)):
+            raise ParameterError(f"{where}: {odd}")
         old = getattr(value, key)
         if dataclasses.is_dataclass(old):
             if not isinstance(change, Mapping):
@@ -77,8 +77,8 @@ def _read(path: Path | Traversable) -> dict[str, Any]:
 def _build(kind: type[T], table: Mapping[str, Any], file: str, prefix: str) -> T:
     hints = typing.get_type_hints(kind, include_extras=True)
     for key in table:
-        if key not in hints:
-            raise ParameterError(f"{file}: unknown key {prefix + key!r}; known here: {', '.join(sorted(hints))}")
+        if odd := unknown_keys([prefix + key], {prefix + name for name in hints}):
+            raise ParameterError(f"{file}: {odd}")
     missing = sorted(set(hints) - set(table))
     if missing:
         raise ParameterError(

@@ -10,7 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from hil.errors import BrakebenchError
+from hil.errors import BrakebenchError, unknown_keys
 from hil.scenario.parameters import is_number
 from hil.scenario.waveforms import GENERATORS, Points
 from plant.manoeuvre import Trace
@@ -215,9 +215,8 @@ class Table:
 
     def done(self) -> None:
         """Refuse what is left over."""
-        if self._values:
-            odd = ", ".join(map(repr, self._values))
-            raise ScenarioError(f"{self._where}: unknown key {odd}; known here: {', '.join(sorted(set(self._known)))}")
+        if odd := unknown_keys(self._values, set(self._known)):
+            raise ScenarioError(f"{self._where}: {odd}")
 
 
 def _cell(text: str | None) -> float | None:

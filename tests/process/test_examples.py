@@ -49,3 +49,18 @@ def test_the_plain_script_stays_plain():
     code = text.split('"""', 2)[2]
     assert sum(bool(line.strip()) for line in code.splitlines()) <= 41
     assert not re.search(r"^(from|import) (hil|dbc|ecu|plant)", text, re.MULTILINE)
+
+
+@pytest.mark.slow
+def test_the_notebook_from_top_to_bottom(start, tmp_path, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    cells = json.loads((EXAMPLES / "recording.ipynb").read_text())["cells"]
+    code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    (tmp_path / "notebook.py").write_text("\n\n".join([*code, 'figure.savefig("drawn.png")']))
+    process = start("notebook.py", program=PYTHON)
+    out, err = process.communicate(timeout=550)  # `explain` alone takes minutes on a busy machine
+    assert process.returncode == 0, err
+    assert "Front left" in out
+    assert (tmp_path / "drawn.png").stat().st_size > 10_000
+    assert (tmp_path / "found" / "extension.toml").exists()

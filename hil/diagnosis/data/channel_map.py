@@ -10,7 +10,9 @@ import numpy as np
 
 from hil.diagnosis.data.log import CHANNELS, Floats, UnusableError
 from hil.diagnosis.data.units import ROAD_SPEED, TO_SI, units_of, written
+from hil.errors import in_words, unknown_keys
 
+_KEYS = ("signal", "unit", "scale", "sign", "offset", "source")
 _QUESTION = re.compile(r"^\s*([A-Za-z_0-9]+)\s*=\s*\?")
 Series = tuple[Floats, Floats]
 """Times (s) and values of one signal, both (samples,)."""
@@ -116,7 +118,7 @@ def load_map(path: Path, radius_m: float | None = None) -> ChannelMap:
         refuse_question_marks(path, text)
         table = tomllib.loads(text)
     except (OSError, ValueError) as error:
-        raise UnusableError(f"{path}: not a channel map: {error}") from error
+        raise UnusableError(f"{path}: not a channel map: {in_words(error)}") from error
     time = table.pop("time", None)
     table.pop("source", None)
     entries = {}
@@ -125,9 +127,10 @@ def load_map(path: Path, radius_m: float | None = None) -> ChannelMap:
         if target not in CHANNELS:
             raise UnusableError(f"{where}: unknown channel; expected one of {', '.join(CHANNELS)}")
         entry = {"signal": entry} if isinstance(entry, str) else entry
-        unknown = set(entry) - {"signal", "unit", "scale", "sign", "offset", "source"}
-        if "signal" not in entry or unknown:
-            raise UnusableError(f"{where}: expected signal, unit, scale, sign, offset, got {', '.join(entry)}")
+        if not isinstance(entry, dict) or "signal" not in entry:
+            raise UnusableError(f"{where}: expected a table with signal = 'MESSAGE.SIGNAL' or a column, got {entry!r}")
+        if odd := unknown_keys(entry, _KEYS):
+            raise UnusableError(f"{where}: {odd}")
         unit = str(entry.get("unit", ""))
         on_road = target.startswith("wheel_speed") and unit.strip().lower() in ROAD_SPEED and "scale" not in entry
         factor, offset = channel_to_si(target, unit, where, "scale" in entry or (on_road and radius_m is not None))

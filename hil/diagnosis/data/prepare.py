@@ -113,8 +113,8 @@ def _without_contradicted_demands(logs: Sequence[Log]) -> Sequence[Log]:
     ):  # fmt: skip
         for log in logs:
             if log.has(*demands, *measured):
-                demand = np.nanmax([np.abs(log.channels[name]) for name in demands], axis=0)
-                active = np.nanmax([np.abs(log.channels[name]) for name in measured], axis=0) > 5.0 * released
+                demand = np.fmax.reduce([np.abs(log.channels[name]) for name in demands])
+                active = np.fmax.reduce([np.abs(log.channels[name]) for name in measured]) > 5.0 * released
                 undemanded = active & ~_lasts(demand >= released, log.t_s, _RELEASE_S)
                 if _duration_s(undemanded, log.t_s) > max(_UNDEMANDED_S, _CONTRADICTED * _duration_s(active, log.t_s)):
                     dropped |= set(demands)

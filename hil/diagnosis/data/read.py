@@ -17,8 +17,10 @@ from hil.diagnosis.data.hints import expected_instead
 from hil.diagnosis.data.log import CHANNELS, Floats, Log, Origin, UnusableError, make_log
 from hil.diagnosis.data.table_text import read_text_table
 from hil.diagnosis.data.time_column import NAMES, times_s
+from hil.errors import in_words, unknown_keys
 from hil.extras import missing
 from hil.log import DecodedLog, decode_log, log_format, read_log
+from hil.scenario.parameters import is_number
 
 _GRID_S = 0.01
 _MOTION, _SLOW_S = ("ax_mps2", "ay_mps2", "yaw_rate_rad_s", "speed_mps"), 0.04
@@ -26,6 +28,8 @@ _MOTION, _SLOW_S = ("ax_mps2", "ay_mps2", "yaw_rate_rad_s", "speed_mps"), 0.04
 _TABLES = (".csv", ".parquet", ".mf4", ".mdf", ".mat")
 _CSV_FRAMES = ("csv", "python_can_csv", "gvret")
 """Formats of frames with the suffix of a table; rows of numbers between tabs look like other logs of frames."""
+_FACTS = ("direction", "initial_disc_temperature_k")
+"""Keys of a log in ``logs.toml``."""
 _FRAMES = {"channel", "id", "extended", "length", "data"}
 
 
@@ -67,20 +71,31 @@ def _with_log_facts(log: Log, file: Path, about: Path | None) -> Log:
         return log
     try:
         table = tomllib.loads(source.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise UnusableError(f"{source}: not valid TOML: {error}") from error
+    except OSError as error:
+        raise UnusableError(f"{source}: cannot be read: {in_words(error)}") from error
+    except ValueError as error:
+        raise UnusableError(f"{source}: not valid TOML: {in_words(error)}") from error
     entry = table.get(file.name, table.get(file.stem, table.get("logs", {}).get(file.name, {})))
     if not isinstance(entry, Mapping):
         raise UnusableError(f"{source}: {file.name}: expected a table with direction and initial_disc_temperature_k")
-    direction = int(entry.get("direction", 1))
-    if direction not in (1, -1):
-        raise UnusableError(f"{source}: {file.name}: direction: expected 1 or -1, got {direction}")
-    temperature = entry.get("initial_disc_temperature_k")
-    if temperature is not None and not 200.0 <= float(temperature) <= 1300.0:
+    if odd := unknown_keys(entry, _FACTS):
+        raise UnusableError(f"{source}: {file.name}: {odd}")
+    loose = {name: value for name, value in table.items() if not isinstance(value, Mapping)}
+    if loose:
         raise UnusableError(
-            f"{source}: {file.name}: initial_disc_temperature_k: expected 200 to 1300, got {temperature}"
+            f'{source}: {", ".join(loose)}: expected tables alone, one for each log; write it below ["{file.name}"]'
         )
-    return replace(log, direction=direction, disc_temperature_k=None if temperature is None else float(temperature))
+    direction = entry.get("direction", 1)
+    if direction not in (1, -1):
+        raise UnusableError(f"{source}: {file.name}: direction: expected 1 or -1, got {direction!r}")
+    temperature = entry.get("initial_disc_temperature_k")
+    if temperature is not None and not (is_number(temperature) and 200.0 <= temperature <= 1300.0):
+        raise UnusableError(
+            f"{source}: {file.name}: initial_disc_temperature_k: expected 200 to 1300, got {temperature!r}"
+        )
+    return replace(
+        log, direction=int(direction), disc_temperature_k=None if temperature is None else float(temperature)
+    )
 
 
 def read_one(

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from hil.diagnosis.data.log import Floats, UnusableError
+from hil.errors import in_words
 
 _SAMPLE = 200
 """Rows that show the kind of numbers."""
@@ -48,7 +49,7 @@ def _lines(path: Path) -> list[str]:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise UnusableError(f"{path}: cannot be read: {error}") from error
+        raise UnusableError(f"{path}: cannot be read: {in_words(error)}") from error
     if b"\0" in data:
         raise UnusableError(f"{path}: not a table of text: it has zero bytes (UTF-16? save it as UTF-8)")
     try:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from hil.diagnosis.data.log import Floats, UnusableError
+from hil.errors import in_words, unknown_keys
 from hil.scenario.effects import EffectError, read_laws, written_laws
 from plant.injection.bank import NO_TERMS
 from plant.injection.theta import THETA
@@ -25,6 +26,7 @@ ONSET_LOG = "onset_log"
 """Key of the log in which an effect begins."""
 _RENAMED = {("wrong_scale", "factor"): "gain"}
 """Parameters of effects that earlier files call differently: effect and name, name now."""
+_TABLES = ("effects", "laws", "parameters", "channels")
 _CHANNEL_MODELS = ("along", "turning", "wheels", "braking")
 
 
@@ -123,8 +125,8 @@ def load_extension(path: Path) -> Extension:
             raise UnusableError(f"{path}: effects.{name}: {error.args[0]}") from error
     parameters = {}
     for name, values in table.get("parameters", {}).items():
-        if name not in PARAMETER.sizes:
-            raise UnusableError(f"{path}: parameters: the plant has no parameter {name!r}")
+        if odd := unknown_keys([name], PARAMETER.sizes):
+            raise UnusableError(f"{path}: parameters: {odd}")
         parameters[name] = [float(v) for v in (values if isinstance(values, list) else [values])]
         expected, got = PARAMETER.sizes[name], len(parameters[name])
         if got != expected:
@@ -171,6 +173,9 @@ def load_channels(path: Path) -> dict[str, dict[str, float]]:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise UnusableError(f"{path}: not an extension file: {error}") from error
+        raise UnusableError(f"{path}: not an extension file: {in_words(error)}") from error
+    if odd := unknown_keys(table, _TABLES):
+        raise UnusableError(f"{path}: {odd}")
+    return table

@@ -46,6 +46,7 @@ from hil.diagnosis.vehicle.priors import (
     with_wide_prior,
 )
 from hil.diagnosis.vehicle.spec import Vehicle, with_constant_friction, with_gains
+from hil.errors import in_words
 from hil.scenario.parameters import is_number, load_set, override
 from plant.model import pack
 from plant.parameters.plant import PlantParameters
@@ -145,7 +146,7 @@ def read_set(path: Path) -> dict[str, Any]:
         refuse_question_marks(path, text)
         return _flattened(tomllib.loads(text))
     except (OSError, ValueError) as error:
-        raise UnusableError(f"{path}: not a vehicle set: {error}") from error
+        raise UnusableError(f"{path}: not a vehicle set: {in_words(error)}") from error
 
 
 def _flattened(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -41,7 +41,13 @@ def plan(family: str, count: int) -> list[tuple[str, int, float | None]]:
 
 
 def run_family(
-    family: str, count: int, seed: int, out: Path, say: Say, settings: Settings | None = None
+    family: str,
+    count: int,
+    seed: int,
+    out: Path,
+    say: Say,
+    settings: Settings | None = None,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> list[Record]:
     """Run what is not yet in ``out/cases.jsonl``; all records of the family, in order of the plan.
 
@@ -51,7 +57,8 @@ def run_family(
     path = out / "cases.jsonl"
     done = {_key(record): record for record in _read(path) if record["seed"] == seed}
     records = []
-    for drawn, index, size in plan(family, count):
+    planned = plan(family, count)
+    for n, (drawn, index, size) in enumerate(planned, 1):
         key = (drawn, index, size)
         if key not in done:
             if drawn in strangers.FAMILIES:
@@ -62,6 +69,7 @@ def run_family(
                 file.write(f"{json.dumps(done[key])}\n".encode())
         records.append(done[key])
         say(f"{family} {index} {'' if size is None else size}: {done[key]['verdict']} {done[key]['named'][:1]}")
+        progress(n / len(planned))
     return records
 
 

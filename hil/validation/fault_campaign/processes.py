@@ -16,7 +16,7 @@ from dbc.messages import BrakeMode, EhbState
 from hil.bench.bench_run import BenchState
 from hil.bench.real import RealBench
 from hil.bench.result import Signals
-from hil.errors import BrakebenchError
+from hil.errors import BrakebenchError, in_words
 from hil.faults.catalogue import fault_named
 from hil.faults.fault import FROM_THE_FIRST_TICK
 from hil.scenario.scenario import load_scenario
@@ -61,12 +61,12 @@ class _Seen:
     zero_s: float  # when it asked, or gave, no motor torque
 
 
-def drive_processes(seed: int, say: Callable[[str], None]) -> list[Row]:
-    """Run every case once; a row each."""
+def drive_processes(seed: int, progress: Callable[[float], None]) -> list[Row]:
+    """Run every case once; a row each. ``progress`` takes the share that is done."""
     rows = []
-    for name, target, at_s, for_s in CASES:
+    for n, (name, target, at_s, for_s) in enumerate(CASES):
+        progress(n / len(CASES))
         armed = Armed(name, target, at_s, 1, {"for_s": for_s} if for_s else {})
-        say(f"real processes: {armed}")
         case = Case((name, f"{target} {1e3 * for_s:.0f} ms" if for_s else target), seed, (armed,))
         rows.append(row_of([(case, *_run(case))], fault_named(name).row))
     return rows
@@ -88,7 +88,7 @@ def _run(case: Case) -> tuple[Measured, list[Miss]]:
         try:
             signals = Signals(bench.log)
         except (OSError, BrakebenchError) as error:
-            return m, [*misses, Miss("exceptions", 1.0, 0.0, text=f"the recording cannot be read: {error}")]
+            return m, [*misses, Miss("exceptions", 1.0, 0.0, text=f"the recording cannot be read: {in_words(error)}")]
         misses += _measure(m, signals, armed, case.seed, bench.state)
     return m, misses
 

@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
-from hil.errors import BrakebenchError
+from hil.errors import BrakebenchError, in_words
 from hil.validation.reference_car.body import LINKS
 from hil.validation.reference_car.car import NOMINAL, TOLERANCE, Car
 from hil.validation.reference_car.case import Case, Hidden, logs
@@ -82,7 +82,7 @@ def write(case: Case, folder: Path) -> Path:
         path = sealed / "answer.json"
         path.write_text(json.dumps(answer(case), indent=1), encoding="utf-8")
     except OSError as error:
-        raise BrakebenchError(f"{folder}: cannot be written: {error}") from error
+        raise BrakebenchError(f"{folder}: cannot be written: {in_words(error)}") from error
     return path
 
 
@@ -201,7 +201,7 @@ def read_answer(folder: Path) -> dict[str, Any]:
     try:
         opened: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise BrakebenchError(f"{path}: no answer to open: {error}") from error
+        raise BrakebenchError(f"{path}: no answer to open: {in_words(error)}") from error
     return opened
 
 

@@ -53,7 +53,12 @@ def job(what: Job, extension: Path | None = None) -> Numbers:
 
 
 def measure(
-    seeds: int, workers: int, say: Callable[[str], None], store: Store, extension: Path | None = None
+    seeds: int,
+    workers: int,
+    say: Callable[[str], None],
+    store: Store,
+    extension: Path | None = None,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> list[Row]:
     """Drive everything and return the rows, nominal condition first.
 
@@ -61,9 +66,10 @@ def measure(
     ----------
     seeds : of every condition.
     workers : processes.
-    say : takes lines of progress.
+    say : takes lines for people.
     store : numbers that need not be measured again; takes each as it is found.
     extension : of the car to drive beside the nominal one, instead of the paper's other conditions.
+    progress : takes the share that is done.
     """
     conditions = conditions_of(extension)
     jobs = [(case, k, seed) for seed in range(1, seeds + 1) for k in range(len(conditions)) for case in CASES]
@@ -75,8 +81,7 @@ def measure(
         if isinstance(numbers, Killed):
             raise BrakebenchError(f"{what}: ended its worker process {numbers.times} times")
         store.add(what, numbers)
-        if n % 20 == 0 or n == len(missing):
-            say(f"{n} of {len(missing)} cases driven (seed {what[2]}, {conditions[what[1]].name})")
+        progress(n / len(missing))
     found: dict[tuple[str, int], list[Numbers]] = {}
     for what in jobs:
         found.setdefault(what[:2], []).append(store.numbers[what])

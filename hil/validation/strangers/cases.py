@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
-from hil.errors import BrakebenchError
+from hil.errors import BrakebenchError, in_words
 from hil.validation.strangers.brake_by_wire_van import BrakeByWireVan
 from hil.validation.strangers.car import Cause, Hidden, StrangerCar
 from hil.validation.strangers.dead_time import DeadTime
@@ -90,4 +90,4 @@ def write(car: StrangerCar, seed: int, hidden: Hidden | None, folder: Path) -> N
             pa.parquet.write_table(pa.table(dict(table)), folder / f"{k}.parquet")
         (folder / "vehicle.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
     except OSError as error:
-        raise BrakebenchError(f"{folder}: cannot be written: {error}") from error
+        raise BrakebenchError(f"{folder}: cannot be written: {in_words(error)}") from error

@@ -333,7 +333,7 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_progress_tells_the_remaining_time_on_a_terminal_only(monkeypatch):
+def test_progress_tells_the_remaining_time_by_lines_where_it_is_no_terminal(monkeypatch):
     now = [100.0]
     monkeypatch.setattr("hil.cli.progress.monotonic_ns", lambda: int(now[0] * 1e9))
     for stream in (Terminal(), io.StringIO()):
@@ -344,7 +344,16 @@ def test_progress_tells_the_remaining_time_on_a_terminal_only(monkeypatch):
             progress(0.5)
             progress(0.51)
         shown = stream.getvalue()
-        assert shown == ("" if not stream.isatty() else "\rreading   25 %, 30 s left\r" + " " * 25 + "\r")
+        line = "reading   25 %, 30 s left"
+        assert shown == (f"\r{line}\r{' ' * len(line)}\r" if stream.isatty() else f"{line}\n")
+    stream, now[0] = io.StringIO(), 100.0
+    with Progress(1, stream) as progress:
+        for n in range(1000):  # a quarter of a second each
+            now[0] += 0.25
+            progress(n / 1000)
+        progress.tell("a line")
+    assert "\r" not in stream.getvalue()
+    assert len(stream.getvalue().splitlines()) == 10
     assert [duration_text(s) for s in (45, 185, 7800)] == ["45 s", "3 min 05 s", "2 h 10 min"]
 
 

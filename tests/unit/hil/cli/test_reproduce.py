@@ -14,7 +14,7 @@ def quick(monkeypatch):
     asked = []
     monkeypatch.setattr(identification, "shipped_study", lambda: None)
     monkeypatch.setattr(identification, "identification_rows", lambda _: [])
-    monkeypatch.setattr(study, "measure", lambda seeds, workers, say, store, extension: asked.append(seeds) or [ROW])
+    monkeypatch.setattr(study, "measure", lambda seeds, *_: asked.append(seeds) or [ROW])
     return asked
 
 

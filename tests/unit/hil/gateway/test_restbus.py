@@ -138,8 +138,8 @@ def test_edits_that_say_what_is_wrong(make, line, message):
     [
         (("RADIO",), None, "no messages of a node RADIO; ABS, PCM"),
         (("ABS",), "[send.MUXED]", "sent by PCM, not by ABS"),
-        (("ABS",), "[send.NONE]", "unknown NONE"),
-        (("ABS",), "[send.EVENT]\nspeed = 1", "unknown speed; expected cycle_ms, counter, protection, start"),
+        (("ABS",), "[send.NONE]", "unknown key 'NONE'"),
+        (("ABS",), "[send.EVENT]\nspeed = 1", "unknown key 'speed'; known here: cycle_ms, counter, protection, start"),
         (("ABS",), "[send.EVENT]\ncycle_ms = 0.1", "expected 0 .* or at least 1, got 0.1"),
         (("ABS",), "[send.EVENT]\nprotection = 3", "expected {profile = 1, 2, 5 or 11"),
         (("ABS",), "[send.EVENT]\nprotection = {profile = 7}", "expected one of 1, 2, 5, 11, got 7"),

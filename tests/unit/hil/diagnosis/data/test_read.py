@@ -64,7 +64,7 @@ def test_channel_map_scales_signs_and_offsets(tmp_path: Path) -> None:
     [
         ("[speed]\nsignal='v'\n", "unknown channel"),
         ("[speed_mps]\nsignal='v'\nunit='furlong'\n", "unit"),
-        ("[speed_mps]\nscale=2\n", "expected signal"),
+        ("[speed_mps]\nscale=2\n", "expected a table with signal"),
         ("[speed_mps\n", "channel map"),
     ],
 )
