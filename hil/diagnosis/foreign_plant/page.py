@@ -118,9 +118,9 @@ def _contexts(answer: Residuals) -> Section:
 
 def _limits(answer: Residuals) -> Section:
     rows = [
-        ("not named", "causes: the FMU has no effects that could be tried in it; explain without --plant names them")
+        ("causes", "the FMU has no effects that could be tried in it: none is named; explain without --plant does"),
+        ("heat and wear", "each stretch begins with a new instance of the FMU"),
     ]
-    rows += [("no segment carries over", "heat and wear: each stretch begins with a new instance of the FMU")]
     rows += [("not compared", name) for name in answer.json["not_compared"]]
     rows += [("remark", text) for text in answer.json["remarks"]]
     return Section("What this cannot show", tables=(Table("Limits", ("what", "which"), tuple(rows)),))
