@@ -1,6 +1,7 @@
 """Workers of a Dask cluster: beyond one machine (https://distributed.dask.org)."""
 
-from concurrent.futures import Executor
+import logging
+from concurrent.futures import CancelledError, Executor
 from typing import Any
 
 from hil.errors import BrakebenchError, in_words
@@ -32,6 +33,8 @@ class DaskWorkers:
             import distributed
         except ImportError as error:
             raise ClusterError(f"--scheduler needs Dask: {pip_install('campaign')}") from error
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # a lost connection is told below, in one line
+        self.name = f"--scheduler {address}"
         client: Any = distributed.Client
         try:
             self._client = client(address, timeout=_CONNECT_S, set_as_default=False)
@@ -59,6 +62,13 @@ class DaskWorkers:
         from distributed.scheduler import KilledWorker
 
         return isinstance(error, KilledWorker)
+
+    def is_loss(self, error: BaseException) -> bool:
+        """Whether the scheduler is gone: the client has cancelled all it had there, or is closed."""
+        from distributed.client import ClosedClientError
+        from distributed.comm.core import CommClosedError
+
+        return isinstance(error, CancelledError | CommClosedError | ClosedClientError)
 
     def leave(self) -> None:
         """Leave the cluster; it goes on."""

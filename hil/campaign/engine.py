@@ -3,10 +3,12 @@
 import contextlib
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
+from queue import Empty, SimpleQueue
 from typing import Generic, Protocol, TypeVar
 
+from hil.errors import BrakebenchError, Verdict
 from hil.rt.process import abandon, worker_pool
 
 Item = TypeVar("Item")
@@ -18,14 +20,22 @@ _POLL_S = 0.5
 Stopped = Callable[[], bool]
 
 
+class LostError(BrakebenchError):
+    """Workers that are gone as a whole; what was yielded before stands."""
+
+    exit_code = Verdict.INCOMPLETE.exit_code
+
+
 class Workers(Protocol):
     """Processes that take batches.
 
     Attributes
     ----------
+    name : for people.
     count : how many.  kills : workers that have ended when a batch comes back with `is_kill`.
     """
 
+    name: str
     count: int
     kills: int
 
@@ -41,10 +51,15 @@ class Workers(Protocol):
         """Whether a batch was given up because its worker ended."""
         ...
 
+    def is_loss(self, error: BaseException) -> bool:
+        """Whether all workers are out of reach, for good."""
+        ...
+
 
 class LocalWorkers:
     """Processes of this machine; a pool is broken as a whole when one of them ends."""
 
+    name = "workers"
     kills = 1
 
     def __init__(self, count: int) -> None:
@@ -64,6 +79,10 @@ class LocalWorkers:
         """Whether the pool is broken."""
         return isinstance(error, BrokenExecutor)
 
+    def is_loss(self, _error: BaseException) -> bool:
+        """Never: a new pool can be opened."""
+        return False
+
 
 @dataclass(frozen=True)
 class Killed:
@@ -79,7 +98,29 @@ class _Work(Generic[Item, Result]):
     stopped: Stopped
 
     def submit(self, executor: Executor, batch: Sequence[Item]) -> "Future[list[Result]]":
-        return executor.submit(_each, self.function, batch)
+        with self.loss_told():
+            return executor.submit(_each, self.function, batch)
+
+    def error(self, future: "Future[list[Result]]") -> BaseException | None:
+        """What a batch that has ended was raised."""
+        with self.loss_told():
+            error = future.exception()
+            if error is not None and self.workers.is_loss(error):
+                raise error
+        return error
+
+    @contextlib.contextmanager
+    def loss_told(self) -> Iterator[None]:
+        """Say in words that the workers are gone."""
+        try:
+            yield
+        except Exception as error:
+            if not self.workers.is_loss(error):
+                raise
+            raise LostError(
+                f"{self.workers.name}: has ended, or cannot be reached any more; what was written before stands; start "
+                "it again, and the same command goes on"
+            ) from error
 
 
 def work(
@@ -93,6 +134,10 @@ def work(
     Batches during which a worker ended are done again one by one; one that ends its worker again is done by its single
     items, and an item that ends its worker `MOST_KILLS` times is `Killed`. What ``function`` raises is raised. Once
     ``stopped``, nothing new begins, and what is under way is given up.
+
+    Raises
+    ------
+    LostError : the workers are out of reach as a whole.
     """
     queue, job = iter(batches), _Work(function, workers, stopped)
     suspects: deque[Sequence[Item]] = deque()
@@ -128,26 +173,35 @@ def _together(
 ) -> Iterator[tuple[Sequence[Item], list[Result | Killed]]]:
     """Until the queue is empty, or a worker has ended: then ``suspects`` are all batches that it may have had."""
     under_way: dict[Future[list[Result]], Sequence[Item]] = {}
+    ended: SimpleQueue[Future[list[Result]]] = SimpleQueue()  # asking thousands of futures each time would cost more
     while not job.stopped():
         while not suspects and len(under_way) < _AHEAD * job.workers.count:
             batch = next(queue, None)
             if batch is None:
                 break
             try:
-                under_way[job.submit(executor, batch)] = batch
+                future = job.submit(executor, batch)
             except BrokenExecutor:
                 suspects.append(batch)
+                continue
+            under_way[future] = batch
+            future.add_done_callback(ended.put)
         if not under_way:
             return
-        for future in wait(under_way, timeout=_POLL_S, return_when=FIRST_COMPLETED).done:
-            batch = under_way.pop(future)
-            error = future.exception()
-            if error is None:
-                yield batch, [*future.result()]
-            elif job.workers.is_kill(error):
-                suspects.append(batch)
-            elif not job.stopped():
-                raise error
+        try:
+            future = ended.get(timeout=_POLL_S)
+        except Empty:
+            continue
+        batch = under_way.pop(future)
+        if job.stopped() and future.cancelled():
+            continue
+        error = job.error(future)
+        if error is None:
+            yield batch, [*future.result()]
+        elif job.workers.is_kill(error):
+            suspects.append(batch)
+        elif not job.stopped():
+            raise error
 
 
 def _alone(
@@ -183,7 +237,7 @@ def _attempt(batch: Sequence[Item], job: _Work[Item, Result]) -> list[Result] | 
         future = job.submit(executor, batch)
         while not job.stopped():
             if wait([future], timeout=_POLL_S).done:
-                error = future.exception()
+                error = job.error(future)
                 if error is None:
                     return future.result()
                 if job.workers.is_kill(error):

@@ -72,32 +72,27 @@ def _run_missing(plan: "Plan", store: "Store", args: argparse.Namespace, stop: A
     import os
 
     from hil.campaign.dask_workers import DaskWorkers
-    from hil.campaign.engine import Killed, LocalWorkers, Workers, work
-    from hil.campaign.tasks import killed
+    from hil.campaign.engine import LocalWorkers, Workers
+    from hil.campaign.perform import perform
     from hil.cli.progress import Progress
     from hil.rt.clock import monotonic_ns
 
-    missing = list(store.missing())
+    missing = len(list(store.missing()))
     if not missing:
         return None
-    if len(missing) < plan.parts:
-        print(f"{plan.parts - len(missing)} of {plan.parts} parts stand in {store.folder}; going on", file=sys.stderr)
-    workers: Workers
-    if args.scheduler is not None:
-        workers = DaskWorkers(args.scheduler)
-    else:
-        workers = LocalWorkers(min(args.workers or os.cpu_count() or 1, len(missing)))
+    if missing < plan.parts:
+        print(f"{plan.parts - missing} of {plan.parts} parts stand in {store.folder}; going on", file=sys.stderr)
+
+    def open_workers(parts: int) -> Workers:
+        if args.scheduler is not None:
+            return DaskWorkers(args.scheduler)
+        return LocalWorkers(min(args.workers or os.cpu_count() or 1, parts))
+
     began_ns, runs = monotonic_ns(), 0
-    batches = (plan.part(number) for number in missing)
     with Progress().part(0, f"{plan.size} runs") as progress:
-        for n, (batch, results) in enumerate(work(batches, plan.runner, workers, lambda: stop.asked), 1):
-            done = [
-                killed(run, result.times) if isinstance(result, Killed) else result
-                for run, result in zip(batch, results, strict=True)
-            ]
-            store.add(batch[0].number // plan.part_size, done)
-            runs += len(done)
-            progress(n / len(missing))
+        for n, done in enumerate(perform(plan, store, open_workers, lambda: stop.asked), 1):
+            runs += done
+            progress(n / missing)
     return runs / ((monotonic_ns() - began_ns) * 1e-9)
 
 

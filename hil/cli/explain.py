@@ -7,6 +7,7 @@ from pathlib import Path
 
 from hil.cli.options import add_json, out_folder
 from hil.diagnosis.data.log import UnusableError
+from hil.errors import BrakebenchError
 from hil.log.samples import log_path
 from hil.rt.clock import monotonic_ns
 
@@ -29,7 +30,11 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--vehicle", type=Path, metavar="SET.toml", help="the vehicle's parameters (default: the shipped car)"
     )
     parser.add_argument("--dbc", type=Path, metavar="FILE", help="another car's DBC, with --map")
-    parser.add_argument("--map", type=Path, metavar="CHANNELS.toml", help="which signal is which channel")
+    parser.add_argument(
+        "--map", type=Path, action="append", default=[], metavar="FILE",
+        help="CHANNELS.toml: which signal is which channel; with --plant MAP.toml: which is which variable of the FMU; "
+        "both with --plant and another car's logs",
+    )  # fmt: skip
     parser.add_argument(
         "--logs", dest="about", type=Path, metavar="LOGS.toml", help="direction, disc temperature per file"
     )
@@ -38,6 +43,10 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="logs of the same car from before something changed, or a folder of them: the change is explained",
     )  # fmt: skip
     parser.add_argument("--extend", type=Path, metavar="FILE", help="extension to start from")
+    parser.add_argument(
+        "--plant", type=Path, metavar="FMU",
+        help="instead: what somebody else's plant gets wrong, with --map MAP.toml; names no cause (docs/fmu.md)",
+    )  # fmt: skip
     parser.add_argument(
         "--out", type=out_folder, metavar="DIR", help="write report.html, report.png, result.json, extension.toml"
     )
@@ -48,10 +57,13 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 def run(args: argparse.Namespace) -> int:
     """Explain and print."""
     from hil.diagnosis.explain import explain
+    from hil.diagnosis.foreign_plant.page import build_report as residuals_report
+    from hil.diagnosis.foreign_plant.residuals import Residuals, residuals
     from hil.diagnosis.manoeuvres.coast_down import CoastDown
     from hil.diagnosis.manoeuvres.coast_down_page import build_report as coast_report
     from hil.diagnosis.manoeuvres.stop_figures import StopFigures
     from hil.diagnosis.manoeuvres.stop_figures import build_report as stops_report
+    from hil.diagnosis.result.answer import Answer
     from hil.diagnosis.result.page import build_report
     from hil.diagnosis.sensor_consistency.check import Consistency
     from hil.diagnosis.sensor_consistency.page import build_report as sensor_report
@@ -61,18 +73,28 @@ def run(args: argparse.Namespace) -> int:
     def progress(text: str) -> None:
         print(f"{(monotonic_ns() - begun_ns) * 1e-9:5.0f} s  {text} ...", file=sys.stderr, flush=True)
 
+    channel_map, plant_map = _maps(args)
+    answer: Answer | Consistency | CoastDown | StopFigures | Residuals
     try:
-        answer = explain(
-            list(args.logs), args.vehicle, channel_map=args.map, database=args.dbc, about=args.about,
-            extend=args.extend, out=args.out, reference=args.reference, progress=progress,
-        )  # fmt: skip
+        if plant_map is not None:
+            answer = residuals(
+                list(args.logs), args.plant, plant_map, args.vehicle, channel_map=channel_map, database=args.dbc,
+                about=args.about, progress=progress,
+            )  # fmt: skip
+        else:
+            answer = explain(
+                list(args.logs), args.vehicle, channel_map=channel_map, database=args.dbc, about=args.about,
+                extend=args.extend, out=args.out, reference=args.reference, progress=progress,
+            )  # fmt: skip
     except UnusableError as error:
         if not args.json:
             raise
         print(json.dumps(_unusable(str(error)), indent=2))
         return error.exit_code
     sources = [str(path) for path in args.logs]
-    if isinstance(answer, CoastDown):
+    if isinstance(answer, Residuals):
+        report = residuals_report(answer, sources)
+    elif isinstance(answer, CoastDown):
         report = coast_report(answer, sources)
     elif isinstance(answer, StopFigures):
         report = stops_report(answer, sources)
@@ -98,6 +120,23 @@ def run(args: argparse.Namespace) -> int:
 
         print_text(report, sys.stdout)
     return 0
+
+
+def _maps(args: argparse.Namespace) -> tuple[Path | None, Path | None]:
+    """The channel map and, with --plant, that of the FMU, which has outputs."""
+    from hil.fmu.plant_map import is_plant_map
+
+    if args.plant is None:
+        if len(args.map) > 1:
+            raise BrakebenchError("--map: expected one; a second one goes with --plant")
+        return (args.map[0] if args.map else None), None
+    if args.reference is not None or args.extend is not None:
+        raise BrakebenchError("--plant compares an FMU with logs: leave out --reference and --extend")
+    of_plant = [path for path in args.map if is_plant_map(path)]
+    of_logs = [path for path in args.map if path not in of_plant]
+    if len(of_plant) != 1 or len(of_logs) > 1:
+        raise BrakebenchError("--plant FMU: give it with one --map MAP.toml that has [outputs] (docs/fmu.md)")
+    return (of_logs[0] if of_logs else None), of_plant[0]
 
 
 def _unusable(why: str) -> dict[str, object]:

@@ -80,8 +80,13 @@ def run(args: argparse.Namespace) -> int:
         from hil.log.export.mcap_file import check_extra as check_mcap
 
         check_mcap(Path("recording.mcap"))
-    if (args.plant is None) != (args.map is None) or (args.plant is not None and not args.virtual):
-        raise BrakebenchError("--plant FMU: give it with --map MAP.toml and --virtual")
+    if (args.plant is None) != (args.map is None):
+        raise BrakebenchError("--plant FMU goes with --map MAP.toml; give both or neither")
+    if args.plant is not None and not args.virtual:
+        raise BrakebenchError(
+            "--plant: an FMU states a step, but not how long it takes to compute, so no tick could be promised in real "
+            "time; add --virtual"
+        )
     scenario, out = args.scenario, args.out
     if args.extend is not None:
         from hil.bench.run import new_folder
@@ -96,8 +101,10 @@ def run(args: argparse.Namespace) -> int:
     foreign = None
     if args.plant is not None:
         from hil.fmu.foreign_plant import open_plant
+        from hil.scenario.scenario import load_scenario
 
-        foreign = open_plant(args.plant, args.map, args.seed)
+        start_mps = load_scenario(scenario).manoeuvre.initial_speed_mps
+        foreign = open_plant(args.plant, args.map, args.seed, start_mps)
         print(f"plant {foreign}", file=sys.stderr, flush=True)
     with foreign or contextlib.nullcontext():
         outcome = run_scenario(

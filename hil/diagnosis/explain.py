@@ -71,17 +71,16 @@ def explain(
     """
     report = progress or (lambda _: None)
     folder = None if out is None else Path(out)
-    car = _vehicle(vehicle)
+    car = vehicle_of(vehicle)
     radius_m = float(car.parameters.wheel.rolling_radius_m)
 
     def given(items: Any) -> list[Log]:
-        found = _logs(items, car, channel_map, database, about, vehicle is not None)
-        return list(with_both_axles(with_paired_wheels(found)))
+        return logs_of(items, car, channel_map, database, about, vehicle is not None)
 
     read = given(logs)
     before = [] if reference is None else _named_reference(given(reference))
     if vehicle is None:
-        _refuse_another_car([*read, *before])
+        refuse_another_car([*read, *before])
     if reference is not None:
         read, before, notes = with_shared_channels(read, before, radius_m)
         _refuse_unsimulated([*before, *read], car)
@@ -132,7 +131,8 @@ def shipped(path: Path, kind: str) -> Path:
     return ours if not path.suffix and not path.exists() and ours.exists() else path
 
 
-def _vehicle(vehicle: Path | str | Mapping[str, Any] | None) -> Vehicle:
+def vehicle_of(vehicle: Path | str | Mapping[str, Any] | None) -> Vehicle:
+    """The vehicle of a set, given as `explain` takes it."""
     if vehicle is None or str(vehicle) == _SHIPPED_CAR:
         return load_vehicle(None)
     return load_vehicle(shipped(Path(vehicle), "vehicle") if isinstance(vehicle, str | Path) else vehicle)
@@ -154,7 +154,7 @@ def _refuse_unsimulated(logs: Sequence[Log], car: Vehicle) -> None:
         )
 
 
-def _refuse_another_car(logs: Sequence[Log]) -> None:
+def refuse_another_car(logs: Sequence[Log]) -> None:
     """Refuse files that nobody said whose they are: only recordings of our own bus are of the shipped car."""
     others = [log.name for log in logs if log.another_car]
     if others:
@@ -167,9 +167,16 @@ def _refuse_another_car(logs: Sequence[Log]) -> None:
         )
 
 
-def _logs(
+def logs_of(
     logs: Any, car: Vehicle, channel_map: Path | None, database: Path | None, about: Path | None, stated: bool
-) -> Sequence[Log]:
+) -> list[Log]:
+    """Logs given as `explain` takes them; ``stated`` where a vehicle set was given."""
+    return list(with_both_axles(with_paired_wheels(_read(logs, car, channel_map, database, about, stated))))
+
+
+def _read(
+    logs: Any, car: Vehicle, channel_map: Path | None, database: Path | None, about: Path | None, stated: bool
+) -> list[Log]:
     items = list(logs) if isinstance(logs, list | tuple) else [logs]
     mapped = (
         None

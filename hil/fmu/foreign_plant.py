@@ -1,7 +1,6 @@
 """Somebody else's FMU in the place of our car: a node of the bench around it."""
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Self
 
@@ -21,8 +20,31 @@ from plant.demands import DEMANDS, Demands
 from plant.manoeuvre import value_at
 from plant.node import STANDING_MPS
 
-TICK_S = 0.01
 _ROUNDING = 1e-6  # of a step
+
+
+def checked_step_s(fmu: ForeignFmu, chart: PlantMap) -> float:
+    """The step to take, s.
+
+    Raises
+    ------
+    FmuError : the FMU has not what the chart names, or states no step; it is closed then.
+    """
+    known = set(fmu.told["outputs"])
+    odd = [name for name in (*chart.inputs, *chart.wanted) if name not in known]
+    if odd:
+        fmu.close()
+        raise FmuError(f"{fmu.name}: has no number {', '.join(odd)}; correct the map")
+    step_s: float = chart.step_s or fmu.told["step_s"]
+    if not step_s > 0.0:
+        fmu.close()
+        raise FmuError(f"{fmu.name}: states no step; give step_s in the map")
+    return step_s
+
+
+def steps_until(time_s: float, step_s: float) -> int:
+    """Whole steps of ``step_s`` within ``time_s`` since the start."""
+    return int(time_s / step_s + _ROUNDING)
 
 
 class ForeignPlant:
@@ -43,15 +65,7 @@ class ForeignPlant:
 
     def __init__(self, fmu: ForeignFmu, chart: PlantMap, scenario: Scenario, seed: int) -> None:
         self._fmu, self._map, self._manoeuvre = fmu, chart, scenario.manoeuvre
-        known = set(fmu.told["outputs"])
-        odd = [name for name in (*chart.inputs, *chart.wanted) if name not in known]
-        if odd:
-            fmu.close()
-            raise FmuError(f"{fmu.name}: has no number {', '.join(odd)}; correct the map")
-        self.step_s = chart.step_s or fmu.told["step_s"]
-        if not self.step_s > 0.0:
-            fmu.close()
-            raise FmuError(f"{fmu.name}: states no step; give step_s in the map")
+        self.step_s = checked_step_s(fmu, chart)
         self._receiver = Receiver((*DEMANDS, StimulusDriver))
         self._demands = Demands(self._receiver, scenario.plant.ehb)
         self._batch = Batch(SENT)
@@ -97,9 +111,7 @@ class ForeignPlant:
         return self._batch.frames(now_ns)
 
     def _advance(self, now_ns: int) -> None:
-        due = 0
-        if self._start_ns is not None:
-            due = int((now_ns - self._start_ns) * 1e-9 / self.step_s + _ROUNDING)
+        due = 0 if self._start_ns is None else steps_until((now_ns - self._start_ns) * 1e-9, self.step_s)
         steps = due - self._steps
         if steps > 0 or not self._values:
             inputs = {name: self._value(source) for name, source in self._map.inputs.items()}
@@ -109,8 +121,7 @@ class ForeignPlant:
             self._steps = due
 
     def _value(self, source: Source, noisy: bool = False) -> float:
-        of: Mapping[str, Mapping[str, float]] = {"fmu": self._values, "signal": self._asked, "value": {"": 1.0}}
-        total = sum(of[term.kind][term.name] * term.factor for term in source.terms)
+        total = source.value(self._values, self._asked, 1.0)
         return total + (source.noise * self._random.standard_normal() if noisy and source.noise else 0.0)
 
     def _follow(self, now_ns: int, elapsed_ns: int) -> None:
@@ -161,8 +172,8 @@ class OpenPlant:
         self._fmu.close()
 
 
-def open_plant(fmu: Path, chart: Path, seed: int) -> OpenPlant:
-    """Read a map and load the FMU with its parameters.
+def open_plant(fmu: Path, chart: Path, seed: int, start_mps: float) -> OpenPlant:
+    """Read a map and load the FMU with its parameters, to start at ``start_mps``.
 
     Raises
     ------
@@ -170,4 +181,4 @@ def open_plant(fmu: Path, chart: Path, seed: int) -> OpenPlant:
     FmuError : the FMU cannot be loaded.
     """
     found = load_plant_map(chart)
-    return OpenPlant(ForeignFmu(fmu, found.parameters), found, seed)
+    return OpenPlant(ForeignFmu(fmu, found.parameters_at(start_mps)), found, seed)

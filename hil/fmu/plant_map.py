@@ -1,10 +1,13 @@
 """MAP.toml: which signal is which variable of somebody else's FMU."""
 
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from dbc.contract import Message, spec_of
 from dbc.messages import EhbDemandFront, EhbDemandRear, MotorDemandFront, MotorDemandRear
@@ -15,6 +18,7 @@ DEMANDS: tuple[type[Message], ...] = (EhbDemandFront, EhbDemandRear, MotorDemand
 DRIVER = ("DRIVER.PEDAL", "DRIVER.STEERING_WHEEL_ANGLE", "DRIVER.TARGET_SPEED")
 SENT: tuple[type[Message], ...] = (*(kind for of in OF_NODES.values() for kind in of), *TRUTH)
 SPEED = "TRUTH_MOTION.SPEED"
+Values = TypeVar("Values", float, NDArray[np.float64])
 _OWN = frozenset({"TRUTH_MOTION.MANOEUVRE"})
 
 
@@ -44,6 +48,25 @@ class Source:
     terms: tuple[Term, ...]
     noise: float = 0.0
 
+    @property
+    def is_of_fmu(self) -> bool:
+        """Whether the FMU has a say in it."""
+        return any(term.kind == "fmu" for term in self.terms)
+
+    def value(self, fmu: Mapping[str, Values], asked: Mapping[str, Values], one: Values) -> Values:
+        """The sum without noise.
+
+        Parameters
+        ----------
+        fmu, asked : variables of the FMU, and `ASKED`, by name: numbers, or arrays of one shape.
+        one : 1, of the same shape.
+        """
+        total = 0.0 * one
+        for term in self.terms:
+            of = one if term.kind == "value" else fmu[term.name] if term.kind == "fmu" else asked[term.name]
+            total = total + of * term.factor
+        return total
+
 
 @dataclass(frozen=True, slots=True)
 class PlantMap:
@@ -53,6 +76,7 @@ class PlantMap:
     ----------
     step_s : 0 for the step that the FMU states.
     parameters : set before its initialisation.
+    start_speed : the parameter that takes the speed at the start, and its unit in m/s by a factor; None for none.
     inputs : by variable of the FMU.  outputs : by signal.
     """
 
@@ -60,6 +84,12 @@ class PlantMap:
     parameters: dict[str, float]
     inputs: dict[str, Source]
     outputs: dict[str, Source]
+    start_speed: Term | None = None
+
+    def parameters_at(self, speed_mps: float) -> dict[str, float]:
+        """Parameters for a start at a speed, m/s."""
+        start = self.start_speed
+        return self.parameters if start is None else self.parameters | {start.name: speed_mps * start.factor}
 
     @property
     def wanted(self) -> list[str]:
@@ -75,21 +105,18 @@ def load_plant_map(path: Path) -> PlantMap:
     ------
     ScenarioError : unreadable, an unknown signal or key, no speed.
     """
-    try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ScenarioError(f"{path}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{path}: not valid TOML: {error}") from error
+    values = _read(path)
     top = Table(values, path.name, Files(path.parent))
     parameters, inputs, outputs = top.table("parameters"), top.table("inputs"), top.table("outputs")
     step_s = top.number("step_s", 0.0, 0.0, 1.0)
+    start_speed = _start_speed(top)
     top.done()
     found = PlantMap(
         step_s,
         {name: parameters.number(name, None) for name in _keys(values, "parameters")},
         {name: _source(inputs, name, "signal") for name in _keys(values, "inputs")},
         {name: _source(outputs, name, "fmu") for name in _keys(values, "outputs")},
+        start_speed,
     )
     for name in found.outputs:
         if name not in TOLD:
@@ -99,9 +126,39 @@ def load_plant_map(path: Path) -> PlantMap:
     return found
 
 
+def is_plant_map(path: Path) -> bool:
+    """Whether a file says what an FMU gives, as no other map does.
+
+    Raises
+    ------
+    ScenarioError : unreadable.
+    """
+    return "outputs" in _read(path)
+
+
+def _read(path: Path) -> dict[str, object]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read ({error.strerror})") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: not valid TOML: {error}") from error
+
+
 def _keys(values: dict[str, object], table: str) -> Iterator[str]:
     found = values.get(table, {})
     return iter(list(found)) if isinstance(found, dict) else iter(())
+
+
+def _start_speed(top: Table) -> Term | None:
+    if not top.has("start_speed"):
+        return None
+    if isinstance(top.peek("start_speed"), str):
+        return Term("fmu", top.text("start_speed"))
+    inner = top.table("start_speed")
+    found = Term("fmu", inner.text("fmu"), inner.number("factor", 1.0))
+    inner.done()
+    return found
 
 
 def _source(table: Table, name: str, plain: Literal["fmu", "signal"]) -> Source:

@@ -6,6 +6,7 @@ import os
 import re
 import shlex
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -140,6 +141,54 @@ def test_dask_workers_give_the_same_and_what_kills_them_is_named(campaign, tmp_p
         workers.leave()
     assert [row["verdict"] for row in rows] == ["passed"] * 5 + ["killed"] + ["passed"] * 3
     assert len(log.read_text().splitlines()) == 4
+
+
+def test_a_killed_scheduler_ends_it_in_words_and_the_same_command_goes_on(brakebench, start, campaign, tmp_path):
+    pytest.importorskip("distributed", reason="pip install 'brakebench[campaign]'")
+    many, address = campaign(60), f"tcp://127.0.0.1:{free_port()}"
+
+    def cluster():
+        """A scheduler and its worker, as the page starts them."""
+        dask = [sys.executable, "-m", "dask"]
+        host, port = ("--host", "127.0.0.1"), address.rpartition(":")[2]
+        scheduler = start("scheduler", *host, "--port", port, "--no-dashboard", program=dask)
+        return scheduler, start("worker", address, *host, "--nthreads", "1", "--no-dashboard", program=dask)
+
+    words = ("campaign", many, "--out", "out", "--scheduler", address)
+    scheduler, _ = cluster()
+    wait_until(lambda: has_worker(address), "the worker", 60)
+    first = start(*words)
+    wait_until(lambda: len(parts(tmp_path / "out")) > 3, "some results", 120)
+    scheduler.kill()
+    _, said = first.communicate(timeout=120)
+    assert first.returncode == Verdict.INCOMPLETE.exit_code, said
+    assert f"--scheduler {address}: has ended, or cannot be reached any more; what was written before stands" in said
+    assert "Traceback" not in said
+    kept = {path.name: path.stat().st_mtime_ns for path in parts(tmp_path / "out")}
+    assert 3 < len(kept) < 60
+    cluster()
+    wait_until(lambda: has_worker(address), "the new worker", 60)
+    done = brakebench(*words)
+    assert f"{len(kept)} of 60 parts stand in out; going on" in done.stderr
+    assert all((tmp_path / "out" / "results" / name).stat().st_mtime_ns == at for name, at in kept.items())
+    brakebench("campaign", many, "--out", "calm", "--workers", "1")
+    assert content(tmp_path / "out") == content(tmp_path / "calm")
+
+
+def free_port():
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+def has_worker(address):
+    from distributed import Client
+
+    try:
+        with Client(address, timeout=1, set_as_default=False) as client:
+            return bool(client.nthreads())
+    except OSError:
+        return False
 
 
 def test_nobody_at_the_scheduler_is_said(brakebench, campaign):

@@ -34,7 +34,7 @@ _UNDEMANDED_S, _RELEASE_S = 0.5, 0.5
 """Least time without a demand that contradicts one, and how long after a demand a release may take, s."""
 _STATE_OF_CHARGE = 0.7  # where no log has it
 _LEAST_MOVING_S = 4.0
-_TRACK = {
+TRACK = {
     "wheel": WHEEL_SPEED, "pressure": PRESSURE, "motor": MOTOR_TORQUE,
     "ax": ("ax_mps2",), "ay": ("ay_mps2",), "yaw": ("yaw_rate_rad_s",), "gps": ("speed_mps",),
 }  # fmt: skip
@@ -68,7 +68,7 @@ def prepare(logs: Sequence[Log], radius_m: float, unstated: Collection[str] = ()
     mask[CUT.slice("pressure")] = 1.0 if pressure else 0.0
     mask[CUT.slice("motor_torque")] = 1.0 if torque else 0.0
     mask[CUT.slice("motor_speed")] = 1.0 if set(WHEEL_SPEED) <= common else 0.0
-    groups = [name for name, names in _TRACK.items() if set(names) <= common]
+    groups = [name for name, names in TRACK.items() if set(names) <= common]
     if "wheel" not in groups and set(WHEEL_SPEED) & common:
         groups.insert(0, "wheel")  # some wheels only: the others are empty
     for name, demand in (("pressure", pressure_demand), ("motor", torque_demand)):
@@ -277,8 +277,8 @@ def _segment_bounds(rows: _Rows, stride: int) -> list[int]:
 
 def _measured(log: Log, group: str, grid_s: Floats, stride: int) -> Floats:
     """Channels of a group of tracks, (samples, channels); NaN where nothing was measured."""
-    values = averaged(np.column_stack([resampled(log, channel, grid_s) for channel in _TRACK[group]]), stride)
-    for k, channel in enumerate(_TRACK[group]):
+    values = averaged(np.column_stack([resampled(log, channel, grid_s) for channel in TRACK[group]]), stride)
+    for k, channel in enumerate(TRACK[group]):
         values[~has_sample(log, channel, float(grid_s[0]), len(values), stride), k] = np.nan
     if group in _FILTERED:
         values[: int(np.ceil(_FILTER_S / (stride * ROW_S)))] = np.nan

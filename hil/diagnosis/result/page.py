@@ -15,7 +15,15 @@ from hil.diagnosis.result import reference
 from hil.diagnosis.result.answer import Answer
 from hil.diagnosis.result.channels_table import channels_section
 from hil.diagnosis.result.cross_validation import probabilities
-from hil.diagnosis.result.page_parts import EXTENDED, NOMINAL, binned_curve, comparison_panels, limits, log_lane
+from hil.diagnosis.result.page_parts import (
+    EXTENDED,
+    NOMINAL,
+    binned_curve,
+    comparison_panels,
+    joined_time,
+    limits,
+    log_lane,
+)
 from hil.diagnosis.result.page_tables import goodness_of_fit, held_out, moved, numbers, scaled
 from hil.diagnosis.result.phrases import place
 from hil.report.report import Chart, Curve, Lane, Panel, Report, Section, Table, Verdict
@@ -57,18 +65,6 @@ def build_report(answer: Answer, sources: Sequence[str]) -> Report:
     )  # fmt: skip
 
 
-def _joined_time(answer: Answer) -> tuple[Floats, Floats]:
-    """Time over all logs, one after the other, (samples,), and where each log begins."""
-    times, gaps, begin = [], [], 0.0
-    for recording in answer.diagnosis.dataset.recordings:
-        times.append(begin + np.arange(recording.samples) * answer.diagnosis.dataset.sample_s)
-        gap = np.zeros(recording.samples, bool)
-        gap[0] = True
-        gaps.append(gap)
-        begin = float(times[-1][-1]) + 1.0
-    return np.concatenate(times), np.concatenate(gaps)
-
-
 def _mean(values: Floats) -> Floats:
     """Mean of the known channels of each row; NaN where none is known."""
     known = np.isfinite(values).sum(axis=1)
@@ -78,7 +74,7 @@ def _mean(values: Floats) -> Floats:
 def _comparison(answer: Answer) -> Section:
     """Measured, nominal and extended over all logs, the residuals below."""
     diagnosis = answer.diagnosis
-    t, gaps = _joined_time(answer)
+    t, gaps = joined_time(diagnosis.dataset)
     measured = diagnosis.fitter.simulator.measured()
     panels: list[Panel] = []
     for group, title in _PANELS:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from hil.diagnosis.data.dataset import Dataset
 from hil.diagnosis.data.log import Floats
 from hil.report.report import Cell, Curve, Lane, Panel, Section, Span, Table, Trace
 from hil.report.units import Unit
@@ -30,6 +31,18 @@ def comparison_panels(
         Panel(title, unit, (Trace("measured", t_s, measured, "measured"), *traces)),
         Panel(f"{title.split(',')[0]}: residual", unit, tuple(residuals)),
     ]
+
+
+def joined_time(dataset: Dataset) -> tuple[Floats, Floats]:
+    """Time over all logs, one after the other, (samples,), and where each log begins."""
+    times, gaps, begin = [], [], 0.0
+    for recording in dataset.recordings:
+        times.append(begin + np.arange(recording.samples) * dataset.sample_s)
+        gap = np.zeros(recording.samples, bool)
+        gap[0] = True
+        gaps.append(gap)
+        begin = float(times[-1][-1]) + 1.0
+    return np.concatenate(times), np.concatenate(gaps)
 
 
 def log_lane(names: Sequence[str], begins_s: Sequence[float], end_s: float) -> Lane:

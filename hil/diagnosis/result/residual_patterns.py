@@ -43,7 +43,7 @@ class ResidualPattern:
 def residual_patterns(diagnosis: Diagnosis) -> list[ResidualPattern]:
     """The pattern of every channel in the simulation of the nominal vehicle."""
     masks = diagnosis.fitter.masks
-    variables = _variables(diagnosis.dataset)
+    variables = variables_of(diagnosis.dataset)
     expected = _expected(diagnosis, masks)
     patterns = []
     for name in masks.names:
@@ -62,7 +62,8 @@ def _expected(diagnosis: Diagnosis, masks: SampleMasks) -> dict[str, float]:
     return {name: float(np.sqrt(np.mean(final[name][known[name], 0] ** 2))) for name in masks.names}
 
 
-def _variables(dataset: Dataset) -> dict[str, Floats]:
+def variables_of(dataset: Dataset) -> dict[str, Floats]:
+    """What a residual may go with, (samples,) over all recordings by name."""
     parts: dict[str, list[Floats]] = {}
     for recording in dataset.recordings:
         at = np.arange(recording.samples) * recording.stride

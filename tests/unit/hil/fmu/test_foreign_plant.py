@@ -57,7 +57,7 @@ def stopping_distance_m(signals):
 
 
 def test_our_own_car_as_an_fmu_stops_where_our_car_stops(car):
-    with open_plant(*car, seed=1) as plant:
+    with open_plant(*car, 1, 20.0) as plant:
         assert "steps of 1 ms" in str(plant)
         theirs = simulate(SCENARIO, plant=plant.node(SCENARIO))
     assert stopping_distance_m(theirs) == pytest.approx(stopping_distance_m(simulate(SCENARIO)), abs=1.0)
@@ -100,7 +100,7 @@ def test_a_stall_ends_with_the_fmus_name(car):
 def test_a_map_that_does_not_fit_is_refused_and_nothing_is_left(car, tmp_path, edit, words):
     (tmp_path / "map.toml").write_text(car[1].read_text().replace(*edit))
     with pytest.raises(FmuError, match=words):
-        open_plant(car[0], tmp_path / "map.toml", 1).node(SCENARIO)
+        open_plant(car[0], tmp_path / "map.toml", 1, 20.0).node(SCENARIO)
     assert held(None) == []
 
 
@@ -115,7 +115,9 @@ def test_what_is_no_fmu_is_refused(tmp_path):
 def test_a_map_needs_its_fmu_and_virtual_time(capsys):
     assert main(["run", "--map", "map.toml", "--virtual"]) == 2
     assert main(["run", "--map", "map.toml", "--plant", "x.fmu"]) == 2
-    assert "--plant FMU: give it with --map MAP.toml and --virtual" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "--plant FMU goes with --map MAP.toml; give both or neither" in said
+    assert "no tick could be promised in real time; add --virtual" in said
 
 
 def crane(name):
@@ -126,7 +128,7 @@ def crane(name):
 
 def test_anothers_mass_and_damper_is_braked_by_the_controllers_pressures(tmp_path):
     (tmp_path / "mass.toml").write_text(MASS)
-    with open_plant(crane("HarmonicOscillator6D"), tmp_path / "mass.toml", 1) as plant:
+    with open_plant(crane("HarmonicOscillator6D"), tmp_path / "mass.toml", 1, 20.0) as plant:
         assert str(plant).endswith("steps of 10 ms")
         signals = simulate(SCENARIO, plant=plant.node(SCENARIO))
     time_s, speed = signals.get("TRUTH_MOTION.SPEED")
@@ -144,7 +146,7 @@ def test_anothers_mass_and_damper_is_braked_by_the_controllers_pressures(tmp_pat
 
 def test_anothers_force_generator_is_a_car_whose_speed_swings(tmp_path):
     (tmp_path / "wave.toml").write_text('[outputs]\n"TRUTH_MOTION.SPEED" = { fmu = "f[0]", offset = 20.0 }\n')
-    with open_plant(crane("DrivingForce"), tmp_path / "wave.toml", 1) as plant:
+    with open_plant(crane("DrivingForce"), tmp_path / "wave.toml", 1, 20.0) as plant:
         signals = simulate(SCENARIO, plant=plant.node(SCENARIO))
     speed = signals.get("TRUTH_MOTION.SPEED")[1]
     assert (speed.min(), speed.max()) == pytest.approx((17.0, 23.0), abs=0.05)  # its amplitude is 3
