@@ -6,6 +6,7 @@ import json
 from dataclasses import asdict
 
 from hil.cli.options import add_json
+from hil.cli.progress import Progress
 from hil.errors import BrakebenchError
 
 MEASUREMENTS = ("rt", "plant", "ecu", "codec", "loop", "decode", "explain", "live")
@@ -26,7 +27,8 @@ def run(args: argparse.Namespace) -> int:
     module = importlib.import_module(f"hil.validation.perf.{args.name}")
     if args.beside is not None and args.name != "loop":
         raise BrakebenchError(f"--beside goes with perf loop, not with perf {args.name}")
-    rows = module.measure() if args.beside is None else module.beside(args.beside)
+    with Progress().part(0, f"perf {args.name}") as progress:
+        rows = module.measure(progress) if args.beside is None else module.beside(args.beside)
     if args.json:
         print(json.dumps({"rows": [asdict(row) for row in rows]}, indent=2))
         return 0

@@ -68,7 +68,10 @@ class Screen:
             lines += 5 + len(codes)
         parts += [Text(printable(event), _FAIR, no_wrap=True, overflow="crop") for event in self._events]
         lines += len(self._events)
-        parts.append(self._messages(state, width, None if height is None else max(2, height - lines)))
+        if state["rows"]:
+            parts.append(self._messages(state, width, None if height is None else max(2, height - lines)))
+        else:
+            parts.append(Text("nothing has come on the buses yet", _FAIR))
         return Group(*parts)
 
     def _value(self, name: str) -> float | None:

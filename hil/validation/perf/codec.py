@@ -9,7 +9,7 @@ from hil.bench.virtual import simulate
 from hil.rt.clock import cpu_time_ns
 from hil.scenario.scenario import load_scenario
 from hil.validation.perf.cantools_codec import database, dbc_values, protected
-from hil.validation.perf.row import Row, paired
+from hil.validation.perf.row import Progress, Row, paired, unseen
 
 REPEATS = 30
 PAIRS = 15
@@ -28,7 +28,7 @@ def payloads() -> dict[int, list[bytes]]:
     return found
 
 
-def measure() -> list[Row]:
+def measure(progress: Progress = unseen) -> list[Row]:
     """Processor time of one frame, encoded and decoded, microseconds; the values are those of a blended stop."""
     specs = contract(BusName.VEHICLE).by_id
     cases: list[tuple[Any, Any, Message, dict[str, Any], bytes]] = []
@@ -56,6 +56,7 @@ def measure() -> list[Row]:
         "us",
         pairs=PAIRS,
     )
+    progress(0.5)
     decode = paired(
         "decode a frame",
         each(lambda spec, _theirs, _message, _values, data: spec.decode(data)),

@@ -24,26 +24,28 @@ from hil.rt.clock import cpu_time_ns
 from hil.rt.process import output_of
 from hil.scenario.scenario import load_scenario
 from hil.validation.perf.cantools_codec import database
-from hil.validation.perf.row import Row, paired
+from hil.validation.perf.row import Progress, Row, paired, unseen
 
 FRAMES = 1_000_000  # of our files
 FEW = 50_000  # of the files that Python reads frame by frame
 PEER_TIMEOUT_S = 60.0
 UNIT = "Mframe/s"
+_STEPS = 8  # of the whole, about equally long
 PYTHON_CAN = "python-can + cantools"
 
 
-def measure() -> list[Row]:
+def measure(progress: Progress = unseen) -> list[Row]:
     """Million frames a second of processor time, from a file (or frames in memory) to all signals as columns."""
     frames = many_frames(FRAMES)
     rows = [_frames_to_signals(frames)]
     with tempfile.TemporaryDirectory() as folder:
         files = Files(Path(folder), frames)
-        for suffix in (".log", ".asc", ".blf", ".trc"):
+        for n, suffix in enumerate((".log", ".asc", ".blf", ".trc"), 1):
+            progress(n / _STEPS)
             rows.append(_file_to_signals(files, suffix))
-        rows += _csv_to_signals(files)
-        rows += _mf4(files)
-        rows += _blf_raw(files)
+        for n, more in enumerate((_csv_to_signals, _mf4, _blf_raw), 5):
+            progress(n / _STEPS)
+            rows += more(files)
     return rows
 
 

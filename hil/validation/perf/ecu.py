@@ -36,7 +36,7 @@ from ecu.node import EcuNode
 from ecu.parameters.ecu import EcuParameters
 from hil.rt.clock import monotonic_ns
 from hil.scenario.parameters import load_set
-from hil.validation.perf.row import Row, paired, time_per_call_ns
+from hil.validation.perf.row import Progress, Row, paired, time_per_call_ns, unseen
 
 STEPS = 2_000
 BULK = 50_000
@@ -48,10 +48,14 @@ _Q = np.array([1e-6, 9.0, 1600.0, 2.0e4])
 _R = np.array([0.01, 3600.0])
 
 
-def measure() -> list[Row]:
+def measure(progress: Progress = unseen) -> list[Row]:
     """Return the rows of ``brakebench perf ecu``."""
     parameters = load_set(resources.files("ecu.parameters") / "paper_ecu.toml", EcuParameters)
-    return [*_against_filterpy(), _joint(parameters), *_tick(parameters)]
+    rows = _against_filterpy()
+    progress(1 / 3)
+    rows.append(_joint(parameters))
+    progress(2 / 3)
+    return [*rows, *_tick(parameters)]
 
 
 def _against_filterpy() -> list[Row]:

@@ -21,7 +21,7 @@ from hil.errors import BrakebenchError
 from hil.extras import pip_install
 from hil.rt.clock import process_cpu_time_ns
 from hil.validation.perf.rivals import NONE, RIVALS, Guess
-from hil.validation.perf.row import Row
+from hil.validation.perf.row import Progress, Row, unseen
 from hil.validation.perf.signatures import problem
 from hil.validation.reference_car.cases import draw
 from hil.validation.reference_car.files import read_answer, write
@@ -54,7 +54,7 @@ class Outcome:
         return sum((chance - (name == self.hidden)) ** 2 for name, chance in chances.items())
 
 
-def measure() -> list[Row]:
+def measure(progress: Progress = unseen) -> list[Row]:
     """Rows of ``brakebench perf explain``: for each figure one a rival. Takes some three minutes a case.
 
     Figures are shares of cases, the mean Brier score, and the median processor time of a case, all threads, reading the
@@ -74,17 +74,18 @@ def measure() -> list[Row]:
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, "blas"):
-        said = _all_said()
+        said = _all_said(progress)
     ours = said.pop(OURS)
     figures = [rows_of(ours, others, rival) for rival, others in said.items()]
     return [row for of_one_figure in zip(*figures, strict=True) for row in of_one_figure]
 
 
-def _all_said() -> dict[str, list[Outcome]]:
+def _all_said(progress: Progress) -> dict[str, list[Outcome]]:
     """What each side says of every case."""
     planned = [("single", k, SNR) for k in SINGLES] + [("null", k, None) for k in NULLS]
     said: dict[str, list[Outcome]] = {side: [] for side in (OURS, *RIVALS)}
     for number, (family, index, size) in enumerate(planned):
+        progress(number / len(planned))
         with TemporaryDirectory() as folder:
             logs = Path(folder) / "logs"
             write(draw(family, index, SEED, size), logs)

@@ -19,7 +19,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 from hil.rt.clock import WallClock
-from hil.validation.perf.row import Row
+from hil.validation.perf.row import Progress, Row, unseen
 
 PAGES = 3
 ROUNDS = 3
@@ -45,11 +45,12 @@ class _Late(NamedTuple):
     overruns: float
 
 
-def measure() -> list[Row]:
+def measure(progress: Progress = unseen) -> list[Row]:
     """Measure all ways in turn, and hold the medians against those without a page."""
     found: dict[str, list[_Late]] = {way: [] for way in _WAYS}
     for number in range(ROUNDS):
-        for way in _WAYS:
+        for k, way in enumerate(_WAYS):
+            progress((number + k / len(_WAYS)) / ROUNDS)
             with tempfile.TemporaryDirectory() as folder:
                 found[way].append(_drive(way, Path(folder), number))
     medians = {way: _Late(*map(statistics.median, zip(*runs, strict=True))) for way, runs in found.items()}

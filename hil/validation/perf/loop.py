@@ -27,7 +27,7 @@ from hil.rt.clock import cpu_time_ns, monotonic_ns
 from hil.rt.lockstep import Member, lockstep
 from hil.scenario.scenario import load_scenario
 from hil.validation.perf.cantools_codec import cantools_inside
-from hil.validation.perf.row import Row, paired
+from hil.validation.perf.row import Progress, Row, paired, unseen
 from plant.node import PlantNode
 
 SCENARIO = "stop72_blend70"
@@ -143,16 +143,17 @@ def _under_the_clock(owner: Any, attribute: str, name: str, spent: dict[str, int
         setattr(owner, attribute, function)
 
 
-def measure() -> list[Row]:
+def measure(progress: Progress = unseen) -> list[Row]:
     """Whole loop and parts, microseconds for 10 ms of simulated time; then the real-time factor."""
     for loop in (our_loop, other_loop):  # compile, load, fill caches
         for _ in loop(200_000_000):
             pass
     ours: list[Timing] = []
     theirs: list[Timing] = []
-    for _ in range(PAIRS):
+    for n in range(PAIRS):
         ours.append(timed(our_loop))
         theirs.append(timed(other_loop))
+        progress((n + 1) / PAIRS)
     whole = _median([t.whole_us for t in ours])
     other_is = "the same loop over cantools and python-can's virtual bus"
     rows = [_row("closed loop, 10 ms", [t.whole_us for t in ours], [t.whole_us for t in theirs], other_is)]

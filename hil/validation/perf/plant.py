@@ -19,7 +19,7 @@ from scipy.integrate import solve_ivp
 
 from hil.rt.clock import monotonic_ns
 from hil.validation.perf import effects
-from hil.validation.perf.row import Row, paired, time_per_call_ns
+from hil.validation.perf.row import Progress, Row, paired, time_per_call_ns, unseen
 from hil.validation.verify.car import paper_car
 from hil.validation.verify.right_hand_side import RightHandSide
 from plant.integrate import RUNGE_KUTTA_4, SEMI_IMPLICIT
@@ -114,7 +114,7 @@ def start_s(folder: str) -> float:
     return (monotonic_ns() - began_ns) * 1e-9
 
 
-def measure() -> list[Row]:
+def measure(progress: Progress = unseen) -> list[Row]:
     """All rows."""
     exact, scale = reference()
     errors = {m: float(np.abs((run(m)[: RATES.size] - exact) / scale).max()) for m in (SEMI_IMPLICIT, RUNGE_KUTTA_4)}
@@ -145,7 +145,9 @@ def measure() -> list[Row]:
             paired(f"{name} against the clock", lambda m=method: per_step_ns(m), lambda: STEP_S * 1e9,  # type: ignore[misc]
                    "real time", "ns/step", pairs=PAIRS)
         )  # fmt: skip
+    progress(0.5)
     rows += effects.measure(per_step_ns)
+    progress(0.7)
     cores = len(os.sched_getaffinity(0))
     rows.append(
         paired(f"{CARS} cars on {cores} cores", lambda: batch_ns(cores), lambda: batch_ns(1), "one core", "ns/step",
@@ -155,6 +157,7 @@ def measure() -> list[Row]:
         paired(f"{CARS} cars on {cores} cores, against the clock", lambda: batch_ns(cores), lambda: STEP_S * 1e9,
                "real time", "ns/step", pairs=PAIRS)
     )  # fmt: skip
+    progress(0.9)
     with tempfile.TemporaryDirectory() as folder:
         first, later = start_s(folder), start_s(folder)
     rows.append(Row("first start, compiles", first, FIRST_START_LIMIT_S, "our limit", FIRST_START_LIMIT_S / first, "s"))

@@ -6,6 +6,13 @@ from dataclasses import dataclass
 
 from hil.rt.clock import monotonic_ns
 
+Progress = Callable[[float], None]
+"""Takes the share of a measurement that is done; never called while anything is timed."""
+
+
+def unseen(_: float) -> None:
+    """Progress that nobody looks at."""
+
 
 @dataclass(frozen=True, slots=True)
 class Row:

@@ -23,7 +23,7 @@ from dbc.frame import BusName, Frame
 from hil.bus import open_bus
 from hil.rt.clock import monotonic_ns
 from hil.rt.realtime import PRIORITY
-from hil.validation.perf.row import Row, paired
+from hil.validation.perf.row import Progress, Row, paired, unseen
 from hil.validation.perf.rt_child import END_ID
 
 ROUND_TRIPS = 4_000
@@ -57,13 +57,18 @@ int main(int argc, char **argv) {
 """  # noqa: E501 - a line of C reads as one
 
 
-def measure() -> list[Row]:
+def measure(progress: Progress = unseen) -> list[Row]:
     """Return the rows of ``brakebench perf rt``."""
     before = os.sched_getaffinity(0)
     here, there = min(before), max(before)  # two processes on two cores, on our side and on the others'
     os.sched_setaffinity(0, {here})
     try:
-        rows = [*_against_floor(here, there), *_against_remote(there), _in_process()]
+        rows = list(_against_floor(here, there))
+        progress(0.25)
+        rows += _against_remote(there)
+        progress(0.5)
+        rows.append(_in_process())
+        progress(0.75)
     finally:
         os.sched_setaffinity(0, before)
     return rows + _against_cyclictest()

@@ -92,6 +92,12 @@ def test_a_message_that_is_late_or_unsound_stands_first(screen):
     assert lines[at + 2].rstrip().endswith("s ago")
 
 
+def test_a_silent_bus_is_told(screen):
+    lines = drawn(screen, MS)
+    assert lines[-1].rstrip() == "nothing has come on the buses yet"
+    assert "loopback:a" in lines[0]
+
+
 def test_link_events_are_told(screen):
     screen.feed.hear([LinkEvent(BusName.VEHICLE, LinkState.BUS_OFF, 0, 1, "no such [bold]device\x1b[2J")])
     text = "\n".join(drawn(screen, MS))

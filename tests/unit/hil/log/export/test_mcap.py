@@ -101,7 +101,7 @@ def test_a_whole_recording_reads_back_as_it_is_decoded(tmp_path):
 
 def test_rerun_reads_it(tmp_path):
     rerun = pytest.importorskip(
-        "rerun.chunk", reason="rerun-sdk takes 490 MB and is in no extra; pip install rerun-sdk to run this test"
+        "rerun.chunk", reason="rerun-sdk takes 490 MB and is in an extra of its own: pip install --editable '.[rerun]'"
     )
     log, out = tmp_path / "a.log", tmp_path / "a.mcap"
     log.write_text(LOG)
