@@ -7,6 +7,7 @@ frame become a `Pdu`, or nothing where the standard ignores them.
 from enum import Enum, IntEnum
 from typing import NamedTuple
 
+from dbc.diagnostic_ids import PADDING
 from dbc.frame_length import FD_LENGTHS, fd_length
 
 N_BS_NS = N_CR_NS = 1_000_000_000  # ISO 15765-2: time-outs of a flow control and of a consecutive frame
@@ -138,7 +139,7 @@ def segment(message: bytes, frame_bytes: int = _CLASSIC, padding: int | None = N
 
 def _filled(data: bytes, padding: int | None) -> bytes:
     size = _CLASSIC if padding is not None and len(data) < _CLASSIC else fd_length(len(data))
-    return data.ljust(size, bytes((0xCC if padding is None else padding,)))
+    return data.ljust(size, bytes((PADDING if padding is None else padding,)))
 
 
 class _Sending(NamedTuple):

@@ -46,8 +46,10 @@ def check_transmit(spec: str, transmit: bool, why: str) -> None:
         )
 
 
-def open_for_role(spec: str, bus: BusName, transmit: bool) -> "Bus | ListeningBus":
+def open_for_role(spec: str, bus: BusName, transmit: bool, *, optional: bool = True) -> "Bus | ListeningBus":
     """Join a bus; one with hardware is only listened to unless ``transmit``.
+
+    ``optional`` False: the command never sends, and has no ``--transmit``.
 
     Raises
     ------
@@ -62,7 +64,7 @@ def open_for_role(spec: str, bus: BusName, transmit: bool) -> "Bus | ListeningBu
         return open_bus(spec, bus)
     if parsed.kind in LISTEN_ONLY and not silent:
         spec += ",listen_only=true"
-    return ListeningBus(open_bus(spec, bus))
+    return ListeningBus(open_bus(spec, bus), optional)
 
 
 class ListeningBus:
@@ -74,12 +76,12 @@ class ListeningBus:
     words : what that means on this bus, for people.
     """
 
-    def __init__(self, bus: Bus) -> None:
+    def __init__(self, bus: Bus, optional: bool = True) -> None:
         self._bus = bus
         self.name = bus.name
         self.withheld = 0
         kind, _, channel = bus.name.partition(":")
-        self.words = f"listens only: nothing is sent on {bus.name} without --transmit; "
+        self.words = f"listens only: nothing is sent on {bus.name}{' without --transmit' if optional else ''}; "
         if kind in LISTEN_ONLY:
             self.words += "the adapter does not acknowledge either"
         elif kind == "socketcan":

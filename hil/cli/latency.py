@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     if (args.stimulus is None) != (args.response is None):
         raise BrakebenchError("latency: --from and --to go together")
     known, _ = databases(args.dbc)
-    frames = _listen(args.bus, args.for_s) if args.log is None else _read(args.log)
+    frames, lost = _listen(args.bus, args.for_s) if args.log is None else (_read(args.log), None)
     if not len(frames):
         raise TimingError(f"latency: {args.log or args.bus}: not one frame")
     responses = []
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
                 continue
     cyclic = cyclic_messages(frames, known)
     if args.json:
-        print(json.dumps(_values(args, frames, responses, cyclic), indent=2))
+        print(json.dumps(_values(args, frames, lost, responses, cyclic), indent=2))
     else:
         say(_lines(responses, cyclic))
     return 0
@@ -76,7 +76,8 @@ def _read(log: str) -> "FrameTable":
     return read_log(log_path(log)).frames
 
 
-def _listen(spec: str, for_s: float) -> "FrameTable":
+def _listen(spec: str, for_s: float) -> "tuple[FrameTable, int]":
+    """What came, and how many frames were lost on the way here."""
     from dbc.frame import BusName
     from hil.bench.wire_timing import table_of
     from hil.bus.transmit import open_for_role
@@ -87,15 +88,16 @@ def _listen(spec: str, for_s: float) -> "FrameTable":
         raise BrakebenchError(f"--for {for_s:g}: expected seconds above 0, at most 3600")
     stop, clock = StopSignal(), WallClock()
     with stop.at_once():
-        bus = open_for_role(spec, BusName.VEHICLE, transmit=False)
+        bus = open_for_role(spec, BusName.VEHICLE, transmit=False, optional=False)
     with bus:
         _say(f"listening to {bus.name} for {for_s:g} s")
         end_ns = clock.now_ns() + round(for_s * 1e9)
-        return table_of(_hear(bus, lambda: not stop.asked and clock.now_ns() < end_ns))
+        heard, lost = _hear(bus, lambda: not stop.asked and clock.now_ns() < end_ns)
+    return table_of(heard), lost
 
 
-def _hear(bus: "Bus | ListeningBus", goes_on: "Callable[[], bool]") -> "list[Frame]":
-    """Frames of a bus; says what listening means there, and what was lost."""
+def _hear(bus: "Bus | ListeningBus", goes_on: "Callable[[], bool]") -> "tuple[list[Frame], int]":
+    """Frames of a bus, and how many were lost; says so, and what listening means there."""
     from dbc.frame import Frame, LinkState
     from hil.bus.transmit import ListeningBus
 
@@ -111,7 +113,7 @@ def _hear(bus: "Bus | ListeningBus", goes_on: "Callable[[], bool]") -> "list[Fra
                 lost += item.number
     if lost:
         _say(f"{lost} frames were lost on the way here: cycles missed and jitter are partly this machine's")
-    return heard
+    return heard, lost
 
 
 def _say(text: str) -> None:
@@ -119,7 +121,11 @@ def _say(text: str) -> None:
 
 
 def _values(
-    args: argparse.Namespace, frames: "FrameTable", responses: "list[Response]", cyclic: "list[Cyclic]"
+    args: argparse.Namespace,
+    frames: "FrameTable",
+    lost: int | None,
+    responses: "list[Response]",
+    cyclic: "list[Cyclic]",
 ) -> dict[str, Any]:
     def plain(one: "Response | Cyclic") -> dict[str, Any]:
         return {k: v._asdict() if hasattr(v, "_asdict") else v for k, v in one._asdict().items()}
@@ -128,6 +134,7 @@ def _values(
         "log": args.log,
         "bus": args.bus,
         "frames": len(frames),
+        "lost": lost,
         "responses": [plain(one) for one in responses],
         "cyclic": [plain(one) for one in cyclic],
     }

@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     stop = StopSignal()
     with contextlib.ExitStack() as stack:
         with stop.at_once():
-            vehicle = stack.enter_context(open_for_role(args.bus, BusName.VEHICLE, transmit=False))
+            vehicle = stack.enter_context(open_for_role(args.bus, BusName.VEHICLE, transmit=False, optional=False))
             bench = stack.enter_context(open_bus(bench_channel(args.bus), BusName.BENCH))
         sources: list[Source] = [vehicle, FaultyListener(bench, ("RECORDER",))]
         return _record_around(args, sources, stop) if args.trigger else _record_all(args, sources, stop)

@@ -64,7 +64,7 @@ def serve_view(
         os.nice(_NICENESS)
     with contextlib.ExitStack() as stack:
         with stop.at_once():
-            vehicle = stack.enter_context(open_for_role(bus, BusName.VEHICLE, transmit=False))
+            vehicle = stack.enter_context(open_for_role(bus, BusName.VEHICLE, transmit=False, optional=False))
             bench = stack.enter_context(open_bus(bench_channel(bus), BusName.BENCH))
         feed = Feed(databases or Databases.own(), Databases.own())
         controls = Controls()

@@ -1,5 +1,6 @@
 """Two signals compared: correlation, ratio with its interval, and lag."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,7 +22,8 @@ class Evidence:
     """How a signal goes with what it ought to be.
 
     ``ratio`` is signal per reference with its 95 % interval (a jackknife over ten stretches), ``lag_s`` how
-    late the signal is, ``against`` the reference in words, ``seconds`` how long both were there.
+    late the signal is (NaN where the best lag is the longest that was looked for: not determined), ``against`` the
+    reference in words, ``seconds`` how long both were there.
     """
 
     correlation: float
@@ -37,15 +39,20 @@ class Evidence:
         """In words."""
         return (
             f"{self.ratio:.4g} ({self.low:.4g} to {self.high:.4g}) times {self.against}, correlation "
-            f"{self.correlation:.3f}, {abs(1e3 * self.lag_s):.0f} ms {'late' if self.lag_s >= 0.0 else 'early'}, over "
-            f"{self.seconds:.0f} s"
+            f"{self.correlation:.3f}, {self._lag}, over {self.seconds:.0f} s"
         )
+
+    @property
+    def _lag(self) -> str:
+        if math.isnan(self.lag_s):
+            return "lag not determined"
+        return f"{abs(1e3 * self.lag_s):.0f} ms {'late' if self.lag_s >= 0.0 else 'early'}"
 
     def as_json(self) -> dict[str, Any]:
         """Numbers by name."""
         return {
-            "correlation": self.correlation, "ratio": self.ratio, "ci95": [self.low, self.high], "lag_s": self.lag_s,
-            "against": self.against, "seconds": self.seconds,
+            "correlation": self.correlation, "ratio": self.ratio, "ci95": [self.low, self.high],
+            "lag_s": None if math.isnan(self.lag_s) else self.lag_s, "against": self.against, "seconds": self.seconds,
         }  # fmt: skip
 
 
@@ -67,7 +74,9 @@ def compared(
         return None
     correlation, ratio = float(np.corrcoef(x, y)[0, 1]), _ratio(x, y)
     half = half_width([_ratio(x[keep], y[keep]) for keep in left_out(x)])
-    return Evidence(correlation, ratio, ratio - half, ratio + half, lag * STEP_S, against, len(x) * STEP_S)
+    at_edge = abs(lag) >= round(longest_s / STEP_S)
+    lag_s = math.nan if at_edge else lag * STEP_S
+    return Evidence(correlation, ratio, ratio - half, ratio + half, lag_s, against, len(x) * STEP_S)
 
 
 def _best_lag(x: Floats, y: Floats, known: Floats, longest_s: float) -> float | None:

@@ -1,5 +1,6 @@
 """From the signals of a stranger's logs to a draft: each channel's guess, the numbers of the set, and what is open."""
 
+import math
 from dataclasses import replace
 
 from hil.diagnosis.data.log import UnusableError, four
@@ -82,6 +83,9 @@ def _with_lag_word(guess: Guess) -> Guess:
     """With a word on a lag that is more than `explain` estimates."""
     if guess.evidence is None or abs(guess.evidence.lag_s) <= _LATE_S or not guess.channel.startswith(_SENSORS):
         return guess
+    if math.isnan(guess.evidence.lag_s):
+        word = "its stamps: the best lag is the longest that was looked for, so it is not determined"
+        return replace(guess, check=(*guess.check, word))
     return replace(
         guess, check=(*guess.check, "its stamps: farther off than a filter makes it; explain moves it or refuses it")
     )

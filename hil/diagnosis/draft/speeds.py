@@ -1,5 +1,6 @@
 """Which signals are the four wheel speeds, the ground speed and the longitudinal acceleration."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -198,7 +199,7 @@ def _accelerometers(signals: Mapping[str, Signal], reference: Floats, source: st
 def _rank(signal: Signal, seen: Evidence) -> tuple[bool, float, float]:
     """Order of accelerometers: a name that says so first, as what only follows the wheels may be computed from them."""
     named = "ax" in kinds(signal.name, signal.unit) and abs(seen.correlation) > _NAMED
-    return not named, -round(abs(seen.correlation), 1), abs(seen.lag_s)
+    return not named, -round(abs(seen.correlation), 1), math.inf if math.isnan(seen.lag_s) else abs(seen.lag_s)
 
 
 def _spin(wheels: Mapping[str, Signal], by_name: bool) -> str:

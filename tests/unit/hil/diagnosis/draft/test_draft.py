@@ -1,6 +1,8 @@
 """``prepare`` on a stranger's table: which signal, unit, sign and lag; what is left open; what explain makes of it."""
 
 import json
+import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from hil.diagnosis.data.channel_map import load_map
 from hil.diagnosis.data.log import PRESSURE, WHEEL_SPEED, UnusableError
 from hil.diagnosis.data.read import read_logs
 from hil.diagnosis.data.trial.run import on_trial
+from hil.diagnosis.draft.compare import compared
 from hil.diagnosis.draft.drafting import draft
 from hil.diagnosis.draft.files import write_draft
 from hil.diagnosis.draft.guess import Draft, Guess
@@ -260,3 +263,14 @@ def test_our_own_bus_in_strangers_names_goes_all_the_way(tmp_path, capsys) -> No
     assert answer["verdict"] not in ("unusable", "model_does_not_describe")  # pads that fade are told as one gain
     assert {one["column"] for one in answer["channels_read"]} >= {"WhlSpd_FL", "Acc_X", "GyroYaw", "pBrakeFL"}
     assert answer["held_out_error"]["wheel_speed"]["after"] < answer["held_out_error"]["wheel_speed"]["before"]
+
+
+def test_a_lag_at_the_end_of_the_search_is_not_determined():
+    t_s = np.arange(0.0, 60.0, 0.02)
+    seen = compared(np.sin(0.3 * t_s), np.sin(0.3 * (t_s - 3.0)), "the wheels")  # later than is looked for
+    assert math.isnan(seen.lag_s)
+    assert "lag not determined" in seen.text
+    assert json.loads(json.dumps(seen.as_json()))["lag_s"] is None
+    late = compared(np.sin(t_s), np.sin(t_s - 0.2), "the wheels")
+    assert late.lag_s == pytest.approx(0.2, abs=0.01)
+    assert re.search(r"(?:199|20[01]) ms late", late.text)
