@@ -5,11 +5,11 @@ import importlib
 import json
 from dataclasses import asdict
 
-from hil.cli.options import add_json
+from hil.cli.options import add_json, positive
 from hil.cli.progress import Progress
 from hil.errors import BrakebenchError
 
-MEASUREMENTS = ("rt", "plant", "ecu", "codec", "loop", "decode", "explain", "live")
+MEASUREMENTS = ("rt", "plant", "ecu", "codec", "loop", "decode", "explain", "live", "campaign")
 """Each is a module of hil.validation.perf with ``measure() -> list[Row]``."""
 
 
@@ -18,6 +18,10 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser = subparsers.add_parser("perf")
     parser.add_argument("name", choices=MEASUREMENTS, help="what to measure")
     parser.add_argument("--beside", metavar="FOLDER", help="loop: compare with another checkout of the project instead")
+    parser.add_argument(
+        "--count", type=positive, metavar="N", help="campaign: stops of each measurement (default: 200)"
+    )
+    parser.add_argument("--tiny", type=positive, metavar="N", help="campaign: instead, N tiny tasks through Dask")
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -27,8 +31,17 @@ def run(args: argparse.Namespace) -> int:
     module = importlib.import_module(f"hil.validation.perf.{args.name}")
     if args.beside is not None and args.name != "loop":
         raise BrakebenchError(f"--beside goes with perf loop, not with perf {args.name}")
+    if args.name != "campaign" and (args.count or args.tiny):
+        raise BrakebenchError(f"--count and --tiny go with perf campaign, not with perf {args.name}")
     with Progress().part(0, f"perf {args.name}") as progress:
-        rows = module.measure(progress) if args.beside is None else module.beside(args.beside)
+        if args.beside is not None:
+            rows = module.beside(args.beside)
+        elif args.tiny:
+            rows = module.tiny(args.tiny, progress)
+        elif args.count:
+            rows = module.measure(progress, args.count)
+        else:
+            rows = module.measure(progress)
     if args.json:
         print(json.dumps({"rows": [asdict(row) for row in rows]}, indent=2))
         return 0
