@@ -49,7 +49,7 @@ def test_json_stands_alone_and_files_are_written(tmp_path, capsys):
     assert json.loads((tmp_path / "table.json").read_text()) == printed
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<td class=s>top1 snr8</td>" in page
-    assert "<td class=s>road_grade</td><td class=s>8</td>" in page
+    assert "<td class=s>road_grade</td><td class=n>8</td>" in page
     assert (tmp_path / "confusion.png").read_bytes().startswith(b"\x89PNG")
 
 
