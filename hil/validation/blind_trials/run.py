@@ -2,10 +2,12 @@
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from hil.campaign.engine import Killed, LocalWorkers, work
 from hil.diagnosis.data.log import UnusableError
 from hil.diagnosis.detection.result import Settings
 from hil.diagnosis.explain import explain
@@ -23,10 +25,12 @@ SIZES = (15.0, 8.0, 5.0, 3.0)
 SURE = (15.0, 8.0)
 """Those at which parameters, gain and calibration are scored."""
 Record = dict[str, Any]
+CaseKey = tuple[str, int, float | None]
+"""Family that a case is drawn from, number, size."""
 Say = Callable[[str], None]
 
 
-def plan(family: str, count: int) -> list[tuple[str, int, float | None]]:
+def plan(family: str, count: int) -> list[CaseKey]:
     """Cases of a family in the order they are run: which family they are drawn from, number, size.
 
     ``single`` has ``count`` cases a size, effects in turn. ``parameters``, ``gain`` and ``calibration`` have ``count``
@@ -56,24 +60,33 @@ def run_family(
     out.mkdir(parents=True, exist_ok=True)
     path = out / "cases.jsonl"
     done = {_key(record): record for record in _read(path) if record["seed"] == seed}
-    records = []
-    planned = plan(family, count)
-    for n, (drawn, index, size) in enumerate(planned, 1):
-        key = (drawn, index, size)
-        if key not in done:
-            if drawn in strangers.FAMILIES:
-                done[key] = run_stranger(strangers.draw(drawn, index, seed), seed, settings)
-            else:
-                done[key] = run_case(draw(drawn, index, seed, size), seed, size, settings)
-            with path.open("ab", buffering=0) as file:  # one write: other families may be appending too
-                file.write(f"{json.dumps(done[key])}\n".encode())
-        records.append(done[key])
-        say(f"{family} {index} {'' if size is None else size}: {done[key]['verdict']} {done[key]['named'][:1]}")
-        progress(n / len(planned))
-    return records
+    cases = plan(family, count)
+    missing = [case for case in cases if case not in done]
+    if len(missing) < len(cases):
+        say(f"{family}: {len(cases) - len(missing)} of {len(cases)} cases stand in {path}")
+    # one worker: a case takes all processors by itself, and the lines come in the order of the plan
+    found = work([[case] for case in missing], partial(_run, seed=seed, settings=settings), LocalWorkers(1))
+    for n, ((case,), (record,)) in enumerate(found, len(cases) - len(missing) + 1):
+        if isinstance(record, Killed):
+            raise BrakebenchError(f"{case}: ended its worker process {record.times} times")
+        with path.open("ab", buffering=0) as file:  # one write: other families may be appending too
+            file.write(f"{json.dumps(record)}\n".encode())
+        done[case] = record
+        drawn, index, size = case
+        say(f"{drawn} {index} {'' if size is None else size}: {record['verdict']} {record['named'][:1]}")
+        progress(n / len(cases))
+    return [done[case] for case in cases]
 
 
-def _key(record: Record) -> tuple[str, int, float | None]:
+def _run(case: CaseKey, seed: int, settings: Settings | None) -> Record:
+    """In a worker."""
+    drawn, index, size = case
+    if drawn in strangers.FAMILIES:
+        return run_stranger(strangers.draw(drawn, index, seed), seed, settings)
+    return run_case(draw(drawn, index, seed, size), seed, size, settings)
+
+
+def _key(record: Record) -> CaseKey:
     return str(record["family"]), int(record["index"]), record["size"]
 
 
