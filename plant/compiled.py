@@ -81,6 +81,11 @@ def entry(function: F) -> F:
     return _entry(function, _OPTIONS)
 
 
+def borrowing_entry(function: F) -> F:
+    """As `entry`, for what allocates nothing: all vectors are the caller's, and nobody counts references to them."""
+    return _entry(function, _BORROWED)
+
+
 def exact_entry(function: F) -> F:
     """As `entry`, but nothing is fused: every product and sum is rounded as Python does it."""
     return _entry(function, _OPTIONS | {"fastmath": False})
