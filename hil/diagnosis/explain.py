@@ -42,6 +42,7 @@ _INERTIAL = {"ax_mps2", "ay_mps2", "yaw_rate_rad_s"}
 """Channels that can be compared with the motion."""
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # simulations fill the processors; a second thread only waits
 def explain(
     logs: Any, vehicle: Path | str | Mapping[str, Any] | None = None, *, channel_map: Path | None = None,
     database: Path | None = None, about: Path | None = None, extend: Path | None = None, out: Path | None = None,
@@ -90,12 +91,11 @@ def explain(
     car = (car.without_lateral_dynamics() if is_straight_line(read) else car).with_motor_limits_from(read)
     dataset = prepare(read, radius_m, car.unstated)
     base, notes = (nominal(car), []) if extend is None else extended_car(car, Path(extend), dataset)
-    with threadpool_limits(1, "blas"):  # simulations fill the processors; linear algebra beside them only waits
-        diagnosis = diagnose(dataset, car, base, settings, report)
-        report("held-out error by cross-validation")
-        diagnosis = confirmed(diagnosis, report)
-        errors, patterns = held_out_error(diagnosis), residual_patterns(diagnosis)
-        fits = goodness_of_fit(diagnosis)
+    diagnosis = diagnose(dataset, car, base, settings, report)
+    report("held-out error by cross-validation")
+    diagnosis = confirmed(diagnosis, report)
+    errors, patterns = held_out_error(diagnosis), residual_patterns(diagnosis)
+    fits = goodness_of_fit(diagnosis)
     extension = None if folder is None else write_extended_car(diagnosis, folder)
     of_logs = (f"{one.log.name}: {text}" for one in dataset.recordings for text in one.log.remarks)
     remarks = [*car.remarks, *notes, *of_logs, *diagnosis.remarks]

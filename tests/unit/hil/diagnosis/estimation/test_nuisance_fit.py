@@ -110,6 +110,18 @@ def test_the_discs_heat_matters_once_a_cause_reads_their_temperature():
     assert acts(fades)
 
 
+def test_a_cause_is_compared_with_channels_of_the_same_inputs():
+    """Inputs denoised anew moved every number that changes nothing, and all by the same signature."""
+    vehicle = paper_car()
+    case = prepare([log_of_pulses()], 0.308)
+    numbers = NuisanceFit(Simulator(case, vehicle), SampleMasks.of(case), vehicle, nominal(vehicle), False)
+    bare, noise = numbers.fitter.start()
+    heavier = numbers.fitter.at(bare.z, (Term(_MASS, 100.0),), noise)
+    anew, before = numbers.fitter.denoised(heavier), numbers.fitter.simulator.runs
+    assert anew.nuisance_jacobian_at(heavier) is numbers.fitter.nuisance_jacobian
+    assert numbers.fitter.simulator.runs == before + 2  # at the model, and all that change nothing together
+
+
 def test_sensitivities_taken_lately_serve_again_where_cars_are_alike():
     vehicle = paper_car()
     case = prepare([log_of_pulses()], 0.308)
@@ -124,7 +136,7 @@ def test_sensitivities_taken_lately_serve_again_where_cars_are_alike():
 
     bare = numbers.fitter.nuisance_jacobian
     assert replays(z) == 0
-    assert replays(z, Term(heavy, 100.0)) > len(z)
+    assert replays(z, Term(heavy, 100.0)) > len(z) // 2
     beside = numbers.fitter.nuisance_jacobian
     assert replays(z + 0.4) == 0
     assert numbers.fitter.nuisance_jacobian is bare
@@ -132,9 +144,9 @@ def test_sensitivities_taken_lately_serve_again_where_cars_are_alike():
     assert numbers.fitter.nuisance_jacobian is not bare
     assert replays(z, Term(heavy, 110.0)) == 0
     assert numbers.fitter.nuisance_jacobian is beside
-    assert replays(z, Term(heavy, 150.0)) > len(z)
-    assert replays(z, Term(heavy, 150.0, (0, 1.0))) > len(z)
-    assert replays(z + 1.0) > len(z)
+    assert replays(z, Term(heavy, 150.0)) > len(z) // 2
+    assert replays(z, Term(heavy, 150.0, (0, 1.0))) > len(z) // 2
+    assert replays(z + 1.0) > len(z) // 2
 
 
 @pytest.mark.parametrize(("stated_k", "deviation_k"), [(350.0, DISC_MEASURED_SD_K), (None, DISC_ASSUMED_SD_K)])
