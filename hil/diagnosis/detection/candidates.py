@@ -109,15 +109,18 @@ class CandidateSet:
         other.linearise_at(fitter, model, progress)
         return other
 
-    def scores(self, fitter: Fitter, blocks: InformationBlocks, model: Model, noise: Noise) -> list[ScoreTest]:
-        """Score test of each candidate given a model, by ``blocks`` of its nuisances, terms and all candidates."""
+    def scores(
+        self, fitter: Fitter, blocks: InformationBlocks, model: Model, noise: Noise, search: bool = True
+    ) -> list[ScoreTest]:
+        """Score test of each candidate given a model, by ``blocks`` of its nuisances, terms and all candidates; without
+        ``search`` those behind limits gain nothing."""
         accepted = len(model.terms)
         marginal = marginalise(blocks.total(), blocks.nuisances, range(accepted), model.z, fitter.at_bounds(model.z))
         values = {id(term.candidate): term.value for term in model.terms}
         tests = scores(
             self.candidates, marginal, accepted, [values.get(id(candidate), 0.0) for candidate in self.candidates]
         )
-        behind_limits = [item for item in tests if has_zero_gradient(item)]
+        behind_limits = [item for item in tests if has_zero_gradient(item)] if search else []
         searched = thread_map(lambda item: line_search(fitter, model, noise, item), behind_limits)
         by_search = dict(zip(map(id, behind_limits), searched, strict=True))
         return [by_search.get(id(item), item) for item in tests]

@@ -271,5 +271,4 @@ def _shortlist(
     if onset is not None:
         return shortlist(candidates.scores_from_onset(fitter, bare, noise, onset), SHORTLIST_SIZE)
     blocks = fitter.information_blocks(bare, candidates.jacobian, noise)
-    tests = candidates.scores(fitter, blocks, bare, noise)
-    return shortlist([item for item in tests if not item.replayed], SHORTLIST_SIZE)
+    return shortlist(candidates.scores(fitter, blocks, bare, noise, search=False), SHORTLIST_SIZE)

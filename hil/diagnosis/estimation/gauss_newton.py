@@ -49,7 +49,7 @@ _FOLLOWED = 0.5
 """Step, in prior standard deviations, below which the Jacobian is not updated: rounding and noise would count."""
 BIASED_BIRGE_RATIO = 1.5
 """Birge ratio (`Fitter.birge_ratio`) from which an unmodelled cause may bias the nuisances."""
-_REMEMBERED = 8
+_REMEMBERED = 16
 """Term Jacobians that are remembered: fits, their scores and intervals ask for the same one."""
 _ALIKE = 0.2
 """Share by which the value of a term may change while its signature serves on."""
@@ -118,8 +118,20 @@ class _Whitened:
     products: Floats = field(default_factory=lambda: np.empty((0, 0)))
 
 
-_Point = tuple[object, bytes, tuple[tuple[Candidate, float, tuple[int, float] | None, float], ...]]
-"""Where a term Jacobian was taken: inputs, nuisances, and of each term all that its difference depends on."""
+@dataclass(frozen=True, eq=False)
+class _Taken:
+    """A term Jacobian, at which ``model`` by which inputs (`Simulator.driven_by`) and steps of the values."""
+
+    driven_by: object
+    model: Model
+    steps: list[float]
+    tracks: Tracks
+
+    def at(self, driven_by: object, model: Model, steps: list[float]) -> bool:
+        """Taken at exactly this point."""
+        terms = [[(one.candidate, one.value, one.onset) for one in of.terms] for of in (self.model, model)]
+        same = self.driven_by is driven_by and self.steps == steps and terms[0] == terms[1]
+        return same and bool((self.model.z == model.z).all())
 
 
 class Fitter:
@@ -147,7 +159,7 @@ class Fitter:
         self.radius = float(simulator.vehicle.parameters.wheel.rolling_radius_m)
         self._measured = simulator.measured()
         self._whitened = _Whitened()
-        self._taken: deque[tuple[_Point, Tracks]] = deque(maxlen=_REMEMBERED)
+        self._taken: deque[_Taken] = deque(maxlen=_REMEMBERED)
         self._awake: set[int] = set()  # nuisances without a column of their own that acted in some model
 
     def copy(self) -> "Fitter":
@@ -218,19 +230,21 @@ class Fitter:
         parameters = self.parameter_set(model.z, model.terms)
         known = np.diag(model.covariance) if model.covariance.size else np.zeros(len(model.terms))
         steps = [_difference(term, float(sd)) for term, sd in zip(model.terms, np.sqrt(known), strict=True)]
-        listed = zip(model.terms, steps, strict=True)
-        point: _Point = (
-            self.simulator.driven_by,
-            model.z.tobytes(),
-            tuple((term.candidate, term.value, term.onset, step) for term, step in listed),
-        )
-        taken = next((tracks for other, tracks in tuple(self._taken) if other == point), None)
-        if taken is not None:
-            return taken
+        driven_by = self.simulator.driven_by
+        known_tracks = next((one.tracks for one in tuple(self._taken) if one.at(driven_by, model, steps)), None)
+        if known_tracks is not None:
+            return known_tracks
         moved = [term.candidate.applied(parameters, step) for term, step in zip(model.terms, steps, strict=True)]
         tracks = finite_difference_jacobian(self.simulator, self.masks, self.channels(model), moved, steps)
-        self._taken.append((point, tracks))
+        at = Model(model.z, model.terms, {}, 0.0, np.zeros((0, 0)))
+        self._taken.append(_Taken(driven_by, at, steps, tracks))
         return tracks
+
+    def _near(self, model: Model) -> _Taken | None:
+        """The last term Jacobian that holds for the model, too."""
+        driven_by = self.simulator.driven_by
+        taken = (one for one in reversed(tuple(self._taken)) if one.driven_by is driven_by)
+        return next((one for one in taken if not _far(one.model, model)), None)
 
     def nuisance_jacobian_at(self, model: Model) -> Tracks:
         """Jacobian of the nuisances, with new columns for those that had none before the model's terms.
@@ -270,6 +284,8 @@ class Fitter:
         """
         best = replace(model, cost=self.cost(model.residual, model.z, noise))
         linearised = best
+        if best.terms and own is None and (near := self._near(best)) is not None:
+            own, linearised = near.tracks, near.model
         for _ in range(steps):
             if best.terms and (own is None or (relinearise and _far(linearised, best))):
                 own, linearised = self.term_jacobian(best), best
