@@ -1,10 +1,10 @@
 """`explain`: takes measured logs and a vehicle set, gives the answer. The call behind ``brakebench explain``."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from threadpoolctl import threadpool_limits
 
@@ -38,11 +38,16 @@ _SHIPPED_CAR = "paper_car"
 """Name of the vehicle set that our own recordings are of."""
 _UNSTATED = "no vehicle is given: taken as the car that comes with brakebench"
 
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+_limited = threadpool_limits.wrap(limits=1, user_api="blas")
+_on_one_thread = cast(Callable[[_Function], _Function], _limited)
+"""Linear algebra of a function on one thread: simulations fill the processors, and a thread beside them only waits."""
+
 _INERTIAL = {"ax_mps2", "ay_mps2", "yaw_rate_rad_s"}
 """Channels that can be compared with the motion."""
 
 
-@threadpool_limits.wrap(limits=1, user_api="blas")  # simulations fill the processors; a second thread only waits
+@_on_one_thread
 def explain(
     logs: Any, vehicle: Path | str | Mapping[str, Any] | None = None, *, channel_map: Path | None = None,
     database: Path | None = None, about: Path | None = None, extend: Path | None = None, out: Path | None = None,
