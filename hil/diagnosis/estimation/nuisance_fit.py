@@ -123,6 +123,8 @@ class NuisanceFit:
             if self._relinearise and stale and times < most:
                 information = np.diag(self.fitter.nuisance_information(noise))
                 self._steps = np.clip(_FINE / np.sqrt(np.maximum(information, 1e-9)), 0.03, _COARSE)
+                if times:
+                    self._taken.pop()  # on the way of this fit: no other will ask for it
                 self.relinearise(model.z, model.terms)
                 model = self.fitter.at(model.z, model.terms, noise)
                 around, times, cost = model.z, times + 1, np.inf
