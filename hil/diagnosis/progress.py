@@ -10,8 +10,9 @@ Progress = Callable[[str], None]
 Item = TypeVar("Item")
 _EVERY_S = 2.0
 """Time between two lines of a stage, s: short stages say nothing but their name."""
-REPLAYS = (600, 5000)
-"""Replays of a diagnosis: of few logs in which nothing is wrong, and of a car of another structure (docs/trials.md)."""
+REPLAYS = (500, 5000)
+"""Replays of a diagnosis: 536 of logs in which nothing is wrong, 1,460 with a cause, 4,400 of a car of another
+structure whose numbers go far (docs/decisions/simulation-speed.md)."""
 
 
 def counted(report: Progress, stage: str, results: Iterable[Item], count: int) -> Iterator[Item]:

@@ -8,6 +8,7 @@ from pulses import log_of_pulses
 
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.estimation.gauss_newton import Fitter, Term
+from hil.diagnosis.estimation.information import acting_among
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.estimation.terms import candidates, columns
 from hil.diagnosis.noise.model import SampleMasks
@@ -108,6 +109,21 @@ def test_the_discs_heat_matters_once_a_cause_reads_their_temperature():
 
     assert not acts(bare)
     assert acts(fades)
+
+
+def test_what_acts_is_found_among_what_does_not_by_few_replays(paper_fitter):
+    simulator, names = paper_fitter.simulator, [one.name for one in paper_fitter.nuisances]
+    base = simulator.run(paper_fitter.base)
+    still = [k for k, name in enumerate(names) if "cooling" in name or "heat_capacity" in name]
+    places, before = [*still, names.index("vehicle_mass_kg")], simulator.runs
+
+    def stepped(some):
+        return paper_fitter.parameter_set(np.isin(np.arange(len(names)), some).astype(float), ())
+
+    assert len(still) > 2
+    assert acting_among(simulator, base, stepped, still) == []
+    assert simulator.runs == before + 1
+    assert acting_among(simulator, base, stepped, places) == places[-1:]
 
 
 def test_a_cause_is_compared_with_channels_of_the_same_inputs():
