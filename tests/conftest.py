@@ -8,6 +8,10 @@ from hypothesis import HealthCheck, settings
 pytest_plugins = ["drawn", "shared"]
 SLOW_LIMIT_S = 3600.0  # ends what hangs; a busy machine takes ten times as long as an idle one
 
+for name in ("COLUMNS", "LINES"):  # readline, which pytest imports, sets them for child processes, terminal or not
+    os.environ.pop(name, None)
+    os.unsetenv(name)
+
 settings.register_profile(
     "brakebench",
     deadline=None,

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hil.cli.options import add_json, out_folder
+from hil.cli.options import add_json, out_folder, positive
 
 if TYPE_CHECKING:
     from hil.campaign.plan import Plan
@@ -25,17 +25,11 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     )
     parser.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml", help="what is run and varied")
     parser.add_argument("--out", type=out_folder, metavar="DIR", help="results and report (default: campaigns/NAME)")
-    parser.add_argument("--workers", type=_positive, metavar="N", help="processes (default: one a processor)")
+    parser.add_argument("--workers", type=positive, metavar="N", help="processes (default: one a processor)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler in place of own processes")
     parser.add_argument("--repeat", type=int, metavar="RUN", help="instead: one run again, with recording and report")
     add_json(parser)
     parser.set_defaults(run=run)
-
-
-def _positive(text: str) -> int:
-    if not text.isdecimal() or int(text) == 0:
-        raise argparse.ArgumentTypeError(f"expected a whole number, 1 or more, got {text!r}")
-    return int(text)
 
 
 def run(args: argparse.Namespace) -> int:

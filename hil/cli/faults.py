@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.cli.columns import columns, say, terminal_width, wrapped
-from hil.cli.options import add_json, add_seed, out_folder
+from hil.cli.options import add_json, add_seed, out_folder, positive
 from hil.errors import BrakebenchError
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "docs/fault-campaign.md.",
     )
     parser.add_argument(
-        "--instants", type=_positive, default=200, metavar="N", help="instants of every row (default: 200)"
+        "--instants", type=positive, default=200, metavar="N", help="instants of every row (default: 200)"
     )
     parser.add_argument(
         "--only", action="append", default=[], metavar="NAME", help="one fault (or `pair`), a line for each target; "
@@ -39,12 +39,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     add_seed(parser)
     add_json(parser)
     parser.set_defaults(run=run)
-
-
-def _positive(text: str) -> int:
-    if not text.isdecimal() or int(text) == 0:
-        raise argparse.ArgumentTypeError(f"expected a whole number, 1 or more, got {text!r}")
-    return int(text)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from hil.cli.options import add_json, add_seed, out_folder
+from hil.cli.options import add_json, add_seed, out_folder, positive
 from hil.validation.blind_trials import FAMILIES
 
 
@@ -32,7 +32,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--family", choices=FAMILIES, metavar="F", help="one of the families below (default: all)")
     parser.add_argument(
         "--count",
-        type=_positive,
+        type=positive,
         default=12,
         metavar="N",
         help="cases of a family; of single: at each signal-to-noise ratio, effects in turn (default: 12)",
@@ -60,12 +60,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     )
     add_json(parser)
     parser.set_defaults(run=run)
-
-
-def _positive(text: str) -> int:
-    if not text.isdecimal() or int(text) == 0:
-        raise argparse.ArgumentTypeError(f"expected a whole number of cases, 1 or more, got {text!r}")
-    return int(text)
 
 
 def run(args: argparse.Namespace) -> int:

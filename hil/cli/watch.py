@@ -62,8 +62,10 @@ def check_extra() -> None:
     """Refuse to go on without the library of the server; BrakebenchError says how to get it."""
     import importlib.util
 
+    from hil.extras import pip_install
+
     if importlib.util.find_spec("websockets") is None:
-        raise BrakebenchError("the live view needs websockets; install it with: pip install 'brakebench[live]'")
+        raise BrakebenchError(f"the live view needs websockets; install it with: {pip_install('live')}")
 
 
 def _databases(files: list[Path]) -> "Databases | None":

@@ -86,7 +86,7 @@ class FrameBuilder:
         if self.width < 64:
             self.width = 64
             *before, data, flags = self.columns
-            self.columns = (*before, np.pad(data, ((0, 0), (0, 56))), flags)  # type: ignore[assignment]
+            self.columns = (*before, np.pad(data, ((0, 0), (0, 56))), flags)  # type: ignore[assignment]  # same columns
 
     def add(
         self, time_ns: int, channel: str, can_id: int, extended: bool, data: bytes, flags: FrameFlag | int, length: int
@@ -129,7 +129,7 @@ class FrameBuilder:
         parts = [column if n == self.rows else column[:n].copy() for column in columns]
         self.n = 0
         self.columns = self._fresh()
-        return FrameTable(names, *parts)  # type: ignore[arg-type]
+        return FrameTable(names, *parts)  # type: ignore[arg-type]  # in the order of the fields
 
     def reject(self, offset: int, text: bytes | str) -> None:
         """Count something that should be a frame and is none."""

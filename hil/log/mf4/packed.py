@@ -81,7 +81,7 @@ class _Plain:
 
     def read_into(self, view: memoryview) -> int:
         self.file.seek(self.at)
-        n: int = self.file.readinto(view[: min(len(view), self.left)])  # type: ignore[attr-defined]
+        n: int = self.file.readinto(view[: min(len(view), self.left)])  # type: ignore[attr-defined]  # BinaryIO has none
         if not n:
             raise DamagedError(self.at, f"{self.left} bytes should stand here and cannot be read")
         self.at += n

@@ -20,16 +20,16 @@ class SignalText(Protocol):
     """
 
     @property
-    def name(self) -> str: ...  # noqa: D102
+    def name(self) -> str: ...  # noqa: D102 (the class says what)
 
     @property
-    def unit(self) -> str: ...  # noqa: D102
+    def unit(self) -> str: ...  # noqa: D102 (the class says what)
 
     @property
-    def choices(self) -> Mapping[int, str]: ...  # noqa: D102
+    def choices(self) -> Mapping[int, str]: ...  # noqa: D102 (the class says what)
 
     @property
-    def comment(self) -> str: ...  # noqa: D102
+    def comment(self) -> str: ...  # noqa: D102 (the class says what)
 
 
 class SignalsWriter:

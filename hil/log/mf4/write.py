@@ -224,7 +224,7 @@ class GroupWriter:
 
     def _block(self, records: bytes) -> int:
         lines = np.frombuffer(records, np.uint8).reshape(-1, self.stride)
-        packed = _deflate(np.ascontiguousarray(lines.T).data, LEVEL)  # type: ignore[arg-type]
+        packed = _deflate(np.ascontiguousarray(lines.T).data, LEVEL)  # type: ignore[arg-type]  # any buffer
         if len(packed) + 24 >= len(records):
             return self.writer.add(b"DT", [], records)
         facts = struct.pack("<2sBxIQQ", b"DT", 1, self.stride, len(records), len(packed))

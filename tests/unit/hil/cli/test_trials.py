@@ -121,4 +121,4 @@ def test_a_missed_case_is_printed_with_its_number(tmp_path, capsys):
 def test_a_count_of_no_cases_is_refused(count, capsys):
     with pytest.raises(SystemExit):
         run("--count", count)
-    assert "expected a whole number of cases, 1 or more" in capsys.readouterr().err
+    assert "expected a whole number, 1 or more" in capsys.readouterr().err
