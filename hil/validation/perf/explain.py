@@ -3,14 +3,15 @@
 The cases are fixed before anything is seen: singles evenly spaced over the list of separable effects, nulls in order.
 Ours fits the vehicle's numbers within their tolerance and models the disturbances; the rivals
 (`hil.validation.perf.rivals`) take the nominal vehicle and white noise, so that what a tolerance lets be off is a cause
-to them. Rank and isolation probability are those of `hil.validation.blind_trials.isolation`.
+to them. Rank and isolation probability are those of `hil.validation.blind_trials.isolation`; a rival's probabilities or
+its shares count, whichever put more on the right causes.
 """
 
 import importlib
 import statistics
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -152,7 +153,7 @@ def guess_of(answer: dict[str, Any]) -> Guess:
 
 def rows_of(ours: Sequence[Outcome], others: Sequence[Outcome], rival: str) -> list[Row]:
     """One rival's rows; see `measure`."""
-    sides = ours, others
+    sides = ours, _kinder_reading(others)
     singles = [[one for one in side if one.hidden != NONE] for side in sides]
     nulls = [[one for one in side if one.hidden == NONE] for side in sides]
     found = [[one for one in side if one.detected] for side in singles]
@@ -178,6 +179,15 @@ def rows_of(ours: Sequence[Outcome], others: Sequence[Outcome], rival: str) -> l
         "processor time of a case", statistics.median(times[0]), statistics.median(times[1]), rival, ratio, "s"
     )  # fmt: skip
     return [*rows, score, took]
+
+
+def _kinder_reading(others: Sequence[Outcome]) -> Sequence[Outcome]:
+    """A rival's outcomes with probabilities or with shares for them, as more is on what is hidden in the singles."""
+    by_share = [
+        one if one.guess.shares is None else replace(one, guess=Guess(one.guess.named, one.guess.shares))
+        for one in others
+    ]
+    return max((others, by_share), key=lambda of: sum(one.mass for one in of if one.hidden != NONE))
 
 
 def _row(name: str, sides: Sequence[Sequence[float]], rival: str, good: bool = True) -> Row:

@@ -63,6 +63,16 @@ def test_intervals_hold_the_shares_and_narrow_with_cases():
     assert of_few[1].ours == pytest.approx(0.75)
 
 
+def test_the_reading_of_a_rival_counts_that_is_better_for_it():
+    shares = {"road_grade": 0.3, "mass_offset": 0.7}
+    wrong = Guess("mass_offset", {"mass_offset": 1.0}, shares)
+    cases = [Outcome("road_grade", wrong, 1.0), Outcome(NONE, wrong, 1.0)]
+    ours = [Outcome("road_grade", GRADE, 1.0), Outcome(NONE, NOTHING, 1.0)]
+    assert rows_of(ours, cases, "another")[1].other == 0.3
+    right = [Outcome("road_grade", Guess("road_grade", GRADE.probability, shares), 1.0), cases[1]]
+    assert rows_of(ours, right, "another")[1].other == 1.0
+
+
 def test_what_is_not_detected_counts_in_the_probability_of_all_alone():
     found = Guess("road_grade", {"road_grade": 0.8, NONE: 0.2})
     missed = Guess(NONE, {"road_grade": 0.4, NONE: 0.6})
