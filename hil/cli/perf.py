@@ -9,7 +9,7 @@ from hil.cli.options import add_json, positive
 from hil.cli.progress import Progress
 from hil.errors import BrakebenchError
 
-MEASUREMENTS = ("rt", "plant", "ecu", "codec", "loop", "decode", "explain", "live", "campaign")
+MEASUREMENTS = ("rt", "plant", "ecu", "codec", "loop", "decode", "explain", "coverage", "live", "campaign")
 """Each is a module of hil.validation.perf with ``measure() -> list[Row]``."""
 
 
@@ -45,8 +45,17 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({"rows": [asdict(row) for row in rows]}, indent=2))
         return 0
-    width = max(len(row.name) for row in rows)
-    print(f"{'':{width}}  {'ours':>12} {'other':>12} {'unit':8} {'ratio':>8}  other is")
+    width, spread = max(len(row.name) for row in rows), any(row.ours_95 for row in rows)
+    both = f"{'ours, 95 %':>14} {'other, 95 %':>14} " if spread else ""
+    print(f"{'':{width}}  {'ours':>12} {'other':>12} {both}{'unit':8} {'ratio':>8}  other is")
     for row in rows:
-        print(f"{row.name:{width}}  {row.ours:12.4g} {row.other:12.4g} {row.unit:8} {row.ratio:8.2f}  {row.other_is}")
+        both = f"{_interval(row.ours_95):>14} {_interval(row.other_95):>14} " if spread else ""
+        print(
+            f"{row.name:{width}}  {row.ours:12.4g} {row.other:12.4g} {both}{row.unit:8} {row.ratio:8.2f}"
+            f"  {row.other_is}"
+        )
     return 0
+
+
+def _interval(of: tuple[float, float] | None) -> str:
+    return "" if of is None else f"{of[0]:.2f} to {of[1]:.2f}"

@@ -48,11 +48,16 @@ def median(values: Sequence[float], mark: float | None = None, at_most: bool = F
     return metric(float(np.median(ordered)), float(low), float(high), mark, at_most)
 
 
+def mean(values: Sequence[float]) -> Metric:
+    """Mean, with its interval over drawn cases."""
+    return bootstrapped(lambda drawn, _: float(drawn.mean()), values, [True] * len(values), None)
+
+
 def bootstrapped(
     score: Callable[[np.ndarray[Any, Any], np.ndarray[Any, Any]], float], chances: Sequence[float],
     hits: Sequence[bool], mark: float | None,
 ) -> Metric:  # fmt: skip
-    """A score of chances against what came true, the smaller the better, with its interval over drawn cases."""
+    """A score of chances against what came true, with its interval over drawn cases; a mark is the most it may be."""
     if not len(chances):
         return metric(None, None, None, mark, True)
     p, y = np.asarray(chances, np.float64), np.asarray(hits, np.float64)

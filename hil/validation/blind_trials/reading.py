@@ -1,5 +1,6 @@
 """What a record says: which of the hidden causes were named, and whether one cause was claimed."""
 
+from hil.validation.blind_trials.isolation import probabilities
 from hil.validation.blind_trials.metrics import Record
 from plant.injection.theta import THETA
 
@@ -34,6 +35,13 @@ def is_found(record: Record) -> bool:
 def in_set(record: Record) -> bool:
     """Whether the hidden effect is among the named ones and their rivals."""
     return record["hidden"][0]["effect"] in {*record["named"], *record["rivals"]}
+
+
+def isolation_probability(record: Record) -> float:
+    """Probability of the hidden effect. Older records have none of rivals: there a rival counts as 0."""
+    rivals = zip(record["rivals"], record.get("rival_probabilities", ()), strict=False)
+    entries = [*record["causes"], *({"effect": name, "probability": chance} for name, chance in rivals)]
+    return probabilities(entries).get(record["hidden"][0]["effect"], 0.0)
 
 
 def claims(record: Record) -> bool:

@@ -164,7 +164,7 @@ def _explained(
     except UnusableError as error:
         return None, {
             "verdict": "unusable", "why": str(error), "named": [], "causes": [], "rivals": [], "rivals_at": [],
-            "undetectable_effects": [], "held_out_error": {},
+            "rival_probabilities": [], "undetectable_effects": [], "held_out_error": {},
         }  # fmt: skip
     assert isinstance(answered, Answer)  # the logs tell forces
     found = answered.json
@@ -172,5 +172,6 @@ def _explained(
         "verdict": found["verdict"], "named": [cause["effect"] for cause in found["causes"]],
         "causes": found["causes"], "rivals": [rival["effect"] for rival in found["rivals"]],
         "rivals_at": [f"{rival['effect']}@{rival['location']}" for rival in found["rivals"]],
+        "rival_probabilities": [rival["probability"] for rival in found["rivals"]],
         "undetectable_effects": found["undetectable_effects"], "held_out_error": found["held_out_error"],
     }  # fmt: skip

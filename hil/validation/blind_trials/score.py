@@ -8,7 +8,7 @@ from hil.validation.blind_trials import strangers
 from hil.validation.blind_trials.calibration import calibration
 from hil.validation.blind_trials.detection import detection_limits
 from hil.validation.blind_trials.gain import gain, gain_of_oracle
-from hil.validation.blind_trials.metrics import Metrics, Record, median, share
+from hil.validation.blind_trials.metrics import Metrics, Record, mean, median, share
 from hil.validation.blind_trials.misses import misses
 from hil.validation.blind_trials.parameters import parameters
 from hil.validation.blind_trials.reading import (
@@ -21,6 +21,7 @@ from hil.validation.blind_trials.reading import (
     is_exact,
     is_found,
     is_top,
+    isolation_probability,
     names_listed_elsewhere,
     right_injection_point,
     right_law,
@@ -61,7 +62,11 @@ def _null(records: Records) -> Metrics:
 
 
 def _single(records: Records) -> Metrics:
-    """The first name counts where causes are separable (`hil.validation.blind_trials.separable`)."""
+    """The first name counts where causes are separable (`hil.validation.blind_trials.separable`).
+
+    The isolation probability is that of the hidden effect where anything is named, and of all cases
+    (`hil.validation.blind_trials.isolation`).
+    """
     found: Metrics = {}
     for size in sorted({record["size"] for record in records}):
         of = _reached([record for record in records if record["size"] == size])
@@ -71,6 +76,8 @@ def _single(records: Records) -> Metrics:
         found[f"top1_snr{size:g}"] = share(apart, is_top, {8.0: 0.9, 15.0: 0.97}.get(size))
         found[f"top1_of_all_snr{size:g}"] = share(of, is_top)
         found[f"in_set_snr{size:g}"] = share(of, in_set, 0.99 if sure else None)
+        found[f"isolation_probability_snr{size:g}"] = mean([isolation_probability(r) for r in of if answers(r)])
+        found[f"isolation_probability_of_all_snr{size:g}"] = mean([isolation_probability(r) for r in of])
     return found
 
 

@@ -3,14 +3,15 @@
 The cases are fixed before anything is seen: singles evenly spaced over the list of separable effects, nulls in order.
 Ours fits the vehicle's numbers within their tolerance and models the disturbances; the rivals
 (`hil.validation.perf.rivals`) take the nominal vehicle and white noise, so that what a tolerance lets be off is a cause
-to them.
+to them. Rank and isolation probability are those of `hil.validation.blind_trials.isolation`; a rival's probabilities or
+its shares count, whichever put more on the right causes.
 """
 
 import importlib
 import statistics
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -20,6 +21,8 @@ from hil.diagnosis.result.answer import Answer
 from hil.errors import BrakebenchError
 from hil.extras import pip_install
 from hil.rt.clock import process_cpu_time_ns
+from hil.validation.blind_trials.isolation import probabilities, share_of_first
+from hil.validation.blind_trials.metrics import mean, wilson
 from hil.validation.perf.rivals import NONE, RIVALS, Guess
 from hil.validation.perf.row import Progress, Row, unseen
 from hil.validation.perf.signatures import problem
@@ -27,8 +30,8 @@ from hil.validation.reference_car.cases import draw
 from hil.validation.reference_car.files import read_answer, write
 
 SEED, SNR = 1, 15.0
-SINGLES = (7, 22, 37, 52)
-NULLS = (0, 1, 2, 3)
+SINGLES = (7, 14, 22, 29, 37, 44, 52, 59)
+NULLS = (0, 1, 2, 3, 4, 5, 6, 7)
 WARM_UP = ("m03_motor_20.parquet", "m05_stop_72_hot.parquet")
 """Logs that both sides look at before anything is timed: what is compiled at its first call is compiled then."""
 OURS = "brakebench explain"
@@ -43,9 +46,19 @@ class Outcome:
     time_s: float
 
     @property
-    def wrong(self) -> bool:
-        """Whether anything but what is hidden is named first."""
-        return self.guess.named != self.hidden
+    def detected(self) -> bool:
+        """Whether anything is named at all."""
+        return self.guess.named != NONE
+
+    @property
+    def first(self) -> float:
+        """1 where what is hidden ranks first by probability, less in a tie."""
+        return share_of_first(self.guess.probability, self.hidden)
+
+    @property
+    def mass(self) -> float:
+        """Probability of what is hidden."""
+        return float(self.guess.probability.get(self.hidden, 0.0))
 
     @property
     def brier(self) -> float:
@@ -55,15 +68,17 @@ class Outcome:
 
 
 def measure(progress: Progress = unseen) -> list[Row]:
-    """Rows of ``brakebench perf explain``: for each figure one a rival. Takes some three minutes a case.
+    """Rows of ``brakebench perf explain``: for each figure one a rival. Takes about a minute a case.
 
-    Figures are shares of cases, the mean Brier score, and the median processor time of a case, all threads, reading the
-    logs included; a rival's has the making of the signatures in it, ours the gain on held-out logs. Linear algebra has
-    one thread: more of them poll for each other, and on a busy machine that is most of what would be measured.
+    Figures are shares of cases, means of the probability of the hidden cause and of the Brier score, and the median
+    processor time of a case, all threads, reading the logs included; a rival's has the making of the signatures in it,
+    ours the gain on held-out logs. Linear algebra has one thread: more of them poll for each other, and on a busy
+    machine that is most of what would be measured. Where a side detects nothing, its probability where detected is 0.
 
-    The ratio of shares is (1 + wrong answers of the other) / (1 + wrong answers of ours), that of Brier scores
-    (1 + sum of the other) / (1 + sum of ours): one wrong case is added to both sides, so that no zero of a few cases
-    makes it infinite. That of times is the median of the cases' ratios.
+    The ratio of shares and probabilities is (1 + what the other lacks) / (1 + what ours lacks), each summed over its
+    cases, that of Brier scores (1 + sum of the other) / (1 + sum of ours): one wrong case is added to both sides, so
+    that no zero of a few cases makes it infinite. That of times is the median of the cases' ratios. Intervals of shares
+    are Wilson's, those of means a bootstrap over cases.
 
     Raises
     ------
@@ -131,36 +146,61 @@ def _since_s(begin_ns: int) -> float:
 
 
 def guess_of(answer: dict[str, Any]) -> Guess:
-    """Our answer as a guess: its first cause; probabilities of causes and rivals, the rest on `NONE`.
-
-    Several causes, or a set of tied ones, may add up to more than 1: they share it in proportion.
-    """
-    chances: dict[str, float] = {}
-    for entry in (*answer["causes"], *answer["rivals"]):
-        chances[entry["effect"]] = max(chances.get(entry["effect"], 0.0), float(entry["probability"]))
-    total = max(sum(chances.values()), 1.0)
-    chances = {name: chance / total for name, chance in chances.items()}
+    """Our answer as a guess: its first cause; probabilities of causes and rivals, the rest on `NONE`."""
+    chances = probabilities((*answer["causes"], *answer["rivals"]))
     chances[NONE] = max(1.0 - sum(chances.values()), 0.0)
     return Guess(answer["causes"][0]["effect"] if answer["causes"] else NONE, chances)
 
 
 def rows_of(ours: Sequence[Outcome], others: Sequence[Outcome], rival: str) -> list[Row]:
     """One rival's rows; see `measure`."""
-    rows = []
-    for name, nothing, good in (("hidden cause named first", False, True), ("false alarms", True, False)):
-        pairs = [(a.wrong, b.wrong) for a, b in zip(ours, others, strict=True) if (a.hidden == NONE) == nothing]
-        mine, theirs = (sum(wrong) for wrong in zip(*pairs, strict=True))
-        shares = [(len(pairs) - wrong if good else wrong) / len(pairs) for wrong in (mine, theirs)]
-        title = f"{name}, {len(pairs)} {'with nothing hidden' if nothing else f'singles at SNR {SNR:g}'}"
-        rows.append(Row(title, shares[0], shares[1], rival, (1 + theirs) / (1 + mine), "share"))
-    mine_b, theirs_b = (sum(outcome.brier for outcome in side) for side in (ours, others))
+    sides = ours, _kinder_reading(others)
+    singles = [[one for one in side if one.hidden != NONE] for side in sides]
+    nulls = [[one for one in side if one.hidden == NONE] for side in sides]
+    found = [[one for one in side if one.detected] for side in singles]
+    at = f"{len(singles[0])} singles at SNR {SNR:g}"
+    rows = [
+        _row(f"right cause has rank 1, {at}", [[one.first for one in side] for side in singles], rival),
+        _row(f"probability of the right cause, {at}", [[one.mass for one in side] for side in singles], rival),
+        _row("the same, of those detected", [[one.mass for one in side] for side in found], rival),
+        _row(f"detected, {at}", [[one.detected for one in side] for side in singles], rival),
+        _row(
+            f"false alarms, {len(nulls[0])} with nothing hidden", [[one.detected for one in side] for side in nulls],
+            rival, good=False,
+        ),
+    ]  # fmt: skip
+    mine_b, theirs_b = (sum(outcome.brier for outcome in side) for side in sides)
     score = Row(
         "Brier score over all names, 0 to 2", mine_b / len(ours), theirs_b / len(ours), rival,
         (1.0 + theirs_b) / (1.0 + mine_b), "",
     )  # fmt: skip
-    times = [[outcome.time_s for outcome in side] for side in (ours, others)]
+    times = [[outcome.time_s for outcome in side] for side in sides]
     ratio = statistics.median(b / a for a, b in zip(*times, strict=True))
     took = Row(
         "processor time of a case", statistics.median(times[0]), statistics.median(times[1]), rival, ratio, "s"
     )  # fmt: skip
     return [*rows, score, took]
+
+
+def _kinder_reading(others: Sequence[Outcome]) -> Sequence[Outcome]:
+    """A rival's outcomes with probabilities or with shares for them, as more is on what is hidden in the singles."""
+    by_share = [
+        one if one.guess.shares is None else replace(one, guess=Guess(one.guess.named, one.guess.shares))
+        for one in others
+    ]
+    return max((others, by_share), key=lambda of: sum(one.mass for one in of if one.hidden != NONE))
+
+
+def _row(name: str, sides: Sequence[Sequence[float]], rival: str, good: bool = True) -> Row:
+    """Means of values from 0 to 1 of both sides, by case, with their intervals."""
+    (mine, mine_95), (theirs, theirs_95) = (_mean(side) for side in sides)
+    lacking = [1.0 + sum((1.0 - value) if good else value for value in side) for side in sides]
+    return Row(name, mine, theirs, rival, lacking[1] / lacking[0], "share", mine_95, theirs_95)
+
+
+def _mean(values: Sequence[float]) -> tuple[float, tuple[float, float]]:
+    """Mean of values from 0 to 1, and its interval: of whole hits and misses Wilson's, else a bootstrap's."""
+    if set(values) <= {0.0, 1.0}:
+        return sum(values) / max(len(values), 1), wilson(round(sum(values)), len(values))
+    entry = mean(values)
+    return entry["value"], (entry["low"], entry["high"])

@@ -25,6 +25,7 @@ class Row:
     other_is : what the other is.
     ratio : above 1 when we are better; the median of the pairs' ratios.
     unit : unit of both figures.
+    ours_95, other_95 : 95 % intervals of both figures, where they are shares or means of cases.
     """
 
     name: str
@@ -33,6 +34,8 @@ class Row:
     other_is: str
     ratio: float
     unit: str
+    ours_95: tuple[float, float] | None = None
+    other_95: tuple[float, float] | None = None
 
 
 def paired(

@@ -80,7 +80,17 @@ def test_a_null_case_with_a_cause_is_an_alarm() -> None:
 def test_single_cases_count_the_first_name() -> None:
     records = [_record("a", ["a"]), _record("a", ["b"], rivals=["a"]), _record("a", ["a", "b"]), _record("a", [])]
     values = _values("single", [*records, _record("a", [], reached=False)])
-    assert values == {"detected_snr15": 0.75, "top1_snr15": 0.5, "top1_of_all_snr15": 0.5, "in_set_snr15": 0.75}
+    probability = {"isolation_probability_snr15": (0.9 + 0.0 + 0.5) / 3, "isolation_probability_of_all_snr15": 0.35}
+    assert values == pytest.approx(
+        {"detected_snr15": 0.75, "top1_snr15": 0.5, "top1_of_all_snr15": 0.5, "in_set_snr15": 0.75} | probability
+    )
+
+
+def test_a_rival_has_its_share_of_the_isolation_probability() -> None:
+    tied = _record("a", ["b"], rivals=["a", "c"], rival_probabilities=[0.06, 0.04])
+    metrics = _metrics("single", [tied, _record("a", ["a"])])
+    assert metrics["isolation_probability_snr15"]["value"] == pytest.approx((0.06 + 0.9) / 2)
+    assert 0.0 < metrics["isolation_probability_snr15"]["low"] <= 0.06
 
 
 def test_the_first_name_is_asked_for_only_where_causes_can_be_told_apart() -> None:

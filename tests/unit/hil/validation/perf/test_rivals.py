@@ -40,6 +40,15 @@ def test_a_single_cause_is_named(rival, column, name):
     assert guess.named == name
     assert guess.probability[name] > 0.95
     assert sum(guess.probability.values()) == pytest.approx(1.0)
+    assert max(guess.shares, key=guess.shares.get) == name
+    assert sum(guess.shares.values()) == pytest.approx(1.0)
+    assert guess.shares[NONE] == 0.0
+
+
+def test_shares_go_by_what_is_lost_without_a_cause():
+    pytest.importorskip("pysindy", reason="pysindy is not installed")
+    shares = sparse(_problem(5, {0: 40.0, 7: 20.0})).shares
+    assert (shares["drag"], shares["lag"]) == pytest.approx((0.8, 0.2), abs=0.1)
 
 
 def test_a_cause_at_two_wheels_is_one_name(rival):
@@ -54,6 +63,7 @@ def test_white_noise_raises_no_alarm(rival):
     assert sum(guess.named != NONE for guess in guesses) <= 1
     for guess in guesses:
         assert guess.named == NONE or guess.probability[NONE] > 0.1
+        assert guess.shares[NONE] == (guess.named == NONE)
         assert set(guess.probability) == {NONE, *EFFECTS}
         assert sum(guess.probability.values()) == pytest.approx(1.0)
 
