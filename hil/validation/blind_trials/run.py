@@ -136,7 +136,7 @@ def run_stranger(case: strangers.Case, seed: int, settings: Settings | None = No
         before = None
         if case.reference is not None:
             before = Path(folder) / "reference"
-            strangers.write(case.car, case.reference, None, before)
+            strangers.write(case.car, case.seed, None, before, case.reference)
         _, said = _explained(
             lambda logs: strangers.write(case.car, case.seed, case.hidden, logs), Path(folder), settings, before
         )

@@ -11,6 +11,9 @@ Vector = NDArray[np.float64]
 Table = Mapping[str, Vector]
 Vehicle = Mapping[str, float | list[float]]
 """A vehicle set as its owner writes it: keys of docs/vehicle-set.md."""
+DAY_SHARE = 0.5
+"""Share of what wheels and sensors differ by from one to the other that one differs by from day to day: a choice, near
+the 0.05 % of a tyre's radius that 1 to 2 kPa make."""
 
 
 @dataclass(frozen=True)
@@ -88,10 +91,13 @@ class StrangerCar(Protocol):
         """The set that the owner writes: off from the truth within the tolerances it states."""
 
     def drive(
-        self, seed: int, hidden: Hidden | None = None, noisy: bool = True, off: Tolerated | None = None
-    ) -> Sequence[dict[str, Vector]]:
+        self, seed: int, hidden: Hidden | None = None, noisy: bool = True, off: Tolerated | None = None,
+        day: int | None = None,
+    ) -> Sequence[dict[str, Vector]]:  # fmt: skip
         """Logs of a drive, columns of docs/explain-inputs.md, each with ``t_s``; NaN is no sample.
 
+        ``day`` is the seed of another day with the car of ``seed``: manoeuvres, road, noise and ages of frames are that
+        day's; zeros and scales of sensors, and single wheels, are off by half of what cars differ by in them.
         ``noisy`` False leaves out noise and quantisation of the sensors, not the gusts and the road, which are drawn
         from the seed: two such drives differ by what is hidden or ``off`` alone, row by row until either stands.
         """

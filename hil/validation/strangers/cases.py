@@ -27,8 +27,7 @@ SNR, REACHED = 15.0, 0.02
 class Case:
     """A drive of a car; ``hidden`` None is nothing. ``reached`` False: the cause's range ends before the ratio.
 
-    ``reference`` is the seed of a drive before with nothing hidden, None where there is none: of manoeuvres, noise,
-    road and sensors of its own, and of single wheels that differ from this one's by half of what wheels differ by.
+    ``reference`` is the seed of a day before with nothing hidden, None where there is none (`StrangerCar.drive`).
     """
 
     family: str
@@ -73,8 +72,10 @@ def stated(car: StrangerCar, seed: int) -> dict[str, float | list[float]]:
     return car.stated(np.random.default_rng([seed, 7]))
 
 
-def write(car: StrangerCar, seed: int, hidden: Hidden | None, folder: Path) -> None:
+def write(car: StrangerCar, seed: int, hidden: Hidden | None, folder: Path, day: int | None = None) -> None:
     """Write the logs of a drive (``0.parquet`` and on) and the owner's ``vehicle.toml``; nothing tells what is hidden.
+
+    ``day`` is the seed of another day with the same car.
 
     Raises
     ------
@@ -86,7 +87,7 @@ def write(car: StrangerCar, seed: int, hidden: Hidden | None, folder: Path) -> N
     lines = [f"{key} = {json.dumps(value)}" for key, value in stated(car, seed).items()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for k, table in enumerate(car.drive(seed, hidden)):
+        for k, table in enumerate(car.drive(seed, hidden, day=day)):
             pa.parquet.write_table(pa.table(dict(table)), folder / f"{k}.parquet")
         (folder / "vehicle.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
     except OSError as error:

@@ -21,6 +21,7 @@ from hil.validation.strangers.brake_by_wire_van.motion import (
     G,
 )
 from hil.validation.strangers.brake_by_wire_van.numbers import RADIUS_M, WHEELS, Numbers
+from hil.validation.strangers.car import DAY_SHARE
 from hil.validation.strangers.signals import Vector, sampled, slow_noise, steps
 
 LOG_S = 0.02
@@ -36,6 +37,12 @@ STEP = {
     "wheel": 0.0625 / 3.6 / RADIUS_M, "ax": 0.01 * G, "ay": 0.01 * G, "yaw": 0.00175, "pressure": 5e4, "motor": 1.0,
     "steer": 0.00175, "pressure_demand": 5e4, "motor_demand": 1.0, "pedal": 0.004, "throttle": 0.004,
 }  # fmt: skip
+WHEEL_AGE_S, IMU_AGE_S, MOTOR_AGE_S = (0.010, 0.015), (0.004, 0.006), (0.018, 0.022)
+PRESSURE_AGE_S, STEER_AGE_S = (0.008, 0.014), (0.008, 0.012)
+"""Ages of frames, least and most: each start draws them anew."""
+ZERO_MPS2, AX_GAIN, YAW_ZERO_RAD_S, STEER_ZERO_RAD = 0.02, 0.003, 8e-4, 6e-3
+PRESSURE_ZERO_PA, PRESSURE_GAIN = 5e3, 0.004
+"""By how much sensors differ, one standard deviation."""
 
 
 class Logger(NamedTuple):
@@ -58,12 +65,30 @@ class Logger(NamedTuple):
 def true_logger(rng: np.random.Generator) -> Logger:
     """The logger of one seed."""
     return Logger(
-        wheel_age_s=rng.uniform(0.010, 0.015), imu_age_s=rng.uniform(0.004, 0.006),
-        motor_age_s=rng.uniform(0.018, 0.022), pressure_age_s=rng.uniform(0.008, 0.014),
-        steer_age_s=rng.uniform(0.008, 0.012), ax_zero_mps2=float(rng.normal(0.0, 0.02)),
-        ax_gain=1.0 + float(rng.normal(0.0, 0.003)), ay_zero_mps2=float(rng.normal(0.0, 0.02)),
-        yaw_zero_rad_s=float(rng.normal(0.0, 0.0008)), steer_zero_rad=float(rng.normal(0.0, 0.006)),
-        pressure_zero_pa=rng.normal(0.0, 5e3, 4), pressure_gain=1.0 + rng.normal(0.0, 0.004, 4),
+        wheel_age_s=rng.uniform(*WHEEL_AGE_S), imu_age_s=rng.uniform(*IMU_AGE_S),
+        motor_age_s=rng.uniform(*MOTOR_AGE_S), pressure_age_s=rng.uniform(*PRESSURE_AGE_S),
+        steer_age_s=rng.uniform(*STEER_AGE_S), ax_zero_mps2=float(rng.normal(0.0, ZERO_MPS2)),
+        ax_gain=1.0 + float(rng.normal(0.0, AX_GAIN)), ay_zero_mps2=float(rng.normal(0.0, ZERO_MPS2)),
+        yaw_zero_rad_s=float(rng.normal(0.0, YAW_ZERO_RAD_S)), steer_zero_rad=float(rng.normal(0.0, STEER_ZERO_RAD)),
+        pressure_zero_pa=rng.normal(0.0, PRESSURE_ZERO_PA, 4), pressure_gain=1.0 + rng.normal(0.0, PRESSURE_GAIN, 4),
+    )  # fmt: skip
+
+
+def sensors_another_day(logger: Logger, rng: np.random.Generator) -> Logger:
+    """The same logger on another day: ages of its frames, and zeros and scales off by `DAY_SHARE` of what they are."""
+
+    def off(deviation: float) -> float:
+        return DAY_SHARE * deviation * float(rng.standard_normal())
+
+    return logger._replace(
+        wheel_age_s=rng.uniform(*WHEEL_AGE_S), imu_age_s=rng.uniform(*IMU_AGE_S),
+        motor_age_s=rng.uniform(*MOTOR_AGE_S), pressure_age_s=rng.uniform(*PRESSURE_AGE_S),
+        steer_age_s=rng.uniform(*STEER_AGE_S),
+        ax_zero_mps2=logger.ax_zero_mps2 + off(ZERO_MPS2), ax_gain=logger.ax_gain + off(AX_GAIN),
+        ay_zero_mps2=logger.ay_zero_mps2 + off(ZERO_MPS2), yaw_zero_rad_s=logger.yaw_zero_rad_s + off(YAW_ZERO_RAD_S),
+        steer_zero_rad=logger.steer_zero_rad + off(STEER_ZERO_RAD),
+        pressure_zero_pa=logger.pressure_zero_pa + DAY_SHARE * PRESSURE_ZERO_PA * rng.standard_normal(4),
+        pressure_gain=logger.pressure_gain + DAY_SHARE * PRESSURE_GAIN * rng.standard_normal(4),
     )  # fmt: skip
 
 

@@ -7,7 +7,15 @@ import numpy as np
 
 from hil.validation.strangers.brake_by_wire_van.causes import CAUSES, with_hidden
 from hil.validation.strangers.brake_by_wire_van.course import GUST_MPS, GUST_S, REST_S, Course, courses, slope_mps2
-from hil.validation.strangers.brake_by_wire_van.logger import SLOW, STEP, WHITE, Logger, logged, true_logger
+from hil.validation.strangers.brake_by_wire_van.logger import (
+    SLOW,
+    STEP,
+    WHITE,
+    Logger,
+    logged,
+    sensors_another_day,
+    true_logger,
+)
 from hil.validation.strangers.brake_by_wire_van.motion import FRONT_DEMAND, MOTOR_DEMAND, OMEGA, STATES, VX, run
 from hil.validation.strangers.brake_by_wire_van.numbers import (
     FRONT_GAIN_NM_PA,
@@ -16,6 +24,7 @@ from hil.validation.strangers.brake_by_wire_van.numbers import (
     WHEELS,
     Numbers,
     true_numbers,
+    wheels_another_day,
 )
 from hil.validation.strangers.brake_by_wire_van.papers import stated, tolerated, with_off
 from hil.validation.strangers.car import Cause, Hidden, Noise, Tolerated, Vehicle
@@ -44,20 +53,22 @@ class BrakeByWireVan:
         return stated(rng)
 
     def drive(
-        self, seed: int, hidden: Hidden | None = None, noisy: bool = True, off: Tolerated | None = None
-    ) -> Sequence[dict[str, Vector]]:
+        self, seed: int, hidden: Hidden | None = None, noisy: bool = True, off: Tolerated | None = None,
+        day: int | None = None,
+    ) -> Sequence[dict[str, Vector]]:  # fmt: skip
         """Four to six logs, 90 to 130 s together."""
-        car, logger = with_off(with_hidden(truth(seed), hidden), off)
-        driven = courses(np.random.default_rng([seed, 2]))
+        car, logger = with_off(with_hidden(truth(seed, day), hidden), off)
+        driven_by = seed if day is None else day
+        driven = courses(np.random.default_rng([driven_by, 2]))
         if noisy:
             return [
-                logged(motion(car, course), course.asked_nm, car, logger, np.random.default_rng([seed, 3, k]))
+                logged(motion(car, course), course.asked_nm, car, logger, np.random.default_rng([driven_by, 3, k]))
                 for k, course in enumerate(driven)
             ]
         # demands of the sound van: the control would answer to another speed, which is no signature
         return [
             logged(motion(car, course, given), course.asked_nm, car, logger, None)
-            for course, given in zip(driven, _sound_demands(seed), strict=True)
+            for course, given in zip(driven, _sound_demands(seed, day), strict=True)
         ]
 
     def noise(self, seed: int) -> Noise:
@@ -80,10 +91,14 @@ class BrakeByWireVan:
         return tolerated(stated)
 
 
-def truth(seed: int) -> tuple[Numbers, Logger]:
-    """The van and the logger of a seed, with nothing hidden."""
+def truth(seed: int, day: int | None = None) -> tuple[Numbers, Logger]:
+    """The van and the logger of a seed, with nothing hidden; on another ``day``."""
     rng = np.random.default_rng([seed, 1])
-    return true_numbers(rng), true_logger(rng)
+    car, logger = true_numbers(rng), true_logger(rng)
+    if day is None:
+        return car, logger
+    rng = np.random.default_rng([day, 4])
+    return wheels_another_day(car, rng), sensors_another_day(logger, rng)
 
 
 def motion(car: Numbers, course: Course, demands: Vector = NONE) -> Vector:
@@ -104,7 +119,7 @@ def motion(car: Numbers, course: Course, demands: Vector = NONE) -> Vector:
 
 
 @lru_cache(maxsize=4)
-def _sound_demands(seed: int) -> tuple[Vector, ...]:
-    car, _ = truth(seed)
-    driven = courses(np.random.default_rng([seed, 2]))
+def _sound_demands(seed: int, day: int | None) -> tuple[Vector, ...]:
+    car, _ = truth(seed, day)
+    driven = courses(np.random.default_rng([seed if day is None else day, 2]))
     return tuple(motion(car, course)[:, FRONT_DEMAND : MOTOR_DEMAND + 1].copy() for course in driven)

@@ -34,6 +34,7 @@ from hil.validation.strangers.dead_time.log import (
     WHEELS,
     YAW_ZERO_RAD_S,
     Drawn,
+    another_day,
     draw,
     log,
 )
@@ -137,17 +138,19 @@ class DeadTime:
         return said
 
     def drive(
-        self, seed: int, hidden: Hidden | None = None, noisy: bool = True, off: Tolerated | None = None
-    ) -> list[dict[str, Vector]]:
+        self, seed: int, hidden: Hidden | None = None, noisy: bool = True, off: Tolerated | None = None,
+        day: int | None = None,
+    ) -> list[dict[str, Vector]]:  # fmt: skip
         """Six logs; the script, the noise and all that a seed draws do not depend on what is hidden."""
-        numbers, drawn = TRUE, draw(seed)
+        numbers, drawn = TRUE, draw(seed) if day is None else another_day(seed, day)
         if hidden is not None:
             numbers, drawn = _changed(numbers, drawn, CHANGES[hidden.cause], hidden.size)
         if off is not None:
             numbers, drawn = _changed(numbers, drawn, off.name, off.deviation)
+        driven = seed if day is None else day
         return [
-            log(script, numbers, drawn, [seed, 3, k], noisy)
-            for k, script in enumerate(scripts(np.random.default_rng([seed, 2])))
+            log(script, numbers, drawn, [driven, 3, k], noisy)
+            for k, script in enumerate(scripts(np.random.default_rng([driven, 2])))
         ]
 
     def noise(self, seed: int) -> Noise:

@@ -1,13 +1,13 @@
 """Sensors and logger of the car `dead_time`: what a seed draws, and a log from a script."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from hil.validation.strangers.car import Noise, Vector
+from hil.validation.strangers.car import DAY_SHARE, Noise, Vector
 from hil.validation.strangers.dead_time.motion import STEP_S, Corners, Motion, Numbers, move
 from hil.validation.strangers.dead_time.script import CYCLE_S, Script
 
@@ -75,6 +75,30 @@ def draw(seed: int) -> Drawn:
         ALIKE * WHEEL_ZERO_PA * rng.standard_normal(4), 1.0 + ALIKE * WHEEL_GAIN * rng.standard_normal(4),
         *(ALIKE * size * float(rng.standard_normal()) for size in (AX_ZERO_MPS2, YAW_ZERO_RAD_S)),
         *(1.0 + ALIKE * size * float(rng.standard_normal()) for size in (AX_SCALE, GROUND_SCALE)),
+    )  # fmt: skip
+
+
+def another_day(seed: int, day: int) -> Drawn:
+    """The drive of ``day`` in the car of ``seed``: its wheels and sensors, off by half of what ``day`` draws for them.
+
+    Ages of the nodes, phase of the controller and noise are those of the day.
+    """
+    own, drawn = draw(seed), draw(day)
+    wheels, others = own.corners, drawn.corners
+    gains = np.repeat([GAIN_FRONT, GAIN_REAR], 2)
+    return replace(
+        drawn,
+        corners=Corners(
+            wheels.radius_m + DAY_SHARE * (others.radius_m - RADIUS_M),
+            wheels.brake_gain_nm_pa + DAY_SHARE * (others.brake_gain_nm_pa - gains),
+            wheels.drag_nm, wheels.motor_gain + DAY_SHARE * (others.motor_gain - 1.0),
+        ),
+        pressure_zero_pa=own.pressure_zero_pa + DAY_SHARE * drawn.pressure_zero_pa,
+        pressure_scale=own.pressure_scale + DAY_SHARE * (drawn.pressure_scale - 1.0),
+        ax_zero_mps2=own.ax_zero_mps2 + DAY_SHARE * drawn.ax_zero_mps2,
+        yaw_zero_rad_s=own.yaw_zero_rad_s + DAY_SHARE * drawn.yaw_zero_rad_s,
+        ax_scale=own.ax_scale + DAY_SHARE * (drawn.ax_scale - 1.0),
+        ground_scale=own.ground_scale + DAY_SHARE * (drawn.ground_scale - 1.0),
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hil.validation.strangers.car import DAY_SHARE
 from hil.validation.strangers.hydraulic_saloon.course import LEAD_S
 from hil.validation.strangers.hydraulic_saloon.motion import (
     ANGLE,
@@ -28,6 +29,11 @@ FINE_TEETH = 44 * 50
 WHITE = {"wheel": 0.006, "ax": 0.03, "ay": 0.03, "yaw": 0.0012, "pressure": 6e3, "steer": 0.0015, "speed": 0.025}
 SLOW = {"wheel": (0.006, 0.15), "ax": (0.008, 6.0), "ay": (0.008, 6.0), "yaw": (0.0006, 8.0), "speed": (0.03, 1.5)}
 STEP = {"ax": 0.01, "ay": 0.01, "yaw": 0.0005, "pressure": 1e4, "steer": 0.00175, "speed": 0.01}
+IMU_AGE_S, PRESSURE_AGE_S = (0.006, 0.014), (0.001, 0.006)
+"""Ages of frames, least and most: each start draws them anew."""
+ZERO_MPS2, AX_GAIN, YAW_ZERO_RAD_S, STEER_ZERO_RAD = 0.02, 0.003, 8e-4, 6e-3
+PRESSURE_ZERO_PA, PRESSURE_GAIN = 5e3, 0.004
+"""By how much sensors differ, one standard deviation."""
 
 
 class Logger(NamedTuple):
@@ -60,12 +66,28 @@ class Logger(NamedTuple):
 def true_logger(rng: np.random.Generator, master: bool) -> Logger:
     """The logger of one seed."""
     return Logger(
-        imu_cutoff_hz=rng.uniform(12.0, 20.0), imu_age_s=rng.uniform(0.006, 0.014), wheel_age_s=0.0,
-        pressure_age_s=rng.uniform(0.001, 0.006), speed_age_s=rng.uniform(0.10, 0.20),
-        ax_zero_mps2=float(rng.normal(0.0, 0.02)), ax_gain=1.0 + float(rng.normal(0.0, 0.003)),
-        ay_zero_mps2=float(rng.normal(0.0, 0.02)), yaw_zero_rad_s=float(rng.normal(0.0, 0.0008)),
-        steer_zero_rad=float(rng.normal(0.0, 0.006)), pressure_zero_pa=rng.normal(0.0, 5e3, 4),
-        pressure_gain=1.0 + rng.normal(0.0, 0.004, 4), speed_gain=1.0, runout=np.zeros(4), master=master,
+        imu_cutoff_hz=rng.uniform(12.0, 20.0), imu_age_s=rng.uniform(*IMU_AGE_S), wheel_age_s=0.0,
+        pressure_age_s=rng.uniform(*PRESSURE_AGE_S), speed_age_s=rng.uniform(0.10, 0.20),
+        ax_zero_mps2=float(rng.normal(0.0, ZERO_MPS2)), ax_gain=1.0 + float(rng.normal(0.0, AX_GAIN)),
+        ay_zero_mps2=float(rng.normal(0.0, ZERO_MPS2)), yaw_zero_rad_s=float(rng.normal(0.0, YAW_ZERO_RAD_S)),
+        steer_zero_rad=float(rng.normal(0.0, STEER_ZERO_RAD)), pressure_zero_pa=rng.normal(0.0, PRESSURE_ZERO_PA, 4),
+        pressure_gain=1.0 + rng.normal(0.0, PRESSURE_GAIN, 4), speed_gain=1.0, runout=np.zeros(4), master=master,
+    )  # fmt: skip
+
+
+def sensors_another_day(logger: Logger, rng: np.random.Generator) -> Logger:
+    """The same logger on another day: ages of its frames, and zeros and scales off by `DAY_SHARE` of what they are."""
+
+    def off(deviation: float) -> float:
+        return DAY_SHARE * deviation * float(rng.standard_normal())
+
+    return logger._replace(
+        imu_age_s=rng.uniform(*IMU_AGE_S), pressure_age_s=rng.uniform(*PRESSURE_AGE_S),
+        ax_zero_mps2=logger.ax_zero_mps2 + off(ZERO_MPS2), ax_gain=logger.ax_gain + off(AX_GAIN),
+        ay_zero_mps2=logger.ay_zero_mps2 + off(ZERO_MPS2), yaw_zero_rad_s=logger.yaw_zero_rad_s + off(YAW_ZERO_RAD_S),
+        steer_zero_rad=logger.steer_zero_rad + off(STEER_ZERO_RAD),
+        pressure_zero_pa=logger.pressure_zero_pa + DAY_SHARE * PRESSURE_ZERO_PA * rng.standard_normal(4),
+        pressure_gain=logger.pressure_gain + DAY_SHARE * PRESSURE_GAIN * rng.standard_normal(4),
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hil.validation.strangers.car import DAY_SHARE
 from hil.validation.strangers.signals import Vector
 
 WHEELS = ("fl", "fr", "rl", "rr")
@@ -73,6 +74,8 @@ DRAG, AREA_M2, AIR_KG_M3, ROLLING = 0.305, 2.17, 1.19, 0.0117
 MU, EFFICIENCY = 0.37, 0.96
 PISTON_M2 = np.array([2.29e-3, 2.29e-3, 3.464e-4, 3.464e-4])
 BRAKE_RADIUS_M = np.array([0.1135, 0.1135, 0.1143, 0.1143])
+RADIUS_SHARE, PADS_SHARE = 0.0008, 0.008
+"""By how much wheels differ, one standard deviation."""
 
 
 def true_numbers(rng: np.random.Generator) -> Numbers:
@@ -94,14 +97,14 @@ def true_numbers(rng: np.random.Generator) -> Numbers:
         mass_kg=near(MASS_KG, 20.0), yaw_inertia_kg_m2=near(YAW_KG_M2, 180.0),
         to_axle_m=np.array([front_m, WHEELBASE_M - front_m]), height_m=near(HEIGHT_M, 0.025),
         track_m=np.array([1.528, 1.516]), steering_ratio=near(RATIO, 0.3),
-        radius_m=radius * (1.0 + four(0.0008)),
+        radius_m=radius * (1.0 + four(RADIUS_SHARE)),
         wheel_inertia_kg_m2=near(INERTIA_KG_M2, 0.1) * np.array([1.05, 1.05, 0.95, 0.95]),
         drag_kg_m=0.5 * air * near(DRAG, 0.015) * AREA_M2, lift_kg_m=0.5 * air * AREA_M2 * np.array([0.04, 0.09]),
         rolling=np.full(4, tyre_rolling), drag_nm=1.2 + 0.8 * rng.random(4), gearbox_nm=1.5, gearbox_nms=0.012,
         stiffness=near(21.0, 3.0), cornering=np.array([14.5, 17.5]) * near(1.0, 0.1), friction=near(1.02, 0.06),
         length_m=near(0.28, 0.08), side_length_m=near(0.5, 0.1),
         piston_m2=PISTON_M2, radius_brake_m=BRAKE_RADIUS_M, efficiency=EFFICIENCY,
-        mu=np.array([front_mu, front_mu, rear_mu, rear_mu]) * (1.0 + four(0.008)),
+        mu=np.array([front_mu, front_mu, rear_mu, rear_mu]) * (1.0 + four(PADS_SHARE)),
         threshold_pa=np.array([4e4, 4e4, 7e4, 7e4]) + four(5e3), pad_speed_loss=rng.uniform(0.03, 0.06),
         cold_loss=np.zeros(4), mu_exponent=np.zeros(4), held_pa=np.zeros(4), judder=np.zeros(4),
         knee_pa=near(2.6e6, 2e5), valve_slope=near(0.37, 0.03), booster_s=rng.uniform(0.05, 0.09),
@@ -111,3 +114,9 @@ def true_numbers(rng: np.random.Generator) -> Numbers:
         dive_rad_s2_m=rng.uniform(0.9, 1.4) * 0.00178, roll_rad_s2_m=rng.uniform(3.5, 5.0) * 0.00178,
         transfer_s=rng.uniform(0.05, 0.10), toe_rad=rng.normal(0.0, 0.0003),
     )  # fmt: skip
+
+
+def wheels_another_day(car: Numbers, rng: np.random.Generator) -> Numbers:
+    """The same car on another day: radius and pads of single wheels off by `DAY_SHARE` of what wheels differ by."""
+    radius, pads = (1.0 + DAY_SHARE * share * rng.standard_normal(4) for share in (RADIUS_SHARE, PADS_SHARE))
+    return car._replace(radius_m=car.radius_m * radius, mu=car.mu * pads)

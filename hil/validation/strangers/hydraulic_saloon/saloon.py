@@ -7,9 +7,17 @@ import numpy as np
 from hil.validation.strangers.car import Cause, Hidden, Noise, Tolerated, Vehicle
 from hil.validation.strangers.hydraulic_saloon.causes import CAUSES, with_hidden
 from hil.validation.strangers.hydraulic_saloon.course import GUST_MPS, GUST_S, REST_S, Course, courses, slope_mps2
-from hil.validation.strangers.hydraulic_saloon.logger import SLOW, STEP, WHITE, Logger, logged, true_logger
+from hil.validation.strangers.hydraulic_saloon.logger import (
+    SLOW,
+    STEP,
+    WHITE,
+    Logger,
+    logged,
+    sensors_another_day,
+    true_logger,
+)
 from hil.validation.strangers.hydraulic_saloon.motion import OMEGA, STATES, TEMPERATURE, VX, run
-from hil.validation.strangers.hydraulic_saloon.numbers import WHEELS, Numbers, true_numbers
+from hil.validation.strangers.hydraulic_saloon.numbers import WHEELS, Numbers, true_numbers, wheels_another_day
 from hil.validation.strangers.hydraulic_saloon.papers import stated, tolerated, with_off
 from hil.validation.strangers.signals import Vector
 
@@ -34,12 +42,14 @@ class HydraulicSaloon:
         return stated(rng)
 
     def drive(
-        self, seed: int, hidden: Hidden | None = None, noisy: bool = True, off: Tolerated | None = None
-    ) -> Sequence[dict[str, Vector]]:
+        self, seed: int, hidden: Hidden | None = None, noisy: bool = True, off: Tolerated | None = None,
+        day: int | None = None,
+    ) -> Sequence[dict[str, Vector]]:  # fmt: skip
         """Four to six logs, 90 to 130 s together."""
-        car, logger = with_off(with_hidden(truth(seed), hidden), off)
-        driven = courses(np.random.default_rng([seed, 2]))
-        sensing = [np.random.default_rng([seed, 3, k]) if noisy else None for k in range(len(driven))]
+        car, logger = with_off(with_hidden(truth(seed, day), hidden), off)
+        driven_by = seed if day is None else day
+        driven = courses(np.random.default_rng([driven_by, 2]))
+        sensing = [np.random.default_rng([driven_by, 3, k]) if noisy else None for k in range(len(driven))]
         return [logged(motion(car, course), car, logger, rng) for course, rng in zip(driven, sensing, strict=True)]
 
     def noise(self, seed: int) -> Noise:
@@ -63,10 +73,14 @@ class HydraulicSaloon:
         return tolerated(stated)
 
 
-def truth(seed: int) -> tuple[Numbers, Logger]:
-    """The car and the logger of a seed, with nothing hidden."""
+def truth(seed: int, day: int | None = None) -> tuple[Numbers, Logger]:
+    """The car and the logger of a seed, with nothing hidden; on another ``day``."""
     rng = np.random.default_rng([seed, 1])
-    return true_numbers(rng), true_logger(rng, master=bool(rng.random() < 0.5))
+    car, logger = true_numbers(rng), true_logger(rng, master=bool(rng.random() < 0.5))
+    if day is None:
+        return car, logger
+    rng = np.random.default_rng([day, 4])
+    return wheels_another_day(car, rng), sensors_another_day(logger, rng)
 
 
 def motion(car: Numbers, course: Course) -> Vector:
