@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
+from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.validation.perf.coverage import COEFFICIENTS, VALUE, Drives, Interval, coloured, drawn, row_of
 
 DRAWS = 60
@@ -29,6 +30,14 @@ def test_95_percent_intervals_hold_the_truth_in_coloured_noise() -> None:
             assert binom.cdf(by_others, DRAWS, ASKED[0]) > CHANCE
         if coefficient == 0.9:
             assert by_others / DRAWS < 0.5
+
+
+@pytest.mark.slow
+def test_without_the_noise_model_intervals_are_too_narrow(monkeypatch: pytest.MonkeyPatch) -> None:
+    start = Fitter.start
+    monkeypatch.setattr(Fitter, "start", lambda fitter: start(fitter, enabled=False))
+    found = drawn(Drives(), 0.9, 20)
+    assert binom.cdf(sum(ours.holds for ours, _ in found), 20, ASKED[0]) < 1e-6
 
 
 def test_the_noise_has_the_coefficient_and_the_variance_it_is_told() -> None:
