@@ -17,11 +17,11 @@ structure whose numbers go far (docs/decisions/simulation-speed.md)."""
 
 def counted(report: Progress, stage: str, results: Iterable[Item], count: int) -> Iterator[Item]:
     """The results of a stage as they come, with lines that say how many of ``count`` are done."""
-    begun_ns = last_ns = monotonic_ns()
+    start_ns = last_ns = monotonic_ns()
     for done, result in enumerate(results, 1):
         now_ns = monotonic_ns()
         if done < count and now_ns - last_ns > _EVERY_S * 1e9:
-            left_s = (now_ns - begun_ns) * 1e-9 * (count - done) / done
+            left_s = (now_ns - start_ns) * 1e-9 * (count - done) / done
             report(f"{stage}: {done} of {count}, about {left_s:.0f} s left")
             last_ns = now_ns
         yield result

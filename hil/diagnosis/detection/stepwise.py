@@ -84,9 +84,9 @@ class StepwiseSelection:
         simulator = Simulator(dataset, vehicle).prepared(base)
         self.vehicle, self.masks = vehicle, SampleMasks.of(simulator.dataset)
         progress("simulating the nominal vehicle")
-        begun_ns = monotonic_ns()
+        start_ns = monotonic_ns()
         self.nuisance_fit = self._nuisance_fit(simulator, base)
-        progress(expectation(simulator.runs, monotonic_ns() - begun_ns))
+        progress(expectation(simulator.runs, monotonic_ns() - start_ns))
         self.nominal_fitter = self.fitter
         self.nominal, self.first_noise = self.fitter.start(settings.noise_model)
 

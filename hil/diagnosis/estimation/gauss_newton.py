@@ -174,7 +174,7 @@ class Fitter:
         return Fitter(self.simulator, self.masks, self.base, self.nuisances, columns, self.origin)
 
     def forget(self) -> None:
-        """Free the whitened Jacobian, as large as the Jacobian itself; it is made again where it is asked for."""
+        """Free the whitened Jacobian, as large as the Jacobian itself; it is made again where it is needed."""
         shared, empty = self._whitened, _Whitened()
         shared.noise, shared.columns, shared.products = None, empty.columns, empty.products
 

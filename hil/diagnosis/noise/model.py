@@ -180,7 +180,7 @@ def whiten(
 
     They are written ``into`` arrays by track, where these are given; of some ``chosen`` columns alone only into such.
     """
-    out = {name: np.empty_like(values) for name, values in tracks.items()} if into is None else dict(into)
+    out = {name: np.empty(one.shape, one.dtype) for name, one in tracks.items()} if into is None else dict(into)
     filters: list[Callable[[], float]] = [
         partial(_whiten_channel, name, values, frame, noise, out[name], chosen)
         for name, values in tracks.items()
@@ -253,7 +253,7 @@ def _whiten_longitudinal(
 
 
 def _columns(values: Floats, chosen: Sequence[int] | None) -> Floats:
-    return values if chosen is None else values[:, list(chosen)]
+    return values if chosen is None else np.ascontiguousarray(values[:, list(chosen)])
 
 
 def _whiten_channel(
