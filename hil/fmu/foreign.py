@@ -31,7 +31,7 @@ class ForeignFmu:
     Attributes
     ----------
     name : of the file, for people.
-    told : what its model description says: name, fmi, tool, step_s (0: nothing), inputs, outputs.
+    description : what its model description says: name, fmi, tool, step_s (0: nothing), inputs, outputs.
 
     Raises
     ------
@@ -55,7 +55,7 @@ class ForeignFmu:
         self._rest = b""
         try:
             asked = {"path": str(path.resolve()), "folder": self._folder.name, "parameters": dict(parameters or {})}
-            self.told: dict[str, Any] = self._ask(asked, LOAD_TIMEOUT_S)
+            self.description: dict[str, Any] = self._ask(asked, LOAD_TIMEOUT_S)
         except BaseException:
             self.close()
             raise

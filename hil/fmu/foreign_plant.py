@@ -13,7 +13,7 @@ from dbc.exchange import Receiver
 from dbc.frame import Frame, Received
 from hil.fmu.foreign import ForeignFmu
 from hil.fmu.model import FmuError
-from hil.fmu.plant_map import ASKED, SENT, SPEED, PlantMap, Source, load_plant_map
+from hil.fmu.plant_map import REQUESTED, SENT, SPEED, PlantMap, Source, load_plant_map
 from hil.scenario.scenario import Scenario
 from plant import driver
 from plant.demands import DEMANDS, Demands
@@ -30,12 +30,12 @@ def checked_step_s(fmu: ForeignFmu, chart: PlantMap) -> float:
     ------
     FmuError : the FMU has not what the chart names, or states no step; it is closed then.
     """
-    known = set(fmu.told["outputs"])
+    known = set(fmu.description["outputs"])
     odd = [name for name in (*chart.inputs, *chart.wanted) if name not in known]
     if odd:
         fmu.close()
         raise FmuError(f"{fmu.name}: has no number {', '.join(odd)}; correct the map")
-    step_s: float = chart.step_s or fmu.told["step_s"]
+    step_s: float = chart.step_s or fmu.description["step_s"]
     if not step_s > 0.0:
         fmu.close()
         raise FmuError(f"{fmu.name}: states no step; give step_s in the map")
@@ -75,7 +75,7 @@ class ForeignPlant:
                 self._places[f"{spec_of(kind).name}.{field.signal}"] = len(self._places)
                 self._batch.values[len(self._places) - 1] = math.nan if field.sna is not None else 0.0
         self._random = np.random.default_rng(seed)
-        self._asked: dict[str, float] = dict.fromkeys(ASKED, 0.0)
+        self._asked: dict[str, float] = dict.fromkeys(REQUESTED, 0.0)
         self._values: dict[str, float] = {}
         self._start_ns: int | None = None
         self._steps = 0
@@ -147,7 +147,7 @@ class ForeignPlant:
         target = manoeuvre.initial_speed_mps if start is None else driver.target_speed(manoeuvre, time_s)
         pressure, motor = self._demands.update(now_ns, pedal)
         told = (*pressure, *motor, pedal, steering, target or 0.0)
-        self._asked = dict(zip(ASKED, told, strict=True))
+        self._asked = dict(zip(REQUESTED, told, strict=True))
 
 
 class OpenPlant:
@@ -162,7 +162,7 @@ class OpenPlant:
 
     def __str__(self) -> str:
         """For people."""
-        told, step_s = self._fmu.told, self._map.step_s or self._fmu.told["step_s"]
+        told, step_s = self._fmu.description, self._map.step_s or self._fmu.description["step_s"]
         return f"{self._fmu.name} ({told['name']}, FMI {told['fmi']}, {told['tool']}), steps of {step_s * 1e3:g} ms"
 
     def __enter__(self) -> Self:

@@ -26,7 +26,7 @@ def _names(kinds: Sequence[type[Message]]) -> list[str]:
     return [f"{spec_of(kind).name}.{field.signal}" for kind in kinds for field in spec_of(kind).fields]
 
 
-ASKED = (*_names(DEMANDS), *DRIVER)
+REQUESTED = (*_names(DEMANDS), *DRIVER)
 """What an input of the FMU may follow, SI units."""
 TOLD = tuple(name for name in _names(SENT) if name not in _OWN and not name.startswith("PLANT_RECEPTION."))
 """What an output of the FMU may be, SI units."""
@@ -34,7 +34,7 @@ TOLD = tuple(name for name in _names(SENT) if name not in _OWN and not name.star
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A number times a factor: a variable of the FMU, one of `ASKED`, or 1."""
+    """A number times a factor: a variable of the FMU, one of `REQUESTED`, or 1."""
 
     kind: Literal["fmu", "signal", "value"]
     name: str
@@ -58,7 +58,7 @@ class Source:
 
         Parameters
         ----------
-        fmu, asked : variables of the FMU, and `ASKED`, by name: numbers, or arrays of one shape.
+        fmu, asked : variables of the FMU, and `REQUESTED`, by name: numbers, or arrays of one shape.
         one : 1, of the same shape.
         """
         total = 0.0 * one
@@ -186,6 +186,6 @@ def _terms(inner: Table, plain: Literal["fmu", "signal"]) -> tuple[Term, float]:
 
 
 def _term(where: str, kind: Literal["fmu", "signal"], name: str) -> Term:
-    if kind == "signal" and name not in ASKED:
-        raise ScenarioError(f"{where}: {name!r} is nothing that the car is asked; known: {', '.join(ASKED)}")
+    if kind == "signal" and name not in REQUESTED:
+        raise ScenarioError(f"{where}: {name!r} is nothing that the car is asked; known: {', '.join(REQUESTED)}")
     return Term(kind, name)

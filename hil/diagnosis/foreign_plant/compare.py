@@ -16,11 +16,11 @@ from hil.diagnosis.result.residual_patterns import UNITS, variables_of
 from hil.diagnosis.result.statistics import pattern
 
 LEAST_SAMPLES = 50
-"""Compared samples that a channel needs, and a context to be told (as `hil.diagnosis.noise.model`)."""
+"""Compared samples that a channel needs, and a context to be listed (as `hil.diagnosis.noise.model`)."""
 _SWING_S = 0.3  # after the start of a segment, until the body has swung in (as there)
 _LONGEST_LAG_S, _MOVES = 0.5, 3.0
 """Lags that are tried, either way, and times its noise that a channel moves for a lag to be seen."""
-_WORST_S = 1.0  # length of the stretch that is told as the worst
+_WORST_S = 1.0  # length of the stretch that is listed as the worst
 _APPLIED_PA, _DRIVES_NM = 2e5, 20.0  # of any wheel: brakes and motors that act
 _CORRELATED_S = 0.1  # time between samples that count for a correlation
 

@@ -94,7 +94,7 @@ def _comparison(answer: Residuals) -> Section:
     return Section(
         "Measured against simulated", panels=tuple(panels),
         timeline=(log_lane(names, t[gaps].tolist(), float(t[-1])),),
-        text="All logs, one after the other. The FMU is driven by what driver and controller asked for in the log; "
+        text="All logs, one after the other. The FMU is driven by what driver and controller demanded in the log; "
         "each stretch begins anew at the measured speed. Residuals only where the channel is compared.",
     )  # fmt: skip
 
@@ -110,7 +110,7 @@ def _contexts(answer: Residuals) -> Section:
         (one.channel, *(rounded(one.contexts[name] / one.noise) if name in one.contexts else None for name in names))
         for one in answer.channels
     )
-    note = f"Up to {NOTHING_LEFT:g} is noise; below {LEAST_SAMPLES} samples nothing is told."
+    note = f"Up to {NOTHING_LEFT:g} is noise; below {LEAST_SAMPLES} samples nothing is listed."
     return Section(
         "Where it misses", tables=(Table("rms over noise, by what the car does", ("channel", *names), rows, note),)
     )

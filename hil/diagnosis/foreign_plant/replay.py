@@ -14,12 +14,12 @@ from hil.diagnosis.data.log import MOTOR_TORQUE, Floats, UnusableError
 from hil.diagnosis.data.prepare import TRACK
 from hil.fmu.foreign import ForeignFmu
 from hil.fmu.foreign_plant import checked_step_s, steps_until
-from hil.fmu.plant_map import ASKED, SPEED, PlantMap, Source
+from hil.fmu.plant_map import REQUESTED, SPEED, PlantMap, Source
 from plant.vectors import INPUT
 
-_PEDAL, _STEERING, _ = ASKED[8:]
+_PEDAL, _STEERING, _ = REQUESTED[8:]
 _FOUR = ("pressure_demand_pa", "motor_demand_nm")
-"""Inputs that the first eight of `ASKED` are, four of each."""
+"""Inputs that the first eight of `REQUESTED` are, four of each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,14 +52,14 @@ def replay(
     about: dict[str, Any] = {}
     total, done = len(dataset.segments), 0
     for recording in dataset.recordings:
-        asked = _asked((*chart.inputs.values(), *sources.values()), recording)
+        requested = _requested((*chart.inputs.values(), *sources.values()), recording)
         rows = {channel: np.full(len(recording.inputs), np.nan) for channel in sources}
         for segment in _segments(recording, chart):
             done += 1
             report(f"{path.name}: {recording.log.name}, from {segment.first * ROW_S:.0f} s" + f" ({done} of {total})")
-            here = {name: values[segment.first : segment.last] for name, values in asked.items()}
-            told, found = _driven(path, chart, here, start_speed(segment, radius_m))
-            about = about or {name: told[name] for name in ("name", "fmi", "tool", "step_s")}
+            here = {name: values[segment.first : segment.last] for name, values in requested.items()}
+            about_fmu, found = _driven(path, chart, here, start_speed(segment, radius_m))
+            about = about or {name: about_fmu[name] for name in ("name", "fmi", "tool", "step_s")}
             one = np.ones(segment.last - segment.first)
             for channel, source in sources.items():
                 factor = torque_constant_nm_a if channel in MOTOR_TORQUE else 1.0  # motors tell their current
@@ -97,17 +97,19 @@ def start_speed(segment: Segment, radius_m: float) -> float:
 
 
 def _segments(recording: Recording, chart: PlantMap) -> tuple[Segment, ...]:
-    """Those of the recording; all in one for an FMU that cannot be told its speed."""
+    """Those of the recording; all in one for an FMU that does not take its speed."""
     first = recording.segments[0]
     whole = Segment(0, len(recording.inputs), first.start_wheel_rad_s, first.start_speed_mps)
     return (whole,) if chart.start_speed is None else recording.segments
 
 
-def _asked(wanted: Iterable[Source], recording: Recording) -> dict[str, Floats]:
-    """What driver and controller asked for, (rows,) by name of `ASKED`; all that is ``wanted``."""
+def _requested(wanted: Iterable[Source], recording: Recording) -> dict[str, Floats]:
+    """What driver and controller demanded, (rows,) by name of `REQUESTED`; all that is ``wanted``."""
     log, inputs = recording.log, recording.inputs
     columns = np.hstack([inputs[:, INPUT.slice(name)] for name in _FOUR])
-    found = dict(zip(ASKED, columns.T, strict=False)) | {_STEERING: inputs[:, INPUT.slice("steering_wheel_rad")][:, 0]}
+    found = dict(zip(REQUESTED, columns.T, strict=False)) | {
+        _STEERING: inputs[:, INPUT.slice("steering_wheel_rad")][:, 0]
+    }
     if log.has("pedal"):
         grid_s = float(log.t_s[0]) + ROW_S * np.arange(len(inputs))
         found[_PEDAL] = without_gaps(resampled(log, "pedal", grid_s))
@@ -121,13 +123,13 @@ def _asked(wanted: Iterable[Source], recording: Recording) -> dict[str, Floats]:
 
 
 def _driven(
-    path: Path, chart: PlantMap, asked: Mapping[str, Floats], start_mps: float
+    path: Path, chart: PlantMap, requested: Mapping[str, Floats], start_mps: float
 ) -> tuple[dict[str, Any], dict[str, Floats]]:
     """What the FMU says of itself, and its variables, (rows,): inputs hold from each row to the next."""
     fmu = ForeignFmu(path, chart.parameters_at(start_mps))
     try:
-        step_s, rows = checked_step_s(fmu, chart), len(next(iter(asked.values())))
-        inputs = {name: source.value({}, asked, np.ones(rows)) for name, source in chart.inputs.items()}
+        step_s, rows = checked_step_s(fmu, chart), len(next(iter(requested.values())))
+        inputs = {name: source.value({}, requested, np.ones(rows)) for name, source in chart.inputs.items()}
         wanted, steps = chart.wanted, 0
         table = np.empty((rows, len(wanted)))
         for row in range(rows):
@@ -139,6 +141,6 @@ def _driven(
             else:
                 table[row] = table[row - 1]
             steps = due
-        return fmu.told | {"step_s": step_s}, dict(zip(wanted, table.T, strict=True))
+        return fmu.description | {"step_s": step_s}, dict(zip(wanted, table.T, strict=True))
     finally:
         fmu.close()

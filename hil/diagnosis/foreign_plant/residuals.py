@@ -22,8 +22,8 @@ from plant.vectors import INPUT
 
 NOTHING_LEFT = 1.5
 """Times its noise within which a channel counts as reproduced: the noise of two sensors is 1.4 times that of one."""
-_ACTS_NM, _ASKED_NM, _LEAST_UNDEMANDED_S = 20.0, 5.0, 0.2
-"""Mean torque that drives or brakes, and demand that asks for none, N m; time that is told, s: longer than a lag."""
+_ACTS_NM, _DEMANDED_NM, _LEAST_UNDEMANDED_S = 20.0, 5.0, 0.2
+"""Mean torque that drives or brakes, and demand that is none, N m; time that is remarked, s: longer than a lag."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ def headline(name: str, channels: Sequence[ChannelResidual]) -> str:
 
 def _remarks(about: Mapping[str, Any], dataset: Dataset) -> list[str]:
     found = [
-        f"{one.log.name}: motors act for {acts_s:.1f} s without a demand, of which the FMU is not told"
+        f"{one.log.name}: motors act for {acts_s:.1f} s without a demand, which the FMU does not get"
         for one in dataset.recordings
         if (acts_s := _undemanded_s(one)) > _LEAST_UNDEMANDED_S
     ]
@@ -107,8 +107,8 @@ def _remarks(about: Mapping[str, Any], dataset: Dataset) -> list[str]:
 
 
 def _undemanded_s(recording: Recording) -> float:
-    """Time for which motors act and nobody asked, as when a driver holds the speed, s."""
+    """Time for which motors act and nothing is demanded, as when a driver holds the speed, s."""
     torque, demand = (
         np.abs(recording.inputs[:, INPUT.slice(name)]).mean(axis=1) for name in ("motor_torque_nm", "motor_demand_nm")
     )
-    return float(np.count_nonzero((torque > _ACTS_NM) & (demand < _ASKED_NM)) * ROW_S)
+    return float(np.count_nonzero((torque > _ACTS_NM) & (demand < _DEMANDED_NM)) * ROW_S)

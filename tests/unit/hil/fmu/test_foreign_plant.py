@@ -18,7 +18,7 @@ from hil.fmu.export import export
 from hil.fmu.foreign import ForeignFmu
 from hil.fmu.foreign_plant import open_plant
 from hil.fmu.model import FmuError
-from hil.fmu.plant_map import ASKED, TOLD
+from hil.fmu.plant_map import REQUESTED, TOLD
 from hil.scenario.scenario import load_scenario
 
 pytestmark = pytest.mark.slow
@@ -32,7 +32,7 @@ def car(tmp_path_factory):
     """Our own car as an FMU, and a map that names everything once."""
     folder = tmp_path_factory.mktemp("car")
     export("plant", SCENARIO, folder / "car.fmu")
-    lines = ["[inputs]", *(f'"{name}" = "{name}"' for name in ASKED[:8])]
+    lines = ["[inputs]", *(f'"{name}" = "{name}"' for name in REQUESTED[:8])]
     lines += ['"STEERING.STEERING_WHEEL_ANGLE" = "DRIVER.STEERING_WHEEL_ANGLE"', "[outputs]"]
     theirs = [n for n in TOLD if not n.startswith(("BRAKE_PEDAL", "STEERING")) and "EHB_STATE" not in n]
     (folder / "car.toml").write_text("\n".join([*lines, *(f'"{name}" = "{name}"' for name in theirs)]))

@@ -19,7 +19,7 @@ from hil.diagnosis.explain import logs_of, vehicle_of
 from hil.diagnosis.foreign_plant.residuals import residuals
 from hil.fmu.export import export
 from hil.fmu.foreign import ForeignFmu
-from hil.fmu.plant_map import ASKED, TOLD
+from hil.fmu.plant_map import REQUESTED, TOLD
 from hil.scenario.scenario import load_scenario
 
 pytestmark = pytest.mark.slow
@@ -33,7 +33,7 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("residuals")
     export("plant", load_scenario("stop72"), folder / "car.fmu")
     start = 'start_speed = "start.speed_mps"\n[parameters]\n"start.disc_temperature_k" = 423.15\nseed = 7\n'
-    lines = ["[inputs]", *(f'"{name}" = "{name}"' for name in ASKED[:8])]
+    lines = ["[inputs]", *(f'"{name}" = "{name}"' for name in REQUESTED[:8])]
     lines += ['"STEERING.STEERING_WHEEL_ANGLE" = "DRIVER.STEERING_WHEEL_ANGLE"', "[outputs]"]
     theirs = [n for n in TOLD if not n.startswith(("BRAKE_PEDAL", "STEERING")) and "EHB_STATE" not in n]
     lines += [f'"{name}" = "{name}"' for name in theirs]

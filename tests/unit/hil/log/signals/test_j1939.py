@@ -52,7 +52,7 @@ LONG = as_j1939(
         "BO_ 2566834942 DM1: 20 A",  # 0x18FECAFE
         ' SG_ First : 0|8@1+ (1,0) [0|0] "" A',
         ' SG_ Last : 152|8@1+ (1,0) [0|0] "" A',
-        "BO_ 2565800190 ASKED: 9 A",  # 0x18EF00FE: below PDU format 240
+        "BO_ 2565800190 REQUESTED: 9 A",  # 0x18EF00FE: below PDU format 240
         ' SG_ First : 0|8@1+ (1,0) [0|0] "" A',
     )
 )
@@ -81,7 +81,7 @@ def test_a_message_to_one_node_is_joined_and_matches_whatever_the_destination():
     cts = (0x18EC0327, bytes([0x11, 2, 1, 0xFF, 0xFF, 0, 0xEF, 0]), 0, 0, 20 * MS)
     end = (0x18EC0327, bytes([0x13, 9, 0, 2, 0xFF, 0, 0xEF, 0]), 0, 0, 120 * MS)
     log = decoded([*frames, cts, end])
-    assert log.messages["ASKED"].transported == 1
+    assert log.messages["REQUESTED"].transported == 1
     assert (log.transport.joined, log.transport.frames, log.transport.broken) == (1, 5, {})
 
 
@@ -97,7 +97,7 @@ def test_transfers_side_by_side_do_not_disturb_one_another():
     assert (log.transport.joined, log.transport.broken) == (5, {})
     assert log.columns["DM1.First"].values.tolist() == [0, 5]
     assert log.columns["DM1@02.First"].values.tolist() == [19]
-    assert log.messages["ASKED"].count == 2
+    assert log.messages["REQUESTED"].count == 2
     assert log.several_channels
 
 
