@@ -188,6 +188,7 @@ def _is_number(cell: Cell) -> bool:
 
 def _cell(cell: Cell, right: bool, column: int) -> str:
     text = value_text(cell)
+    text = symbol(text) if text.startswith("m/s") else text
     kind = "n" if right else "s" if len(text) <= _ONE_LINE else "t"
     shown = _PAIR.sub(_together, escape(text))
     if column == 0 and kind == "t":  # a long name breaks at its joints where the page is narrow
