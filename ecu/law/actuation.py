@@ -73,7 +73,8 @@ def _actuate(z: Vector, p: Vector) -> None:
     torque = _brake_torque(deceleration, resistance, mass, v)
     demand = _distribute(torque, b.front_share)
     wanted = _wanted_torque(demand, _motor_factor(z[_FACTOR], mu, b.pad_friction, c), _four(z, _USABLE), m)
-    power = sum(wanted) * max(wheel_speed, 0.0) * m.charge_efficiency
+    w0, w1, w2, w3 = wanted  # no sum(): uncompiled it compensates from Python 3.12 on
+    power = (w0 + w1 + w2 + w3) * max(wheel_speed, 0.0) * m.charge_efficiency
     held = _ChargePower(z[_HELD], z[_HELD + 1], z[_HELD + 2])
     charge = _ramp_charge_limit(held, z[_ANNOUNCED], power, s, dt)
     shares = _blend(demand, wanted, power, charge, speed, deceleration, s)

@@ -50,5 +50,6 @@ def motor_factor(factor: float, friction: Four, nominal: float, p: CompensationP
     alpha' = alpha (1 + k max(0, s - mean(mu) / mu_nominal)): "keeping the brakes in their optimal operating
     conditions" (paper, introduction). Blending that is switched off stays off.
     """
-    lack = max(p.motor_preference_from - 0.25 * sum(friction) / nominal, 0.0)
+    f0, f1, f2, f3 = friction  # no sum(): uncompiled it compensates from Python 3.12 on
+    lack = max(p.motor_preference_from - 0.25 * (f0 + f1 + f2 + f3) / nominal, 0.0)
     return min(factor * (1.0 + p.motor_preference * lack), 1.0)

@@ -18,7 +18,6 @@ _ONE_LINE = 20  # letters of a cell that are never broken: numbers with unit or 
 _TABLES_OPEN = 4  # of a section; more are folded
 _PAIR = re.compile(r"\d (?:(?:to|±|/|of) (?=[-+]?\d)|(?=%))")  # stays on one line: 0.2 to 0.3, 5 ± 1, 1 / 596, 18 %
 _NUMBERS = re.compile(r"(?:[-+−]?[\d.]+(?:e[-+]?\d+)?(?:/[-+−]?[\d.]+|/never)?|never|–)?")
-_LONG_NAME = 20  # letters: beyond half of the narrowest page
 _JOINT = re.compile(r"(?<=\w)[._](?=\w)")
 _VERDICT_MARKS = {"passed": "✓", "failed": "✗", "inconclusive": "?", "incomplete": "!", "broken": "✗"}
 
@@ -189,10 +188,11 @@ def _is_number(cell: Cell) -> bool:
 
 def _cell(cell: Cell, right: bool, column: int) -> str:
     text = value_text(cell)
+    text = symbol(text) if text.startswith("m/s") else text
     kind = "n" if right else "s" if len(text) <= _ONE_LINE else "t"
     shown = _PAIR.sub(_together, escape(text))
-    if column == 0 and kind == "s" and len(text) > _LONG_NAME:  # breaks at its joints where the page is narrow
-        kind, shown = "j", _JOINT.sub(r"\g<0><wbr>", shown)
+    if column == 0 and kind == "t":  # a long name breaks at its joints where the page is narrow
+        shown = _JOINT.sub(r"\g<0><wbr>", shown)
     return f"<td class={kind}>{shown}</td>"
 
 

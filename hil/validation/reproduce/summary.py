@@ -35,7 +35,7 @@ def build_report(rows: list[Row], figures: Mapping[str, Report]) -> Report:
     ]
     for report in figures.values():
         for section in report.sections:
-            text = " ".join(filter(None, (report.reason, section.text)))
+            text = " ".join(dict.fromkeys(filter(None, (report.reason, section.text))))
             sections.append(replace(section, title=report.title, text=text))
     return Report(
         title="The paper's numbers and figures, reproduced",

@@ -26,7 +26,8 @@ def one_after_the_other(
     demand = base_brake.distribute(torque, p.friction_brake.front_share)
     factor_now = compensation.motor_factor(factor, mu, nominal, p.compensation)
     wanted = blend.wanted_torque(demand, factor_now, usable, p.motor)
-    power = sum(wanted) * wheel * p.motor.charge_efficiency
+    fl, fr, rl, rr = wanted  # added as compiled code adds: sum() compensates from Python 3.12 on
+    power = (fl + fr + rl + rr) * wheel * p.motor.charge_efficiency
     charge = blend.ramp_charge_limit(held, announced, power, p.blend, dt)
     shares = blend.blend(demand, wanted, power, charge, speed, deceleration, p.blend)
     gains = friction.gains(p.friction_brake)

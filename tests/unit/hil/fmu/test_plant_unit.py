@@ -45,7 +45,7 @@ def test_it_is_the_plants_node_bit_for_bit():
     node = PlantNode(SCENARIO.plant, manoeuvre, seed=1)
     node.step(0, [])
     for tick in range(1, 80):
-        set_inputs(one, (tick - 1) * 0.01)
+        set_inputs(one, (tick - 1) * 10_000_000 * 1e-9)  # the node's own times, to the last bit
         one.advance_to(tick * 0.01)
         node.step(tick * 10_000_000, [])
         x = node.model_state

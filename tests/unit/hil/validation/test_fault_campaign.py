@@ -193,7 +193,7 @@ def test_a_run_in_the_car_is_measured_and_repeats_bit_for_bit():
     assert m.detect_ms <= 15.0
     assert m.friction_back_ms <= 150.0
     assert 1.0 < m.dip_mps2 < 2.3
-    assert run(case) == m
+    assert repr(run(case)) == repr(m)  # has NaN, which equals nothing
 
 
 def test_an_exception_of_a_node_ends_the_run_and_is_counted(monkeypatch):
