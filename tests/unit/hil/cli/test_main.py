@@ -169,9 +169,7 @@ def test_an_interrupted_command_leaves_nothing(folder, number, code, out):
         _, error = process.communicate()
         if process.returncode:
             break
-        shutil.rmtree(out) if out.endswith("/") else Path(
-            out
-        ).unlink()  # it ended before the signal
+        shutil.rmtree(out) if out.endswith("/") else Path(out).unlink()  # it ended before the signal
     assert (process.returncode, error) == (code, b"")
     assert set(Path().iterdir()) == before
 
