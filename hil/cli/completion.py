@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hil.errors import BrakebenchError
-from hil.extras import pip_install
+from hil.extras import missing
 
 SHELLS = ("bash", "zsh", "fish")
 
@@ -28,10 +28,10 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Print the script."""
-    try:
-        import shtab
-    except ImportError as error:
-        raise BrakebenchError(f"completion needs shtab; install it with: {pip_install('completion')}") from error
+    if lacks := missing("shtab"):
+        raise BrakebenchError(f"completion {lacks}")
+    import shtab
+
     from hil.cli.main import COMMANDS, build_parser
 
     parser = build_parser(list(COMMANDS))

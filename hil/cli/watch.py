@@ -71,13 +71,10 @@ def run(args: argparse.Namespace) -> int:
 
 def check_extra(terminal: bool = False) -> None:
     """Refuse to go on without the library of page or terminal; BrakebenchError says how to get it."""
-    import importlib.util
+    from hil.extras import missing
 
-    from hil.extras import pip_install
-
-    name = "rich" if terminal else "websockets"
-    if importlib.util.find_spec(name) is None:
-        raise BrakebenchError(f"the live view needs {name}; install it with: {pip_install('live')}")
+    if lacks := missing("rich" if terminal else "websockets"):
+        raise BrakebenchError(f"the live view {lacks}")
 
 
 def _databases(files: list[Path]) -> "Databases | None":

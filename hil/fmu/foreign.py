@@ -5,12 +5,11 @@ import signal
 import socket
 import sys
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from hil.extras import pip_install
+from hil.extras import missing
 from hil.fmu.model import FmuError
 from hil.rt.process import Piped
 
@@ -44,8 +43,8 @@ class ForeignFmu:
         self.name = path.name
         if not path.is_file():
             raise FmuError(f"{path}: no such FMU")
-        if find_spec("fmpy") is None:
-            raise FmuError(f"{path}: reading FMUs needs FMPy: {pip_install('fmu')}")
+        if lacks := missing("fmpy"):
+            raise FmuError(f"{path}: a foreign FMU {lacks}")
         self._step_timeout_s = step_timeout_s
         self._folder = TemporaryDirectory(prefix="brakebench-fmu-")
         self._line, other = socket.socketpair()

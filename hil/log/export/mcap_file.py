@@ -9,22 +9,18 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager
-from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
-from hil.extras import pip_install
+from hil.extras import missing
 from hil.log.atomic_write import atomic_write
 from hil.log.export.blocks import Block, Field, Layout, grouped, of_message
 from hil.log.export.protobuf import DOUBLE, STRING, description, number_of, rows_of, text
 from hil.log.frames import LogError
 from hil.log.signals.decoded import Column
-
-if TYPE_CHECKING:
-    pass
 
 PACKAGE = "can"
 """Protocol Buffers package of all messages."""
@@ -40,8 +36,8 @@ def check_extra(path: Path) -> None:
     LogError
         It says how to get it.
     """
-    if find_spec("mcap") is None:
-        raise LogError(path, f"writing MCAP needs the mcap package; install it with: {pip_install('mcap')}")
+    if lacks := missing("mcap"):
+        raise LogError(path, f"writing MCAP {lacks}")
 
 
 def write_mcap(
