@@ -246,12 +246,6 @@ class Fitter:
         self._taken.append(_Taken(driven_by, at, steps, tracks))
         return tracks
 
-    def _near(self, model: Model) -> _Taken | None:
-        """The last term Jacobian that holds for the model, too."""
-        driven_by = self.simulator.driven_by
-        taken = (one for one in reversed(tuple(self._taken)) if one.driven_by is driven_by)
-        return next((one for one in taken if not _far(one.model, model)), None)
-
     def nuisance_jacobian_at(self, model: Model) -> Tracks:
         """Jacobian of the nuisances, with new columns for those that had none before the model's terms.
 
@@ -290,8 +284,6 @@ class Fitter:
         """
         best = replace(model, cost=self.cost(model.residual, model.z, noise))
         linearised = best
-        if best.terms and own is None and (near := self._near(best)) is not None:
-            own, linearised = near.tracks, near.model
         for _ in range(steps):
             if best.terms and (own is None or (relinearise and _far(linearised, best))):
                 own, linearised = self.term_jacobian(best), best
