@@ -222,7 +222,7 @@ def test_no_descriptor_is_left_open(name):
     before = descriptors()
     for _ in range(20):
         can.Bus(name, interface="brakebench", receive_own_messages=True).shutdown()
-    assert descriptors() == before
+    assert descriptors() <= before  # one fewer where something of another test was collected meanwhile
 
 
 def test_dead_channels_are_not_listed(name):
