@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from hil.cli.main import main
+from hil.cli.main import build_parser, main
 from hil.fmu.plant_map import load_plant_map
 
 ROOT = Path(__file__).parents[4]
@@ -33,7 +33,7 @@ def test_the_commands_and_the_program_of_the_page(tmp_path, monkeypatch, capsys)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("BRAKEBENCH_PYTHON", sys.executable)
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    (shell,), (program,) = blocks("sh"), blocks("python")
+    (shell, residuals), (program,) = blocks("sh"), blocks("python")
     commands = [shlex.split(line)[1:] for line in shell.splitlines()]
     assert len(commands) == 2
     for words in commands:
@@ -41,6 +41,7 @@ def test_the_commands_and_the_program_of_the_page(tmp_path, monkeypatch, capsys)
     assert "car.fmu: FMI 3.0 co-simulation for Linux" in capsys.readouterr().out
     assert main(commands[0]) == 2  # it exists
     assert "--force" in capsys.readouterr().err
+    assert build_parser(["explain"]).parse_args(shlex.split(residuals)[1:]).plant  # run in test_residuals
     names = {}
     exec(compile(program, "docs/fmu.md", "exec"), names)  # noqa: S102
     speed = names["result"]["TRUTH_MOTION.SPEED"]
