@@ -207,11 +207,10 @@ def _together(
 def _alone(
     suspects: deque[Sequence[Item]], job: _Work[Item, Result]
 ) -> Iterator[tuple[Sequence[Item], list[Result | Killed]]]:
-    """One batch at a time, so that a worker that ends tells which."""
+    """One batch at a time, so that a worker that ends tells which: a cluster, too, gives up what only waited there."""
     while suspects and not job.stopped():
         batch = suspects.popleft()
-        is_guilty = job.workers.kills >= MOST_KILLS  # by the cluster's own account; of a pool it is one of several
-        done = None if is_guilty else _attempt(batch, job)
+        done = _attempt(batch, job)
         kills = job.workers.kills if len(batch) == 1 else 0
         found: list[Result | Killed] = [] if done is None else [*done]
         for item in batch if done is None else ():

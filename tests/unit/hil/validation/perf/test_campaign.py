@@ -9,7 +9,7 @@ pytestmark = pytest.mark.slow
 
 def test_the_campaign_is_measured_beside_a_plain_loop(monkeypatch):
     monkeypatch.setattr(campaign, "ROUNDS", 1)
-    rows = {row.name: row for row in campaign.measure(6)}
+    rows = {row.name: row for row in campaign.measure(stops=6)}
     one, two = rows["stops a second, 1 worker"], rows["stops a second, 2 workers"]
     assert one.ratio == pytest.approx(one.ours / one.other)
     assert two.other == one.ours
