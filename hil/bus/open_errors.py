@@ -56,6 +56,7 @@ def _is_without_driver(error: Exception) -> bool:
     """Missing libraries come as missing names, modules, interfaces, or as an OSError without a number."""
     if isinstance(error, OSError):
         return error.errno is None and "library" in str(error)
+    # python-can: a driver's names are missing, its module is, or it has no such interface (NotImplementedError)
     return isinstance(error, (NameError, ImportError, NotImplementedError))
 
 

@@ -97,6 +97,7 @@ def _signal(spec: MessageSpec, field: Field, causality: Causality) -> Variable:
     text = _comments(spec.bus).get((spec.can_id, field.signal), "")
     unit = _UNITS[field.name.removeprefix(field.signal.lower()).removeprefix("_")]
     start = max(0.0, field.minimum * field.si_per_unit) if causality == "input" else 0.0
+    # mypy takes the two literal kinds for any str
     return Variable(name, kind, causality, start, unit, text)  # type: ignore[arg-type]
 
 

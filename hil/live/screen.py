@@ -113,8 +113,9 @@ class Screen:
             omega = self._value(f"WHEEL_SPEED_{axle}.WHEEL_SPEED_{wheel}")
             current = self._value(f"MOTOR_STATUS_{axle}.CURRENT_{wheel}")
             disc = self._value(f"TRUTH_DISC_TEMPERATURE.DISC_TEMPERATURE_{wheel}")
-            rolls = v is not None and omega is not None and abs(v) >= LEAST_SPEED_MPS
-            slip = 100 * (v - omega * car["wheel_radius_m"]) / v if rolls else None  # type: ignore[operator]
+            slip = None
+            if v is not None and omega is not None and abs(v) >= LEAST_SPEED_MPS:
+                slip = 100 * (v - omega * car["wheel_radius_m"]) / v
             table.add_row(
                 wheel.lower(),
                 _number(slip, 1),

@@ -88,7 +88,7 @@ class McapMessages(AbstractContextManager["McapMessages"]):
     def __exit__(self, kind: object, *_: object) -> None:
         try:
             if kind is None:
-                self._writer.finish()  # type: ignore[no-untyped-call]
+                self._writer.finish()  # type: ignore[no-untyped-call]  # mcap states no type here
         finally:
             self._file.close()
 
