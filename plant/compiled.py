@@ -1,6 +1,7 @@
 """How the plant is compiled: equations are inlined into a few cached entry points.
 
-Products and sums may be fused (``contract``); no other liberty is taken with floating point.
+Products and sums may be fused (``contract``), a quotient be a product with the reciprocal (``arcp``), and a zero have
+either sign (``nsz``); no other liberty is taken with floating point.
 
 ``NUMBA_DISABLE_JIT=1`` runs the same source uncompiled. Numba's cache looks at the age of one file only, so an edited
 submodel or a changed layout would leave a stale entry point behind; `entry` stamps the cache with all sources instead.
@@ -26,7 +27,7 @@ EFFECTS = os.environ.get("BRAKEBENCH_EFFECTS", "1") != "0"
 """False compiles the effects out: the build that the neutral one is compared with."""
 _nb: Any = numba  # whose options are declared in part
 INTERPRETED = bool(_nb.config.DISABLE_JIT)
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "arcp", "nsz"}}
 _BORROWED = _OPTIONS | {"_nrt": False}
 """For what allocates nothing: vectors are the caller's, and nobody counts references to them."""
 
@@ -79,6 +80,11 @@ def block(function: F) -> F:
 def entry(function: F) -> F:
     """Compile a function that Python calls: cached on disk, without the global interpreter lock."""
     return _entry(function, _OPTIONS)
+
+
+def borrowing_entry(function: F) -> F:
+    """As `entry`, for what allocates nothing: all vectors are the caller's, and nobody counts references to them."""
+    return _entry(function, _BORROWED)
 
 
 def exact_entry(function: F) -> F:

@@ -4,7 +4,7 @@ Cut points, in the order of the way of the brake: demand -> pressure -> friction
 -> tyre force -> body. A cut lets a measured value enter at a cut point in place of the simulated one.
 """
 
-from math import cos, pi, sin, sqrt
+from math import pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from plant.brakes import brakes
 from plant.compiled import block, equation
 from plant.contact import contacts, static_load
+from plant.fastmath import cos, sin
 from plant.inject import J, inject_car, inject_wheel
 from plant.injection.apply import after, before
 from plant.motors import motors

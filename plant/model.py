@@ -12,7 +12,7 @@ from math import floor, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.compiled import entry, section
+from plant.compiled import borrowing_entry, section
 from plant.equations import derivative, sensed
 from plant.friction import mu_equilibrium
 from plant.injection import apply
@@ -39,6 +39,8 @@ _NOTHING = np.empty(0, dtype=np.int64)
 _NO_ROWS = np.empty((1, 0))
 _ONE_BY_ONE = np.ones(1, dtype=np.int64)
 NEUTRAL = THETA.neutral()
+_NOW, _Q, _ANGLES = WORK_SHAPE[0], WORK_SHAPE[0] + 1, WORK_SHAPE[0] + 2  # rows of the scratch, behind the steps' own
+_SCRATCH_SHAPE = (WORK_SHAPE[0] + 3, max(WORK_SHAPE[1], apply.SIZE, INPUT.size))
 
 
 def pack(parameters: PlantParameters) -> Vector:
@@ -131,32 +133,19 @@ def count_teeth(x: Vector, before: Vector, step_s: float, pitch_rad: float) -> N
             x[X.tooth_count + i] += abs(passed)
 
 
-@entry
-def simulate(
+@borrowing_entry
+def _simulate(
     x: Vector, inputs: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, step_s: float, steps: int,
     at_once: NDArray[np.int64], method: int, columns: NDArray[np.int64], table: Vector, y: Vector, theta: Vector,
-    terms: Vector, plugins: Vector,
+    terms: Vector, plugins: Vector, scratch: Vector,
 ) -> None:  # fmt: skip
-    """Run the car through rows of inputs; the only compiled entry point.
-
-    Parameters
-    ----------
-    x : state (``STATE``), advanced in place.  inputs : one ``INPUT`` a row, each ``steps`` steps long. Demands hold
-        within a row; steering and measured values go linearly towards the next row, torque of the motors by what
-        ``motor_torque_bend_nm`` in its middle adds to that in a parabola.
-    cut, switch, p : vectors ``CUT``, ``SWITCH``, ``PARAMETER``.  road : rows of `plant.road.road_table`.
-    step_s : s.  at_once : how many of its steps each row may make as one, (rows,).
-    method : `plant.integrate.SEMI_IMPLICIT`, `RUNGE_KUTTA_4` or `EXPONENTIAL`.
-    columns : what to note at the start of each row, as indices into the state followed by the outputs.
-    table : the notes, shape (rows, columns), written.  y : outputs (``OUTPUT``) at the end, written.
-    theta : numbers of all effects (`plant.injection.theta`); onsets act from row to row.
-    terms, plugins : tables of `plant.injection.bank` and `plant.injection.plugin`, a row each.
-    """
-    work = np.empty(WORK_SHAPE)
-    now = np.empty(inputs.shape[1])
-    angles = np.empty(4)
+    """As `simulate`, with a ``scratch`` of shape `_SCRATCH_SHAPE` that this may overwrite."""
+    work = scratch[: WORK_SHAPE[0]]
+    now, q, angles = scratch[_NOW, : inputs.shape[1]], scratch[_Q, : apply.SIZE], scratch[_ANGLES, :4]
     rows = at_once.shape[0]
-    q = np.empty(apply.SIZE)
+    notes_outputs = False
+    for k in range(columns.size):
+        notes_outputs |= columns[k] >= x.size
     apply.begin(p, theta, terms, plugins, q, y, work[2])
     for row in range(rows):
         now_s = x[X.time_s]
@@ -165,7 +154,7 @@ def simulate(
         for i in range(now.size):
             now[i] = inputs[row, i]
         if columns.size > 0:
-            if columns.max() >= x.size:  # an output, not a state
+            if notes_outputs:
                 derivative(x, now, cut, switch, q, road, y)
                 sensed(x, y)
             for k in range(columns.size):
@@ -199,6 +188,32 @@ def simulate(
             step += together
     derivative(x, now, cut, switch, q, road, y)
     sensed(x, y)
+
+
+def simulate(
+    x: Vector, inputs: Vector, cut: Vector, switch: Vector, p: Vector, road: Vector, step_s: float, steps: int,
+    at_once: NDArray[np.int64], method: int, columns: NDArray[np.int64], table: Vector, y: Vector, theta: Vector,
+    terms: Vector, plugins: Vector,
+) -> None:  # fmt: skip
+    """Run the car through rows of inputs; the only way into compiled code.
+
+    Parameters
+    ----------
+    x : state (``STATE``), advanced in place.  inputs : one ``INPUT`` a row, each ``steps`` steps long. Demands hold
+        within a row; steering and measured values go linearly towards the next row, torque of the motors by what
+        ``motor_torque_bend_nm`` in its middle adds to that in a parabola.
+    cut, switch, p : vectors ``CUT``, ``SWITCH``, ``PARAMETER``.  road : rows of `plant.road.road_table`.
+    step_s : s.  at_once : how many of its steps each row may make as one, (rows,).
+    method : `plant.integrate.SEMI_IMPLICIT`, `RUNGE_KUTTA_4` or `EXPONENTIAL`.
+    columns : what to note at the start of each row, as indices into the state followed by the outputs.
+    table : the notes, shape (rows, columns), written.  y : outputs (``OUTPUT``) at the end, written.
+    theta : numbers of all effects (`plant.injection.theta`); onsets act from row to row.
+    terms, plugins : tables of `plant.injection.bank` and `plant.injection.plugin`, a row each.
+    """
+    _simulate(
+        x, inputs, cut, switch, p, road, step_s, steps, at_once, method, columns, table, y, theta, terms, plugins,
+        np.empty(_SCRATCH_SHAPE),
+    )  # fmt: skip
 
 
 def advance(

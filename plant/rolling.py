@@ -30,7 +30,10 @@ _STANDS_MPS, _STANDS_RAD_S = 3e-3, 1e-2
 swings in threes has died away."""
 _SLIDES = 0.08  # slip, either way, beyond which a tyre may be past its peak
 _HUB_TRAVEL, _HUB_RATE = (X.hub_m, X.hub_rate_mps) if EFFECTS else (0, 0)
-_WHEEL, _PRESSURE, _HUB = 0, 24, 48  # where a pair's numbers lie: phi_2 and the matrix, six of each wheel
+_WHEEL, _PRESSURE, _HUB = 0, 4, 8
+"""Pairs: a wheel on its tyre, a pressure loop, a hub on its mount, four each."""
+_M11, _M12, _M21, _M22, _ONE, _ONE_M, _TWO, _TWO_M = range(0, 96, 12)
+"""Where their numbers lie: the block of the Jacobian, phi_1 and phi_2 as a I + b M."""
 
 
 @equation
@@ -84,27 +87,29 @@ def rolling_step(
         one = phi_1(z, exp(-min(z, EXPONENT_LIMIT)))
         mean[i] = phi_2(z, one)
         trial[i] = x[i] + step_s * one * y[Y.rate + i]
+    omega = 2.0 * pi * p[P.ehb_natural_frequency_hz]
     for i in range(wheels):
         radius = rolling_radius(i, p, y)
         spun = -radius * y[Y.slip_stiffness_n + i] / per_axle(i, p, P.wheel_inertia_kg_m2)
-        _begin(
-            _WHEEL, X.slip, X.wheel_speed_rad_s, i, -step_s * y[Y.decay_1_s + X.slip + i],
-            step_s * radius * y[Y.slip_gain_1_m + i], step_s * spun,
-            -step_s * y[Y.decay_1_s + X.wheel_speed_rad_s + i], step_s, x, y, trial, pairs,
+        _set_matrix(
+            _WHEEL + i, -step_s * y[Y.decay_1_s + X.slip + i], step_s * radius * y[Y.slip_gain_1_m + i],
+            step_s * spun, -step_s * y[Y.decay_1_s + X.wheel_speed_rad_s + i], pairs,
         )  # fmt: skip
-    omega = 2.0 * pi * p[P.ehb_natural_frequency_hz]
-    for i in range(wheels):
-        _begin(
-            _PRESSURE, X.pressure_pa, X.pressure_rate_pa_s, i, 0.0, step_s, -step_s * omega * omega,
-            -step_s * 2.0 * p[P.ehb_damping_ratio] * omega, step_s, x, y, trial, pairs,
-        )  # fmt: skip
+        _set_matrix(
+            _PRESSURE + i, 0.0, step_s, -step_s * omega * omega, -step_s * 2.0 * p[P.ehb_damping_ratio] * omega, pairs
+        )
     if extra:
         for i in range(wheels):
             swing = y[Y.hub_swing_1_s + i]
-            _begin(
-                _HUB, _HUB_TRAVEL, _HUB_RATE, i, 0.0, step_s, -step_s * swing * swing,
-                -step_s * y[Y.decay_1_s + _HUB_RATE + i], step_s, x, y, trial, pairs,
-            )  # fmt: skip
+            _set_matrix(_HUB + i, 0.0, step_s, -step_s * swing * swing, -step_s * y[Y.decay_1_s + _HUB_RATE + i], pairs)
+    for k in range((3 if extra else 2) * wheels):  # of one vector alone, so that eight go through at once
+        _set_functions(k, pairs)
+    for i in range(wheels):
+        _begin(_WHEEL, X.slip, X.wheel_speed_rad_s, i, step_s, x, y, trial, pairs)
+        _begin(_PRESSURE, X.pressure_pa, X.pressure_rate_pa_s, i, step_s, x, y, trial, pairs)
+    if extra:
+        for i in range(wheels):
+            _begin(_HUB, _HUB_TRAVEL, _HUB_RATE, i, step_s, x, y, trial, pairs)
     derivative(trial, u, cut, switch, p, road, stage)
     for i in range(last):
         grown = stage[Y.rate + i] - y[Y.rate + i] + y[Y.decay_1_s + i] * (trial[i] - x[i])
@@ -122,17 +127,30 @@ def rolling_step(
 
 
 @equation
+def _set_matrix(k: int, m11: float, m12: float, m21: float, m22: float, pairs: Vector) -> None:
+    """The block of the Jacobian of pair ``k``, times the step."""
+    pairs[_M11 + k], pairs[_M12 + k], pairs[_M21 + k], pairs[_M22 + k] = m11, m12, m21, m22
+
+
+@equation
+def _set_functions(k: int, pairs: Vector) -> None:
+    """phi_1 and phi_2 of the block of pair ``k``."""
+    m11, m12, m21, m22 = pairs[_M11 + k], pairs[_M12 + k], pairs[_M21 + k], pairs[_M22 + k]
+    one, one_m, two, two_m = phi_of_pair(m11 + m22, m11 * m22 - m12 * m21)
+    pairs[_ONE + k], pairs[_ONE_M + k], pairs[_TWO + k], pairs[_TWO_M + k] = one, one_m, two, two_m
+
+
+@equation
 def _begin(
-    at: int, one: int, other: int, i: int, m11: float, m12: float, m21: float, m22: float, step_s: float, x: Vector,
-    y: Vector, trial: Vector, pairs: Vector,
-) -> None:  # fmt: skip
-    """The trial state of a pair of states, whose block of the Jacobian, times the step, is m."""
-    mean, mean_m, second_mean, second_m = phi_of_pair(m11 + m22, m11 * m22 - m12 * m21)
+    at: int, one: int, other: int, i: int, step_s: float, x: Vector, y: Vector, trial: Vector, pairs: Vector
+) -> None:
+    """The trial state of a pair of states."""
+    k = at + i
+    mean, mean_m = pairs[_ONE + k], pairs[_ONE_M + k]
+    m11, m12, m21, m22 = pairs[_M11 + k], pairs[_M12 + k], pairs[_M21 + k], pairs[_M22 + k]
     f, g = step_s * y[Y.rate + one + i], step_s * y[Y.rate + other + i]
     trial[one + i] = x[one + i] + mean * f + mean_m * (m11 * f + m12 * g)
     trial[other + i] = x[other + i] + mean * g + mean_m * (m21 * f + m22 * g)
-    pairs[at + i], pairs[at + 4 + i] = second_mean, second_m
-    pairs[at + 8 + i], pairs[at + 12 + i], pairs[at + 16 + i], pairs[at + 20 + i] = m11, m12, m21, m22
 
 
 @equation
@@ -141,8 +159,9 @@ def _end(
     pairs: Vector, ahead: Vector,
 ) -> None:  # fmt: skip
     """A pair at the end of the step."""
-    mean, mean_m = pairs[at + i], pairs[at + 4 + i]
-    m11, m12, m21, m22 = pairs[at + 8 + i], pairs[at + 12 + i], pairs[at + 16 + i], pairs[at + 20 + i]
+    k = at + i
+    mean, mean_m = pairs[_TWO + k], pairs[_TWO_M + k]
+    m11, m12, m21, m22 = pairs[_M11 + k], pairs[_M12 + k], pairs[_M21 + k], pairs[_M22 + k]
     moved, moved_too = trial[one + i] - x[one + i], trial[other + i] - x[other + i]
     f = step_s * (stage[Y.rate + one + i] - y[Y.rate + one + i]) - m11 * moved - m12 * moved_too
     g = step_s * (stage[Y.rate + other + i] - y[Y.rate + other + i]) - m21 * moved - m22 * moved_too

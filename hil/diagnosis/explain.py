@@ -1,10 +1,10 @@
 """`explain`: takes measured logs and a vehicle set, gives the answer. The call behind ``brakebench explain``."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from threadpoolctl import threadpool_limits
 
@@ -39,10 +39,16 @@ _SHIPPED_CAR = "paper_car"
 """Name of the vehicle set that our own recordings are of."""
 _UNSTATED = "no vehicle is given: taken as the car that comes with brakebench"
 
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+_limited = threadpool_limits.wrap(limits=1, user_api="blas")
+_on_one_thread = cast(Callable[[_Function], _Function], _limited)
+"""Linear algebra of a function on one thread: simulations fill the processors, and a thread beside them only waits."""
+
 _INERTIAL = {"ax_mps2", "ay_mps2", "yaw_rate_rad_s"}
 """Channels that can be compared with the motion."""
 
 
+@_on_one_thread
 def explain(
     logs: Any, vehicle: Path | str | Mapping[str, Any] | None = None, *, channel_map: Path | None = None,
     database: Path | None = None, about: Path | None = None, extend: Path | None = None, out: Path | None = None,
@@ -112,12 +118,11 @@ def _simulated(
     car = (car.without_lateral_dynamics() if is_straight_line(logs) else car).with_motor_limits_from(logs)
     dataset = prepare(logs, radius_m, car.unstated)
     base, of_extension = (nominal(car), []) if extend is None else extended_car(car, Path(extend), dataset)
-    with threadpool_limits(1, "blas"):  # simulations fill the processors; linear algebra beside them only waits
-        diagnosis = diagnose(dataset, car, base, settings, report, reference)
-        report("held-out error by cross-validation")
-        diagnosis = confirmed(diagnosis, report)
-        errors, patterns = held_out_error(diagnosis), residual_patterns(diagnosis)
-        fits = goodness_of_fit(diagnosis)
+    diagnosis = diagnose(dataset, car, base, settings, report, reference)
+    report("held-out error by cross-validation")
+    diagnosis = confirmed(diagnosis, report)
+    errors, patterns = held_out_error(diagnosis), residual_patterns(diagnosis)
+    fits = goodness_of_fit(diagnosis)
     extension = None if folder is None else write_extended_car(diagnosis, folder)
     of_logs = (f"{one.log.name}: {text}" for one in dataset.recordings for text in one.log.remarks)
     remarks = [*notes, *car.remarks, *of_extension, *of_logs, *diagnosis.remarks]

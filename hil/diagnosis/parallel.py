@@ -4,13 +4,15 @@
 and may hold a `parallel_map` within.
 """
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
 from threading import Semaphore
 from typing import TypeVar
 
 from hil.diagnosis.compiled import WORKERS
+from hil.diagnosis.progress import Progress, counted
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -36,12 +38,22 @@ def parallel_map(function: Callable[[Item], Result], items: Sequence[Item]) -> l
             _CALLERS.release()
 
 
-def thread_map(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """``function`` of each item, in order, on one thread a processor."""
-    return list(thread_each(function, items))
+def thread_map(
+    function: Callable[[Item], Result], items: Sequence[Item], stage: str = "", progress: Progress | None = None
+) -> list[Result]:
+    """``function`` of each item, in order, on one thread a processor; ``progress`` hears how many of a ``stage`` are
+    done."""
+    results = thread_each(function, items)
+    return list(results if progress is None else counted(progress, stage, results, len(items)))
 
 
 def thread_each(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-    """As `thread_map`, one result after the other: those already taken need no memory."""
+    """As `thread_map`, one result after the other; few are made before they are taken, for the memory."""
+    ahead: deque[Future[Result]] = deque()
     with ThreadPoolExecutor(WORKERS) as pool:
-        yield from pool.map(function, items)
+        for item in items:
+            ahead.append(pool.submit(function, item))
+            if len(ahead) > 2 * WORKERS:
+                yield ahead.popleft().result()
+        while ahead:
+            yield ahead.popleft().result()

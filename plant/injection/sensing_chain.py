@@ -42,13 +42,13 @@ class Chain:
 
     def _numbers(self, effect: Effect, time_s: Vector) -> Numbers:
         onset, until = (self._theta[self._layout.slice(effect.name, name)][0] for name in ("onset_s", "until_s"))
-        within = ((time_s >= onset) & (time_s < until))[:, None]
-        always = bool(within.all())
+        always = bool(onset <= time_s[0] and time_s[-1] < until)  # times increase
+        within = None if always else ((time_s >= onset) & (time_s < until))[:, None]
         numbers = {}
         for parameter in effect.parameters:
             values = self._theta[self._layout.slice(effect.name, parameter.name)]
-            if always or parameter.shape:
-                numbers[parameter.name] = np.repeat(values[None], len(time_s), axis=0)
+            if within is None or parameter.shape:
+                numbers[parameter.name] = np.broadcast_to(values, (len(time_s), len(values)))
             else:
                 numbers[parameter.name] = np.where(within, values, 0.0)
         return numbers

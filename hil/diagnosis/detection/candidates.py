@@ -29,15 +29,19 @@ from hil.diagnosis.detection.threshold import SCORED_WITH_OWN_NOISE
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Tracks
 from hil.diagnosis.estimation.information import (
     InformationBlocks,
+    acting_among,
     finite_difference_jacobian,
     marginalise,
     marginalise_from_onset,
+    silent_columns,
 )
 from hil.diagnosis.estimation.model_discrepancy import FORM_SHARE
 from hil.diagnosis.estimation.terms import Candidate, candidates, columns
 from hil.diagnosis.noise.model import Noise, SampleMasks
 from hil.diagnosis.parallel import thread_map
+from hil.diagnosis.progress import Progress
 from hil.diagnosis.simulation.hot_spots import phase_penalty
+from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator
 
 _BACKWARD, _BACKWARD_SAMPLES = {"speed_mps": -0.5, "wheel_speed": -1.5}, 10
@@ -82,28 +86,43 @@ class CandidateSet:
         self.candidates = [_with_penalty(one, simulator) for one in listed]
         self.jacobian: Tracks = {}
 
-    def linearise_at(self, fitter: Fitter, model: Model) -> None:
+    def linearise_at(self, fitter: Fitter, model: Model, progress: Progress | None = None) -> None:
         """Renew the Jacobian at a model, from the fitter's baseline."""
-        base = fitter.parameter_set(model.z, model.terms)
-        stepped = [column.stepped(base) for column in self._columns]
-        steps = [column.step for column in self._columns]
-        self.jacobian = finite_difference_jacobian(fitter.simulator, self._masks, model.channels, stepped, steps)
+        base, count = fitter.parameter_set(model.z, model.terms), len(self._columns)
 
-    def at(self, fitter: Fitter, model: Model) -> "CandidateSet":
+        def stepped(places: Sequence[int]) -> ParameterSet:
+            moved = base
+            for k in places:
+                moved = self._columns[k].stepped(moved)
+            return moved
+
+        silent = silent_columns(self.jacobian)
+        channels = fitter.channels(model)
+        acting = acting_among(fitter.simulator, channels, stepped, silent)
+        rest = [k for k in range(count) if k not in silent or k in acting]
+        moved, steps = [stepped([k]) for k in rest], [self._columns[k].step for k in rest]
+        self.jacobian = finite_difference_jacobian(
+            fitter.simulator, self._masks, channels, moved, steps, (rest, count), progress
+        )
+
+    def at(self, fitter: Fitter, model: Model, progress: Progress | None = None) -> "CandidateSet":
         """The same candidates with the Jacobian at another model."""
         other = copy(self)
-        other.linearise_at(fitter, model)
+        other.linearise_at(fitter, model, progress)
         return other
 
-    def scores(self, fitter: Fitter, blocks: InformationBlocks, model: Model, noise: Noise) -> list[ScoreTest]:
-        """Score test of each candidate given a model, by ``blocks`` of its nuisances, terms and all candidates."""
+    def scores(
+        self, fitter: Fitter, blocks: InformationBlocks, model: Model, noise: Noise, search: bool = True
+    ) -> list[ScoreTest]:
+        """Score test of each candidate given a model, by ``blocks`` of its nuisances, terms and all candidates; without
+        ``search`` those behind limits gain nothing."""
         accepted = len(model.terms)
         marginal = marginalise(blocks.total(), blocks.nuisances, range(accepted), model.z, fitter.at_bounds(model.z))
         values = {id(term.candidate): term.value for term in model.terms}
         tests = scores(
             self.candidates, marginal, accepted, [values.get(id(candidate), 0.0) for candidate in self.candidates]
         )
-        behind_limits = [item for item in tests if has_zero_gradient(item)]
+        behind_limits = [item for item in tests if has_zero_gradient(item)] if search else []
         searched = thread_map(lambda item: line_search(fitter, model, noise, item), behind_limits)
         by_search = dict(zip(map(id, behind_limits), searched, strict=True))
         return [by_search.get(id(item), item) for item in tests]

@@ -47,6 +47,7 @@ from hil.diagnosis.estimation.gauss_newton import BIASED_BIRGE_RATIO, Fitter, Mo
 from hil.diagnosis.estimation.information import InformationBlocks
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import Noise
+from hil.diagnosis.progress import counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +245,7 @@ class ForwardStep:
         nominal = fitter.at(fitter.origin, (), noise)
         fitter = fitter.at_baseline(nominal)
         self._fitter = self._fitter.with_simulator(fitter.simulator)
-        candidates = candidates.at(fitter, nominal)
+        candidates = candidates.at(fitter, nominal, self._progress)
         blocks = fitter.information_blocks(nominal, candidates.jacobian, noise)
         tests = candidates.scores(fitter, blocks, nominal, noise)
         tests = candidates.shortlist(fitter, tests, blocks, nominal, False)
@@ -264,7 +265,8 @@ class ForwardStep:
             self._progress(f"fitting {len(beyond)} quantities that are at their bounds, from the nominal vehicle")
         last, nominal = self._fitter, self._nominal_fitter.with_simulator(self._fitter.simulator)
         _, guess = nominal.start(noise.enabled)
-        for candidate in beyond if self._settings.relinearise else ():
+        tried = beyond if self._settings.relinearise else []
+        for candidate in counted(self._progress, "quantities at their bounds", tried, len(tried)):
             self._fitter = nominal.copy()
             start = nominal.at(nominal.origin, (Term(candidate, 0.0),), guess)
             fitted, own = self._nuisance_fit.fit(start, guess)
@@ -302,7 +304,9 @@ class ForwardStep:
         """See `hil.diagnosis.detection.restart`; the fitter comes back with inputs denoised by ``model``."""
         self._fitter = fitter
         self._progress("fitting again from the nominal vehicle")
-        refits = refit_from_nominal(self._nuisance_fit, fitted, model, refit, reference, relinearised, rival_criterion)
+        refits = refit_from_nominal(
+            self._nuisance_fit, fitted, model, refit, reference, relinearised, rival_criterion, self._progress
+        )
         return refits, self._fitter.denoised(model)
 
     def _linearised_at(self, fitter: Fitter, model: Model) -> Fitter:

@@ -277,7 +277,7 @@ def fit_shortlist(
     if best(tests) < HOPELESS_SHARE * threshold.gain:
         return [], []
     progress(f"noise given each of {len(tests)} candidates")
-    profiled = thread_map(fits.profile_over_noise, tests)
+    profiled = thread_map(fits.profile_over_noise, tests, "noise given candidates", progress)
     noise_given = {id(item): noise for item, noise in profiled}
     tests = [item for item, _ in profiled]
     if biased:
@@ -290,7 +290,7 @@ def fit_shortlist(
 
     def fit_each(some: Sequence[ScoreTest]) -> list[FittedHypothesis]:
         progress(f"fitting {len(some)} candidates")
-        return thread_map(lambda item: fits.fit(item, noise_given[id(item)]), some)
+        return thread_map(lambda item: fits.fit(item, noise_given[id(item)]), some, "candidates fitted", progress)
 
     first = [item for item in top if biased or beyond(item, item.gain) >= POOR_SHARE * least]
     fitted = fit_each(first)

@@ -20,6 +20,7 @@ from hil.diagnosis.estimation.gauss_newton import BIASED_BIRGE_RATIO, Model
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import Noise
 from hil.diagnosis.parallel import thread_map
+from hil.diagnosis.progress import Progress
 
 _ROUNDS = 3
 RefitHypothesis = Callable[[FittedHypothesis, Model, Noise], FittedHypothesis]
@@ -30,7 +31,7 @@ Refits = tuple[list[FittedHypothesis], tuple[Model, Noise]]
 
 def refit_from_nominal(
     nuisance_fit: NuisanceFit, fitted: Sequence[FittedHypothesis], given: Model, refit: RefitHypothesis,
-    reference: float, relinearised: int, rival_criterion: float = np.inf,
+    reference: float, relinearised: int, rival_criterion: float = np.inf, progress: Progress | None = None,
 ) -> Refits:  # fmt: skip
     """Fit the hypotheses from the nominal vehicle, and the model without any from where the best of them end.
 
@@ -41,7 +42,7 @@ def refit_from_nominal(
         from those of the last Jacobian.
     rival_criterion : of the best among other hypotheses; a fit that stays far behind is not continued.
     """
-    fits = _NominalFits(nuisance_fit, given, refit, reference)
+    fits = _NominalFits(nuisance_fit, given, refit, reference, progress)
     order = sorted(range(len(fitted)), key=lambda k: criterion(fitted[k]))
     first, rest, best = order[:FIRST_REFITTED], order[FIRST_REFITTED:], rival_criterion
     refits = dict(zip(first, fits.from_nominal([fitted[k] for k in first], best), strict=True))
@@ -65,13 +66,17 @@ def refit_from_nominal(
 class _NominalFits:
     """The fits of `refit_from_nominal`; ``linearised_at`` are the nuisance parameters of the last Jacobian."""
 
-    def __init__(self, nuisance_fit: NuisanceFit, given: Model, refit: RefitHypothesis, reference: float) -> None:
+    def __init__(
+        self, nuisance_fit: NuisanceFit, given: Model, refit: RefitHypothesis, reference: float,
+        progress: Progress | None,
+    ) -> None:  # fmt: skip
+        self._progress = progress
         self._nuisance_fit, self._given, self._refit, self._reference = nuisance_fit, given, refit, reference
         self._fitter, self._linearised_at = nuisance_fit.fitter, given.z
 
     def from_nominal(self, fitted: Sequence[FittedHypothesis], best: float) -> list[FittedHypothesis]:
         """Each hypothesis from the nominal vehicle, where that is better; ``best`` is the best criterion so far."""
-        return thread_map(lambda one: self._from_nominal(one, best), fitted)
+        return thread_map(lambda one: self._from_nominal(one, best), fitted, "fits from nominal", self._progress)
 
     def _from_nominal(self, one: FittedHypothesis, best: float) -> FittedHypothesis:
         own, noise = self._fitter.copy(), one.noise

@@ -1,6 +1,6 @@
 """Settings of a diagnosis, and its result."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,10 +14,8 @@ from hil.diagnosis.detection.threshold import FALSE_ALARM_PROBABILITY, MAX_CAUSE
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model
 from hil.diagnosis.estimation.information import InformationBlocks
 from hil.diagnosis.noise.model import Noise
+from hil.diagnosis.progress import Progress as Progress
 from hil.diagnosis.vehicle.spec import Vehicle
-
-Progress = Callable[[str], None]
-"""Takes a line of text at each stage."""
 
 
 @dataclass(frozen=True)

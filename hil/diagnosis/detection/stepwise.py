@@ -41,10 +41,12 @@ from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import Noise, SampleMasks
 from hil.diagnosis.parallel import thread_map
+from hil.diagnosis.progress import expectation
 from hil.diagnosis.simulation.hot_spots import has_hot_spots
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.spec import Vehicle
+from hil.rt.clock import monotonic_ns
 
 
 def diagnose(
@@ -82,7 +84,9 @@ class StepwiseSelection:
         simulator = Simulator(dataset, vehicle).prepared(base)
         self.vehicle, self.masks = vehicle, SampleMasks.of(simulator.dataset)
         progress("simulating the nominal vehicle")
+        start_ns = monotonic_ns()
         self.nuisance_fit = self._nuisance_fit(simulator, base)
+        progress(expectation(simulator.runs, monotonic_ns() - start_ns))
         self.nominal_fitter = self.fitter
         self.nominal, self.first_noise = self.fitter.start(settings.noise_model)
 
@@ -132,8 +136,7 @@ class StepwiseSelection:
             model, noise = self.nuisance_fit.fit(self.fitter.at(model.z, (), noise), noise)
         simulator = self.fitter.simulator
         self.dataset = simulator.dataset
-        channels = model.channels or simulator.run(self.fitter.parameter_set(model.z, ()))
-        unexcited = unexcited_sensors(self.fitter.tracks(channels), noise)
+        unexcited = unexcited_sensors(self.fitter.tracks(self.fitter.channels(model)), noise)
         since_reference = self.reference is not None
         candidates = CandidateSet(
             simulator, self.masks, self.vehicle.undiagnosable_effects, unexcited, since_reference=since_reference
@@ -177,7 +180,7 @@ class StepwiseSelection:
         self.progress(f"Jacobian of {len(candidates.candidates)} candidates")
         self.fitter = self.fitter.at_baseline(model)
         search = NonparametricSearch(candidates.candidates, self.settings, self.progress)
-        return candidates.at(self.fitter, model), search
+        return candidates.at(self.fitter, model, self.progress), search
 
     def select_next(self, state: State) -> Added | Restarted | Done:
         """One step of the selection."""
@@ -311,5 +314,4 @@ def _shortlist(
     if onset is not None:
         return shortlist(candidates.scores_from_onset(fitter, bare, noise, onset), SHORTLIST_SIZE)
     blocks = fitter.information_blocks(bare, candidates.jacobian, noise)
-    tests = candidates.scores(fitter, blocks, bare, noise)
-    return shortlist([item for item in tests if not item.replayed], SHORTLIST_SIZE)
+    return shortlist(candidates.scores(fitter, blocks, bare, noise, search=False), SHORTLIST_SIZE)

@@ -4,17 +4,21 @@ Takes a simulator, a starting model and a noise; gives the model of least cost, 
 the priors of the nuisances. Each step solves the linearised problem and is simulated, open loop, before it is kept.
 """
 
+from collections import deque
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from hil.diagnosis.compiled import compiled
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.estimation.information import (
     InformationBlocks,
+    acting_among,
     finite_difference_jacobian,
     information_blocks,
+    silent_columns,
     solve_bounded,
 )
 from hil.diagnosis.estimation.terms import Candidate
@@ -45,6 +49,8 @@ _FOLLOWED = 0.5
 """Step, in prior standard deviations, below which the Jacobian is not updated: rounding and noise would count."""
 BIASED_BIRGE_RATIO = 1.5
 """Birge ratio (`Fitter.birge_ratio`) from which an unmodelled cause may bias the nuisances."""
+_REMEMBERED = 16
+"""Term Jacobians that are remembered: fits, their scores and intervals ask for the same one."""
 _ALIKE = 0.2
 """Share by which the value of a term may change while its signature serves on."""
 
@@ -63,7 +69,7 @@ class Model:
     """A fitted vehicle: nuisances ``z`` in prior standard deviations and terms.
 
     ``residual`` tracks, (samples, 1), simulated ``channels`` and ``cost`` are at exactly this point; ``covariance``
-    (terms, terms) is that of the values.
+    (terms, terms) is that of the values. ``driven_by`` are the inputs of the channels (`Simulator.driven_by`).
     """
 
     z: Floats
@@ -72,6 +78,7 @@ class Model:
     cost: float
     covariance: Floats
     channels: Stack = field(default_factory=dict)
+    driven_by: object = None
 
     def values(self) -> list[float]:
         """Values of the terms."""
@@ -102,18 +109,37 @@ def with_term(parameters: ParameterSet, term: Term) -> ParameterSet:
 
 @dataclass(eq=False)
 class _Whitened:
-    """Jacobian of the nuisances whitened for one noise, (samples, nuisances), and its products."""
+    """Jacobian of the nuisances whitened for one noise: ``columns`` (samples, acting) of those that are ``acting``, and
+    the ``products`` (nuisances, nuisances) of all."""
 
     noise: Noise | None = None
+    acting: list[int] = field(default_factory=list)
     columns: Floats = field(default_factory=lambda: np.empty((0, 0), np.float32))
     products: Floats = field(default_factory=lambda: np.empty((0, 0)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Taken:
+    """A term Jacobian, at which ``model`` by which inputs (`Simulator.driven_by`) and steps of the values."""
+
+    driven_by: object
+    model: Model
+    steps: list[float]
+    tracks: Tracks
+
+    def at(self, driven_by: object, model: Model, steps: list[float]) -> bool:
+        """Taken at exactly this point."""
+        terms = [[(one.candidate, one.value, one.onset) for one in of.terms] for of in (self.model, model)]
+        same = self.driven_by is driven_by and self.steps == steps and terms[0] == terms[1]
+        return same and bool((self.model.z == model.z).all())
 
 
 class Fitter:
     """Fits models of one dataset.
 
-    ``nuisance_columns`` is the Jacobian, (samples, nuisances) by track, in prior sd. ``origin`` (nuisances,) is the car
-    that deviations count from: the nominal one, or the one that reference logs show.
+    ``nuisance_columns`` is the Jacobian, (samples, nuisances) by track, in prior sd; its ``silent`` columns are zero
+    and stay so. ``origin`` (nuisances,) is the car that deviations count from: the nominal one, or the one that
+    reference logs show.
     """
 
     def __init__(
@@ -127,6 +153,7 @@ class Fitter:
     ) -> None:
         self.simulator, self.masks, self.base = simulator, masks, base
         self.nuisances, self.nuisance_jacobian = tuple(nuisances), nuisance_columns
+        self.silent = silent_columns(nuisance_columns)
         self.origin = np.zeros(len(self.nuisances)) if origin is None else origin
         self.bound = np.array([nuisance.bound for nuisance in self.nuisances])
         self.upper = np.array([nuisance.upper for nuisance in self.nuisances])
@@ -138,11 +165,18 @@ class Fitter:
         self.radius = float(simulator.vehicle.parameters.wheel.rolling_radius_m)
         self._measured = simulator.measured()
         self._whitened = _Whitened()
+        self._taken: deque[_Taken] = deque(maxlen=_REMEMBERED)
+        self._awake: set[int] = set()  # nuisances without a column of their own that acted in some model
 
     def copy(self) -> "Fitter":
         """A fitter whose Jacobian may be updated independently of this one."""
         columns = {name: values.copy() for name, values in self.nuisance_jacobian.items()}
         return Fitter(self.simulator, self.masks, self.base, self.nuisances, columns, self.origin)
+
+    def forget(self) -> None:
+        """Free the whitened Jacobian, as large as the Jacobian itself; it is made again where it is needed."""
+        shared, empty = self._whitened, _Whitened()
+        shared.noise, shared.columns, shared.products = None, empty.columns, empty.products
 
     def with_simulator(self, simulator: Simulator) -> "Fitter":
         """This fitter on another simulator of the same dataset; both share the Jacobian of the nuisances."""
@@ -169,7 +203,13 @@ class Fitter:
         """The model at these nuisances and terms, simulated."""
         stack = self.simulator.run(self.parameter_set(z, terms))
         residual = self.tracks({group: self._measured[group] - values for group, values in stack.items()})
-        return Model(z, tuple(terms), residual, self.cost(residual, z, noise), np.zeros((0, 0)), stack)
+        cost, unknown = self.cost(residual, z, noise), np.zeros((0, 0))
+        return Model(z, tuple(terms), residual, cost, unknown, stack, self.simulator.driven_by)
+
+    def channels(self, model: Model) -> Stack:
+        """Channels of a model by the inputs of this fitter's simulator, which may be denoised anew since its fit."""
+        known = model.channels and model.driven_by is self.simulator.driven_by
+        return model.channels if known else self.simulator.run(self.parameter_set(model.z, model.terms))
 
     def residual(self, z: Floats, terms: Sequence[Term]) -> Tracks:
         """Residual tracks of a model."""
@@ -196,25 +236,41 @@ class Fitter:
         parameters = self.parameter_set(model.z, model.terms)
         known = np.diag(model.covariance) if model.covariance.size else np.zeros(len(model.terms))
         steps = [_difference(term, float(sd)) for term, sd in zip(model.terms, np.sqrt(known), strict=True)]
+        driven_by = self.simulator.driven_by
+        known_tracks = next((one.tracks for one in tuple(self._taken) if one.at(driven_by, model, steps)), None)
+        if known_tracks is not None:
+            return known_tracks
         moved = [term.candidate.applied(parameters, step) for term, step in zip(model.terms, steps, strict=True)]
-        base = model.channels or self.simulator.run(parameters)
-        return finite_difference_jacobian(self.simulator, self.masks, base, moved, steps)
+        tracks = finite_difference_jacobian(self.simulator, self.masks, self.channels(model), moved, steps)
+        at = Model(model.z, model.terms, {}, 0.0, np.zeros((0, 0)))
+        self._taken.append(_Taken(driven_by, at, steps, tracks))
+        return tracks
 
     def nuisance_jacobian_at(self, model: Model) -> Tracks:
         """Jacobian of the nuisances, with new columns for those that had none before the model's terms.
 
         With constant friction nothing depends on the heat capacity of the discs; with a fade by temperature it does.
         """
-        acting = [np.abs(values).max(axis=0) > 0.0 for values in self.nuisance_jacobian.values()]
-        silent = np.flatnonzero(~np.any(acting, axis=0))
-        if not len(silent) or not model.terms:
+        silent = self.silent
+        if not silent or not model.terms:
             return self.nuisance_jacobian
-        moved = [self.parameter_set(model.z + one, model.terms) for one in np.eye(len(model.z))[silent]]
-        base = model.channels or self.simulator.run(self.parameter_set(model.z, model.terms))
-        added = finite_difference_jacobian(self.simulator, self.masks, base, moved, [1.0] * len(silent))
+        base = self.channels(model)
+
+        def stepped(places: Sequence[int]) -> ParameterSet:
+            z = model.z.copy()
+            z[list(places)] += 1.0
+            return self.parameter_set(z, model.terms)
+
+        mute = [k for k in silent if k not in self._awake]
+        self._awake.update(acting_among(self.simulator, base, stepped, mute))
+        acting = [k for k in silent if k in self._awake]
+        if not acting:
+            return self.nuisance_jacobian
+        moved = [stepped([k]) for k in acting]
+        added = finite_difference_jacobian(self.simulator, self.masks, base, moved, [1.0] * len(acting))
         columns = {name: values.copy() for name, values in self.nuisance_jacobian.items()}
         for name, values in columns.items():
-            values[:, silent] = added[name]
+            values[:, acting] = added[name]
         return columns
 
     def fit(
@@ -311,10 +367,13 @@ class Fitter:
             if own:
                 moved -= own[name].astype(np.float32) @ np.array(stepped, np.float32)
             unpredicted[name] = (moved - columns @ change.astype(np.float32))[:, None]
-            columns += unpredicted[name] * share
-        white = self._whitened
-        white.columns += whitened(unpredicted, self.masks, noise) * share
-        white.products = np.asarray(white.columns.T @ white.columns, np.float64)
+            _add_outer(columns, unpredicted[name][:, 0], share)
+        white, added = self._whitened, whitened(unpredicted, self.masks, noise)[:, 0]
+        cross = np.zeros(len(share))
+        cross[white.acting] = white.columns.T @ added
+        once = np.outer(cross, share)
+        white.products = white.products + once + once.T + float(added @ added) * np.outer(share, share)
+        _add_outer(white.columns, added, share[white.acting])
 
     def at_bounds(self, z: Floats) -> list[int]:
         """Nuisances at their bounds, which explain nothing more."""
@@ -323,8 +382,8 @@ class Fitter:
     def nuisance_information(self, noise: Noise) -> Floats:
         """Information matrix, (nuisances, nuisances), priors left out; remembered for this noise."""
         if self._whitened.noise is not noise:
-            self._whitened.columns, self._whitened.products = self._of_nuisances(noise)
-            self._whitened.noise = noise
+            new, shared = self._of_nuisances(noise), self._whitened  # by all fitters with this Jacobian
+            shared.acting, shared.columns, shared.products, shared.noise = new.acting, new.columns, new.products, noise
         return self._whitened.products
 
     def effective_parameters(self, noise: Noise) -> float:
@@ -355,16 +414,20 @@ class Fitter:
             squares = squares * np.where(np.abs(z) >= bound, 4.0, 1.0)
         return max(1.0, float(squares.sum()) / max(effective_parameters, 1.0))
 
-    def _of_nuisances(self, noise: Noise) -> tuple[Floats, Floats]:
-        """Whitened Jacobian of the nuisances, (samples of all tracks, nuisances), and its products."""
+    def _of_nuisances(self, noise: Noise) -> _Whitened:
+        """Whitened Jacobian of the nuisances."""
         if self._whitened.noise is noise:
-            return self._whitened.columns, self._whitened.products
-        white = whitened(self.nuisance_jacobian, self.masks, noise)
-        return white, np.asarray(white.T @ white, np.float64)
+            return replace(self._whitened)  # others may renew it
+        count = len(self.nuisances)
+        acting = [k for k in range(count) if k not in self.silent]
+        chosen = acting if self.silent else None
+        white, products = whitened(self.nuisance_jacobian, self.masks, noise, chosen), np.zeros((count, count))
+        products[np.ix_(acting, acting)] = white.T @ white
+        return _Whitened(noise, acting, white, products)
 
     def _total(self, model: Model, own: Tracks, noise: Noise) -> Floats:
         """Products of the whitened [residual, nuisances, term Jacobian]."""
-        white, products = self._of_nuisances(noise)
+        white = self._of_nuisances(noise)
         joined = {
             name: np.hstack([values, own[name].astype(np.float64)]) if own else values
             for name, values in model.residual.items()
@@ -374,8 +437,9 @@ class Fitter:
         count, width = len(self.nuisances), outer.shape[1]
         total = np.empty((count + width, count + width))
         at = [0, *range(1 + count, count + width)]
-        total[1 : 1 + count, 1 : 1 + count] = products
-        cross = np.asarray(white.T @ outer.astype(np.float32), np.float64)
+        total[1 : 1 + count, 1 : 1 + count] = white.products
+        cross = np.zeros((count, width))
+        cross[white.acting] = white.columns.T @ outer.astype(np.float32)
         total[np.ix_(range(1, 1 + count), at)] = cross
         total[np.ix_(at, range(1, 1 + count))] = cross.T
         total[np.ix_(at, at)] = outer.T @ outer
@@ -416,8 +480,15 @@ class Fitter:
         if model.terms:
             parts.append(self.term_jacobian(model))
         parts.append(columns)
-        joined = {name: np.hstack([part[name] for part in parts]) for name in columns}
-        return information_blocks(model.residual, joined, self.masks, noise, len(self.nuisances))
+        return information_blocks(model.residual, parts, self.masks, noise, len(self.nuisances))
+
+
+@compiled
+def _add_outer(columns: Floats, by: Floats, share: Floats) -> None:
+    """Add ``by`` (samples,) times ``share`` (columns,) to ``columns`` (samples, columns), in place."""
+    for t in range(columns.shape[0]):
+        for k in range(columns.shape[1]):
+            columns[t, k] += by[t] * share[k]
 
 
 def _difference(term: Term, sd: float) -> float:

@@ -4,24 +4,28 @@ Takes whitened residuals r and a Jacobian J (samples, columns); gives the produc
 (J' J + I) dz = J' r - z for nuisances in prior standard deviations and unbounded or bounded columns beside them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.noise.innovations import HUBER
-from hil.diagnosis.noise.model import Noise, SampleMasks, tracks_of, whiten
+from hil.diagnosis.noise.model import LONGITUDINAL, Noise, SampleMasks, tracks_of, whiten
+from hil.diagnosis.progress import Progress, counted
 from hil.diagnosis.simulation.measurement_model import Stack
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator
 
+Tracks = Mapping[str, Floats]
 _CHUNK = 48
 """Columns whitened at a time, for the memory they take."""
 _HELD = 1e15
 """Information added to a nuisance that does not move: far above that of any data."""
 _DIVERGED = 1e12
 """Largest difference quotient, for simulations that diverge at a step."""
+_ROUNDING = 1e-12
+"""Share of a channel's largest value below which a difference is rounding."""
 _RIDGE = 1e-9
 """Share of each diagonal element that is added to it, for columns that are alike to rounding."""
 _ACTIVE_SET_ROUNDS = 20
@@ -60,43 +64,89 @@ def finite_difference_jacobian(
     base: Stack,
     parameter_sets: Sequence[ParameterSet],
     steps: Sequence[float],
+    among: tuple[Sequence[int], int] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Floats]:
     """Finite differences of simulated channels, by track (samples, parameter sets), each divided by its step.
 
-    ``base`` are the channels at no step.
+    ``base`` are the channels at no step. With ``among``, places and a width, columns stand at these places of a wider
+    Jacobian that is 0 elsewhere. ``progress`` hears how many columns are done.
     """
     radius = float(simulator.vehicle.parameters.wheel.rolling_radius_m)
-    out = {name: np.zeros((len(frame.log_start), len(parameter_sets)), np.float32) for name in frame.names}
-    for k, (stack, step) in enumerate(zip(simulator.run_all(parameter_sets), steps, strict=True)):
+    places, width = among or (range(len(parameter_sets)), len(parameter_sets))
+    out = {name: np.zeros((len(frame.log_start), width), np.float32) for name in frame.names}
+    simulated = simulator.run_all(parameter_sets)
+    if progress is not None:
+        simulated = counted(progress, "Jacobian", simulated, len(parameter_sets))
+    for k, stack, step in zip(places, simulated, steps, strict=True):
         change = {group: (values - base[group]) / step for group, values in stack.items()}
         for name, values in tracks_of(change, frame, radius).items():
             out[name][:, k] = np.clip(values[:, 0], -_DIVERGED, _DIVERGED)
     return out
 
 
+def silent_columns(jacobian: Mapping[str, Floats]) -> list[int]:
+    """Columns of a Jacobian, tracks of (samples, columns), that are zero."""
+    acting = [values.any(axis=0) for values in jacobian.values()]
+    return np.flatnonzero(~np.any(acting, axis=0)).tolist() if acting else []
+
+
+def acting_among(
+    simulator: Simulator, base: Stack, stepped: Callable[[Sequence[int]], ParameterSet], places: Sequence[int]
+) -> list[int]:
+    """Those of the ``places`` whose parameters change the channels, ``base`` being those at no step.
+
+    ``stepped`` gives the parameter set with several of them a step off. Where nothing changes none acts, so that one
+    replay answers for all; else for each half (Dorfman 1943, Ann. Math. Stat. 14, 436).
+    """
+    if not places or _unchanged(simulator.run(stepped(places)), base):
+        return []
+    if len(places) == 1:
+        return list(places)
+    half = len(places) // 2
+    return [k for part in (places[:half], places[half:]) for k in acting_among(simulator, base, stepped, part)]
+
+
+def _unchanged(stack: Stack, base: Stack) -> bool:
+    return all(
+        bool((np.abs(values - base[group]) <= _ROUNDING * np.abs(base[group]).max(initial=0.0)).all())
+        for group, values in stack.items()
+    )
+
+
 def information_blocks(
-    residual: dict[str, Floats], columns: dict[str, Floats], frame: SampleMasks, noise: Noise, nuisances: int
+    residual: dict[str, Floats], columns: Tracks | Sequence[Tracks], frame: SampleMasks, noise: Noise, nuisances: int
 ) -> InformationBlocks:
-    """Whiten residual (samples, 1) and columns (samples, columns) by track, and sum their products by segment."""
+    """Whiten residual (samples, 1) and columns (samples, columns) by track, and sum their products by segment.
+
+    Several Jacobians stand side by side. Only tracks with a common noise are whitened together, for the memory.
+    """
+    parts = (columns,) if isinstance(columns, Mapping) else columns
     white_residual, likelihood = whiten(residual, frame, noise)
-    count = next(iter(columns.values())).shape[1]
+    count = sum(next(iter(part.values())).shape[1] for part in parts)
     segments = np.asarray(frame.segment_id, np.int64)
     segment_count = int(segments.max()) + 1
-    order = np.argsort(segments, kind="stable")
-    bounds = np.searchsorted(segments[order], np.arange(segment_count + 1))
-    whitened = {name: np.empty((len(segments), count + 1), np.float32) for name in residual}
-    for name, values in white_residual.items():
-        whitened[name][:, 0] = _limited(values[:, 0])
-    for begin in range(0, count, _CHUNK):
-        chunk = {name: values[:, begin : begin + _CHUNK] for name, values in columns.items()}
-        for name, values in whiten(chunk, frame, noise)[0].items():
-            whitened[name][:, 1 + begin : 1 + begin + values.shape[1]] = values
+    order = None if (np.diff(segments) >= 0).all() else np.argsort(segments, kind="stable")
+    bounds = np.searchsorted(np.sort(segments), np.arange(segment_count + 1))
+
     matrix = np.zeros((segment_count, count + 1, count + 1))
-    for values in whitened.values():
-        ordered = values[order] if (np.diff(segments) < 0).any() else values
-        for k in range(segment_count):
-            part = ordered[bounds[k] : bounds[k + 1]]
-            matrix[k] += part.T @ part
+    along = [name for name in residual if name in LONGITUDINAL]
+    for names in (along, *([name] for name in residual if name not in LONGITUDINAL)):
+        whitened = {name: np.empty((len(segments), count + 1), np.float32) for name in names}
+        at = 1
+        for part in parts:
+            for begin in range(0, next(iter(part.values())).shape[1], _CHUNK):
+                chunk = {name: part[name][:, begin : begin + _CHUNK] for name in names}
+                for name, values in whiten(chunk, frame, noise)[0].items():
+                    width = values.shape[1]
+                    whitened[name][:, at : at + width] = values
+                at += width
+        for name, values in whitened.items():
+            values[:, 0] = _limited(white_residual[name][:, 0])
+            ordered = values if order is None else values[order]
+            for k in range(segment_count):
+                block = ordered[bounds[k] : bounds[k + 1]]
+                matrix[k] += block.T @ block
     samples = int(sum(float(known.sum()) for known in frame.present.values()))
     return InformationBlocks(matrix, nuisances, samples, likelihood)
 

@@ -18,7 +18,7 @@ from hil.diagnosis.estimation.gauss_newton import (
     same_terms,
     with_term,
 )
-from hil.diagnosis.estimation.information import finite_difference_jacobian
+from hil.diagnosis.estimation.information import acting_among, finite_difference_jacobian
 from hil.diagnosis.noise.model import Noise, SampleMasks
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator
@@ -69,17 +69,24 @@ class NuisanceFit:
         upper = np.array([nuisance.upper for nuisance in self.nuisances])
         steps = np.where(z + self._steps > upper, -self._steps, self._steps)
         channels, moves = simulator.run(at), np.diag(steps)
+        count, silent = len(steps), self.fitter.silent
 
-        def jacobian(moved: Sequence[Floats], by: Sequence[float]) -> Tracks:
-            stepped = [self._parameter_set(z + move, terms) for move in moved]
-            return finite_difference_jacobian(simulator, self._masks, channels, stepped, by)
+        def stepped(places: Sequence[int]) -> ParameterSet:
+            return self._parameter_set(z + moves[list(places)].sum(axis=0), terms)
 
-        columns = jacobian(list(moves), steps.tolist())
-        for k, nuisance in enumerate(self.nuisances):
-            if nuisance.name in _KINKED:  # the mean of both sides
-                other = jacobian([-moves[k]], [-float(steps[k])])
-                for name, values in columns.items():
-                    values[:, k] = 0.5 * (values[:, k] + other[name][:, 0])
+        def jacobian(places: Sequence[int], sign: float, among: tuple[Sequence[int], int] | None = None) -> Tracks:
+            moved = [self._parameter_set(z + sign * moves[k], terms) for k in places]
+            by = [sign * float(steps[k]) for k in places]
+            return finite_difference_jacobian(simulator, self._masks, channels, moved, by, among)
+
+        acting = acting_among(simulator, channels, stepped, silent)
+        rest = [k for k in range(count) if k not in silent or k in acting]
+        columns = jacobian(rest, 1.0, (rest, count))
+        kinked = [k for k in rest if self.nuisances[k].name in _KINKED]
+        if kinked:  # the mean of both sides
+            for name, values in jacobian(kinked, -1.0).items():
+                columns[name][:, kinked] = 0.5 * (columns[name][:, kinked] + values)
+        self.fitter.forget()
         self.fitter = Fitter(simulator, self._masks, self._base, self.nuisances, columns, self.fitter.origin)
         self._taken.append((z, tuple(terms), self.fitter))
 
@@ -118,6 +125,8 @@ class NuisanceFit:
             if self._relinearise and stale and times < most:
                 information = np.diag(self.fitter.nuisance_information(noise))
                 self._steps = np.clip(_FINE / np.sqrt(np.maximum(information, 1e-9)), 0.03, _COARSE)
+                if times:
+                    self._taken.pop()  # on the way of this fit: no other will ask for it
                 self.relinearise(model.z, model.terms)
                 model = self.fitter.at(model.z, model.terms, noise)
                 around, times, cost = model.z, times + 1, np.inf

@@ -102,6 +102,15 @@ def _start_segment(bank: _Bank) -> None:
 
 
 @_inlined
+def _mirror(cov: Floats) -> None:
+    """Complete P, of which one half is made."""
+    for i in range(cov.shape[0]):
+        for j in range(i):
+            for k in range(cov.shape[2]):
+                cov[i, j, k] = cov[j, i, k]
+
+
+@_inlined
 def _predict(bank: _Bank, step: float, phi: Floats, colour: Floats, lanes: int, own: int) -> None:
     """x <- F x and P <- F P F' + Q, in place; ``step`` is r T."""
     x, cov, count = bank.x, bank.cov, len(phi)
@@ -118,11 +127,12 @@ def _predict(bank: _Bank, step: float, phi: Floats, colour: Floats, lanes: int, 
         for k in range(lanes):
             cov[0, 1 + j, k] *= phi[j, k]
             cov[1 + j, 0, k] = cov[0, 1 + j, k]
-        for i in range(count):
+        for i in range(j + 1):  # of what is symmetric, one half
             for k in range(lanes):
                 cov[1 + i, 1 + j, k] *= phi[i, k] * phi[j, k]
         for k in range(lanes):
             cov[1 + j, 1 + j, k] += (1.0 - phi[j, k] * phi[j, k]) * colour[j, k]
+    _mirror(cov)
 
 
 @_inlined
@@ -160,10 +170,11 @@ def _update(
     for i in range(states):
         for k in range(columns):
             x[i, k] += h[i, own * k] * bank.gained[k]
-        for j in range(states):
+        for j in range(i + 1):
             for k in range(lanes):  # from a diffuse P, R remains by cancellation: rounding shows in its sixth digit
                 square = h[i, k] * h[j, k]
-                cov[i, j, k] -= square * bank.inverse[k] if own else square / bank.total[k]
+                cov[j, i, k] -= square * bank.inverse[k] if own else square / bank.total[k]
+    _mirror(cov)
 
 
 @_inlined

@@ -5,7 +5,7 @@ that errors of tracks are independent) and as innovations, with the log-likeliho
 """
 
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -173,30 +173,35 @@ def tracks_of(stack: Stack, frame: SampleMasks, radius_m: float) -> dict[str, Fl
 
 
 def whiten(
-    tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise, into: Mapping[str, Floats] | None = None
-) -> tuple[dict[str, Floats], float]:
+    tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise, into: Mapping[str, Floats] | None = None,
+    chosen: Sequence[int] | None = None,
+) -> tuple[dict[str, Floats], float]:  # fmt: skip
     """Innovations by track, (samples, columns) in the precision given, and the log-likelihood of the first column.
 
-    They are written ``into`` arrays by track, where these are given.
+    They are written ``into`` arrays by track, where these are given; of some ``chosen`` columns alone only into such.
     """
-    out = {name: np.empty_like(values) for name, values in tracks.items()} if into is None else dict(into)
+    out = {name: np.empty(one.shape, one.dtype) for name, one in tracks.items()} if into is None else dict(into)
     filters: list[Callable[[], float]] = [
-        partial(_whiten_channel, name, values, frame, noise, out[name])
+        partial(_whiten_channel, name, values, frame, noise, out[name], chosen)
         for name, values in tracks.items()
         if name not in LONGITUDINAL
     ]
     if any(name in tracks for name in LONGITUDINAL):
-        filters.insert(0, partial(_whiten_longitudinal, tracks, frame, noise, out))
+        filters.insert(0, partial(_whiten_longitudinal, tracks, frame, noise, out, chosen))
     wide = max((values.shape[1] for values in tracks.values()), default=0) >= _WIDE
     return out, sum(parallel_map(operator.call, filters) if wide else (one() for one in filters))
 
 
-def whitened(tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise) -> Floats:
-    """Innovations of all tracks, one below the other in the order of the masks, (tracks x samples, columns)."""
+def whitened(
+    tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise, chosen: Sequence[int] | None = None
+) -> Floats:
+    """Innovations of all tracks, one below the other in the order of the masks, (tracks x samples, columns); of all
+    columns or of the ``chosen`` ones."""
     samples, (columns, kind) = len(frame.log_start), next((one.shape[1], one.dtype) for one in tracks.values())
+    columns = columns if chosen is None else len(chosen)
     joined = np.empty((len(frame.names) * samples, columns), kind)
     parts = {name: joined[k * samples : (k + 1) * samples] for k, name in enumerate(frame.names)}
-    whiten(tracks, frame, noise, parts)
+    whiten(tracks, frame, noise, parts, chosen)
     return joined
 
 
@@ -224,8 +229,10 @@ def ar1_coefficient(tau_s: float, step_s: float) -> float:
 
 
 def _whiten_longitudinal(
-    tracks: Mapping[str, Floats], frame: SampleMasks, noise: Noise, out: Mapping[str, Floats]
-) -> float:
+    every: Mapping[str, Floats], frame: SampleMasks, noise: Noise, out: Mapping[str, Floats],
+    chosen: Sequence[int] | None,
+) -> float:  # fmt: skip
+    tracks = {name: _columns(every[name], chosen) for name in LONGITUDINAL if name in every}
     scale, white = scale_of("long", frame, noise), np.zeros((len(frame.log_start), 3))
     likelihood, measured = 0.0, [name for name in LONGITUDINAL if name in tracks]
     for name in measured:
@@ -245,7 +252,14 @@ def _whiten_longitudinal(
     )
 
 
-def _whiten_channel(name: str, values: Floats, frame: SampleMasks, noise: Noise, out: Floats) -> float:
+def _columns(values: Floats, chosen: Sequence[int] | None) -> Floats:
+    return values if chosen is None else np.ascontiguousarray(values[:, list(chosen)])
+
+
+def _whiten_channel(
+    name: str, every: Floats, frame: SampleMasks, noise: Noise, out: Floats, chosen: Sequence[int] | None
+) -> float:
+    values = _columns(every, chosen)
     track, scale = noise.tracks[name], scale_of(name, frame, noise)
     white = white_variance(name, track, frame)
     colour = track.c**2 if noise.enabled else 0.0

@@ -99,6 +99,7 @@ class Simulator:
     characteristic_mps : speed with which the car's turning goes (`characteristic_speed`).
     hot_spot_visibility : (segments, 4), how much hot spots would show where `with_hot_spot_phase` chose angles.
     hot_spot_angles : (rows, 4) of each recording, rad; empty where no phase was fitted.
+    driven_by : stands for inputs and angles: simulators with the same one give one parameter set the same channels.
     """
 
     dataset: Dataset
@@ -106,6 +107,7 @@ class Simulator:
     characteristic_mps: float = np.inf
     hot_spot_visibility: Floats = field(default_factory=lambda: np.zeros((0, 4)))
     hot_spot_angles: tuple[Floats, ...] = ()
+    driven_by: object = field(default_factory=object)
     _setups: tuple[_Setup, ...] = ()
     _denoised: _Denoised | None = None
     _baseline: _Baseline | None = None
@@ -138,7 +140,8 @@ class Simulator:
         dataset = replace(self.dataset, recordings=tuple(recordings))
         denoised = Simulator(dataset, self.vehicle, self._characteristic(at)).denoised(at)
         each = zip(denoised._setups, denoised.dataset.recordings, strict=True)
-        return replace(denoised, _setups=tuple(replace(setup, rows_per_step=rows_per_step(one)) for setup, one in each))
+        setups = tuple(replace(setup, rows_per_step=rows_per_step(one)) for setup, one in each)
+        return replace(denoised, driven_by=object(), _setups=setups)
 
     def denoised(self, at: ParameterSet) -> "Simulator":
         """With inputs made anew from the raw ones, and no baseline: pressures and motor torques become the simulated
@@ -149,7 +152,8 @@ class Simulator:
         """
         raw = replace(self, _denoised=None, _baseline=None)
         recordings, inputs = zip(*parallel_map(lambda one: raw._denoise(one, at), self.dataset.recordings), strict=True)
-        return replace(raw, dataset=replace(self.dataset, recordings=recordings), _denoised=_Denoised(at, inputs))
+        dataset = replace(self.dataset, recordings=recordings)
+        return replace(raw, dataset=dataset, driven_by=object(), _denoised=_Denoised(at, inputs))
 
     def with_baseline(self, at: ParameterSet) -> "Simulator":
         """With this parameter set simulated once: others are simulated only where they can differ from it."""
@@ -181,7 +185,7 @@ class Simulator:
         fitted = [fit_phase(one, residual, of) for one, (residual, *of) in zip(recordings, each, strict=True)]
         phases, visibility = zip(*fitted, strict=True)
         turned_by = tuple(angle + phase for angle, phase in zip(angles, phases, strict=True))
-        return replace(self, hot_spot_visibility=np.vstack(visibility), hot_spot_angles=turned_by)
+        return replace(self, hot_spot_visibility=np.vstack(visibility), hot_spot_angles=turned_by, driven_by=object())
 
     def _denoise(self, recording: Recording, at: ParameterSet) -> tuple[Recording, tuple[Floats, Floats]]:
         """A recording with the inputs of `denoised`; these as sensors give them, and taken back again (`_Denoised`)."""

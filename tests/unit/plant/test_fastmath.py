@@ -24,6 +24,11 @@ def test_sin(x):
     assert fastmath._sin(x) == pytest.approx(math.sin(x), abs=4e-15)
 
 
+@given(st.floats(-12.0, 12.0))
+def test_cos(x):
+    assert fastmath._cos(x) == pytest.approx(math.cos(x), abs=4e-15)
+
+
 @given(st.floats(-1.0, 1.0))
 def test_exp(x):
     assert fastmath._exp(x) == pytest.approx(math.exp(x), rel=1e-14)

@@ -8,6 +8,7 @@ from pulses import log_of_pulses
 
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.estimation.gauss_newton import Fitter, Term
+from hil.diagnosis.estimation.information import acting_among
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.estimation.terms import candidates, columns
 from hil.diagnosis.noise.model import SampleMasks
@@ -110,6 +111,33 @@ def test_the_discs_heat_matters_once_a_cause_reads_their_temperature():
     assert acts(fades)
 
 
+def test_what_acts_is_found_among_what_does_not_by_few_replays(paper_fitter):
+    simulator, names = paper_fitter.simulator, [one.name for one in paper_fitter.nuisances]
+    base = simulator.run(paper_fitter.base)
+    still = [k for k, name in enumerate(names) if "cooling" in name or "heat_capacity" in name]
+    places, before = [*still, names.index("vehicle_mass_kg")], simulator.runs
+
+    def stepped(some):
+        return paper_fitter.parameter_set(np.isin(np.arange(len(names)), some).astype(float), ())
+
+    assert len(still) > 2
+    assert acting_among(simulator, base, stepped, still) == []
+    assert simulator.runs == before + 1
+    assert acting_among(simulator, base, stepped, places) == places[-1:]
+
+
+def test_a_cause_is_compared_with_channels_of_the_same_inputs():
+    """Inputs denoised anew moved every number that changes nothing, and all by the same signature."""
+    vehicle = paper_car()
+    case = prepare([log_of_pulses()], 0.308)
+    numbers = NuisanceFit(Simulator(case, vehicle), SampleMasks.of(case), vehicle, nominal(vehicle), False)
+    bare, noise = numbers.fitter.start()
+    heavier = numbers.fitter.at(bare.z, (Term(_MASS, 100.0),), noise)
+    anew, before = numbers.fitter.denoised(heavier), numbers.fitter.simulator.runs
+    assert anew.nuisance_jacobian_at(heavier) is numbers.fitter.nuisance_jacobian
+    assert numbers.fitter.simulator.runs == before + 2  # at the model, and all that change nothing together
+
+
 def test_sensitivities_taken_lately_serve_again_where_cars_are_alike():
     vehicle = paper_car()
     case = prepare([log_of_pulses()], 0.308)
@@ -124,7 +152,7 @@ def test_sensitivities_taken_lately_serve_again_where_cars_are_alike():
 
     bare = numbers.fitter.nuisance_jacobian
     assert replays(z) == 0
-    assert replays(z, Term(heavy, 100.0)) > len(z)
+    assert replays(z, Term(heavy, 100.0)) > len(z) // 2
     beside = numbers.fitter.nuisance_jacobian
     assert replays(z + 0.4) == 0
     assert numbers.fitter.nuisance_jacobian is bare
@@ -132,9 +160,9 @@ def test_sensitivities_taken_lately_serve_again_where_cars_are_alike():
     assert numbers.fitter.nuisance_jacobian is not bare
     assert replays(z, Term(heavy, 110.0)) == 0
     assert numbers.fitter.nuisance_jacobian is beside
-    assert replays(z, Term(heavy, 150.0)) > len(z)
-    assert replays(z, Term(heavy, 150.0, (0, 1.0))) > len(z)
-    assert replays(z + 1.0) > len(z)
+    assert replays(z, Term(heavy, 150.0)) > len(z) // 2
+    assert replays(z, Term(heavy, 150.0, (0, 1.0))) > len(z) // 2
+    assert replays(z + 1.0) > len(z) // 2
 
 
 @pytest.mark.parametrize(("stated_k", "deviation_k"), [(350.0, DISC_MEASURED_SD_K), (None, DISC_ASSUMED_SD_K)])

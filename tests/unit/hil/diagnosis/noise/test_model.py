@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from hil.diagnosis.data.log import Log, make_log
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.noise.estimate import estimate, first_guess
-from hil.diagnosis.noise.model import ChannelNoise, Noise, SampleMasks, whiten
+from hil.diagnosis.noise.model import ChannelNoise, Noise, SampleMasks, whiten, whitened
 
 WHEELS = ("fl", "fr", "rl", "rr")
 WAIT_S, NOISE_PA, RAMP_PA_S = 3e-4, 2e3, 2.5e7
@@ -177,3 +177,15 @@ def test_motors_of_one_axle_tell_a_torque_and_a_difference_once(act, tracks):
         channels |= {f"{name}_{w}_nm": -200.0 * np.sin(t) ** 2 * (w in act) for w in WHEELS}
     names = SampleMasks.of(prepare([make_log("log", t, channels)], 0.3)).names
     assert {name.removeprefix("motor.") for name in names if name.startswith("motor.")} == tracks
+
+
+@pytest.mark.parametrize("measured", [("wheel.mean",), ("wheel.mean", "ax")])
+def test_some_columns_are_whitened_as_among_all_where_a_channel_along_the_road_is_missing(measured) -> None:
+    """Chosen columns lie otherwise in memory; a car without ground speed or acceleration could not be whitened."""
+    n = 200
+    rng, ones, zeros = np.random.default_rng(4), np.ones(n), np.zeros(n)
+    tracks = {name: rng.standard_normal((n, 5)).astype(np.float32) for name in measured}
+    fresh = (np.arange(n) == 0) * 1.0
+    frame = SampleMasks(fresh, zeros, ones, 20.0 * ones, zeros, 0.02, dict.fromkeys(tracks, ones), measured)
+    noise = first_guess({name: values[:, :1] for name, values in tracks.items()}, frame)
+    assert np.array_equal(whitened(tracks, frame, noise, [0, 3]), whitened(tracks, frame, noise)[:, [0, 3]])

@@ -319,7 +319,8 @@ def test_steps_are_short_where_a_torque_steps_and_noise_is_no_step():
     }
     for one in (log, replace(log, channels=noisy)):
         paces = Simulator(prepare([one], 0.308), paper_car())._setups[0].rows_per_step
-        assert set(paces[205:212]) == {1}
+        assert set(paces[200:202]) == {1}
+        assert set(paces[205:212]) <= {1, STEPS // 2}
         assert (paces[260:290] == STEPS).all()
         assert 0.0 < (paces == 1).mean() < 0.4
 
