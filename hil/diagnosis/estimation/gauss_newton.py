@@ -5,14 +5,14 @@ the priors of the nuisances. Each step solves the linearised problem and is simu
 """
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hil.diagnosis.compiled import compiled
-from hil.diagnosis.data.log import Floats
+from hil.diagnosis.data.log import Floats, UnusableError
 from hil.diagnosis.estimation.information import (
     InformationBlocks,
     acting_among,
@@ -43,6 +43,10 @@ _LIMITS = (
 """Nuisances with an effect on one side alone: a limit that is not met, moved a little too far, spoils any step."""
 _DIVERGED = 1e15
 """Cost of a simulation that is not finite."""
+_DIVERGES = (
+    "with the numbers of the vehicle set the simulated car diverges: its speeds are not finite. Each number is within"
+    " its bounds; expected numbers that belong to one car. Check masses, inertias, stiffnesses and time constants"
+)
 _WORTH = 1.0
 """Decrease of the cost (chi-squared) below which a step is the last: far below any threshold of detection."""
 _FOLLOWED = 0.5
@@ -83,6 +87,10 @@ class Model:
     def values(self) -> list[float]:
         """Values of the terms."""
         return [term.value for term in self.terms]
+
+
+def _finite(values: Mapping[str, Floats]) -> bool:
+    return all(np.isfinite(one).all() for one in values.values())
 
 
 def same_terms(some: Sequence[Term], others: Sequence[Term]) -> bool:
@@ -202,7 +210,7 @@ class Fitter:
     def at(self, z: Floats, terms: Sequence[Term], noise: Noise) -> Model:
         """The model at these nuisances and terms, simulated."""
         stack = self.simulator.run(self.parameter_set(z, terms))
-        residual = self.tracks({group: self._measured[group] - values for group, values in stack.items()})
+        residual = self._residual_of(stack)
         cost, unknown = self.cost(residual, z, noise), np.zeros((0, 0))
         return Model(z, tuple(terms), residual, cost, unknown, stack, self.simulator.driven_by)
 
@@ -213,7 +221,17 @@ class Fitter:
 
     def residual(self, z: Floats, terms: Sequence[Term]) -> Tracks:
         """Residual tracks of a model."""
-        return tracks_of(self.simulator.residual(self.parameter_set(z, terms)), self.masks, self.radius)
+        return self._residual_of(self.simulator.run(self.parameter_set(z, terms)))
+
+    def _residual_of(self, stack: Stack) -> Tracks:
+        """Residual tracks of simulated channels; infinite where a simulation is not finite.
+
+        In tracks nothing measured is a residual of 0: a car that diverges would fit perfectly.
+        """
+        tracks = self.tracks({group: self._measured[group] - values for group, values in stack.items()})
+        if _finite(stack):
+            return tracks
+        return {name: np.full_like(values, np.inf) for name, values in tracks.items()}
 
     def tracks(self, stack: Stack) -> Tracks:
         """Tracks, (samples, 1), of channels."""
@@ -221,14 +239,17 @@ class Fitter:
 
     def cost(self, residual: Tracks, z: Floats, noise: Noise) -> float:
         """Twice the negative log-likelihood with the priors of the nuisances."""
-        if not all(np.isfinite(values).all() for values in residual.values()):
+        if not _finite(residual):
             return _DIVERGED
         return -2.0 * whiten(residual, self.masks, noise)[1] + float(z @ z)
 
     def start(self, enabled: bool = True) -> tuple[Model, Noise]:
         """The vehicle at the origin, and a first guess of the noise."""
         z = self.origin
-        noise = first_guess(self.residual(z, ()), self.masks, enabled)
+        residual = self.residual(z, ())
+        if not _finite(residual):
+            raise UnusableError(_DIVERGES)
+        noise = first_guess(residual, self.masks, enabled)
         return self.at(z, (), noise), noise
 
     def term_jacobian(self, model: Model) -> Tracks:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pulses import log_of_pulses
 
+from hil.diagnosis.data.log import UnusableError
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.estimation.gauss_newton import Fitter, Term
 from hil.diagnosis.estimation.information import acting_among
@@ -19,7 +20,10 @@ from hil.diagnosis.vehicle.priors import DISC_ASSUMED_SD_K, DISC_MEASURED_SD_K
 
 NOISE_PA = 2e3
 GAINS = {"brake_gain_front_nm_pa": 2e-4, "brake_gain_rear_nm_pa": 1e-4}
-(_MASS,) = (one for one in candidates(columns()) if one.name == "mass_offset@car")
+_MASS, _INERTIA = (
+    next(one for one in candidates(columns()) if one.name == name)
+    for name in ("mass_offset@car", "rotating_inertia@car")
+)
 
 
 @pytest.fixture(scope="module")
@@ -28,6 +32,22 @@ def paper_fitter() -> Fitter:
     vehicle = paper_car()
     case = prepare([log_of_pulses()], 0.308)
     return Fitter(Simulator(case, vehicle), SampleMasks.of(case), nominal(vehicle), vehicle.nuisances, {})
+
+
+def test_a_car_that_diverges_fits_nothing(paper_fitter):
+    """Its wheels have a negative inertia: nothing it says is finite, which is no residual of zero."""
+    z, noise = paper_fitter.origin, paper_fitter.start()[1]
+    diverging = paper_fitter.at(z, (Term(_INERTIA, -2.0),), noise)
+    assert not np.isfinite(paper_fitter.simulator.run(paper_fitter.parameter_set(z, diverging.terms))["wheel"]).all()
+    assert diverging.cost > 1e12
+    assert paper_fitter.cost(diverging.residual, z, noise) > 1e12
+
+
+def test_numbers_with_which_the_car_diverges_are_refused(paper_fitter):
+    base = _INERTIA.applied(paper_fitter.base, -2.0)
+    diverging = Fitter(paper_fitter.simulator, paper_fitter.masks, base, paper_fitter.nuisances, {})
+    with pytest.raises(UnusableError, match="the simulated car diverges"):
+        diverging.start()
 
 
 def test_nuisances_within_their_prior_have_a_birge_ratio_of_1(paper_fitter):
