@@ -12,6 +12,7 @@ from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.agreement import agrees
 from hil.diagnosis.detection.at_bounds import candidates_at_bounds
 from hil.diagnosis.detection.candidates import CandidateSet
+from hil.diagnosis.detection.change_fits import fit_changes
 from hil.diagnosis.detection.nonparametric_search import NonparametricSearch, SelectionStep
 from hil.diagnosis.detection.onset import add_same_onset_alternatives, estimate_onsets_of_best
 from hil.diagnosis.detection.profile_fit import (
@@ -250,7 +251,9 @@ class ForwardStep:
         tests = candidates.scores(fitter, blocks, nominal, noise)
         tests = candidates.shortlist(fitter, tests, blocks, nominal, False)
         fits = CandidateFits(fitter, candidates.jacobian, nominal, noise, self._settings.relinearise)
-        return fit_shortlist(fits, tests, allowance.of, threshold, False, self._progress)
+        fitted = fit_shortlist(fits, tests, allowance.of, threshold, False, self._progress)
+        _, guess = fitter.start(noise.enabled)
+        return merge_best(fitted, fit_changes(self._nuisance_fit, fitter, tests, guess, self._progress))
 
     def _fit_beyond_bounds(self, model: Model, noise: Noise) -> Fitted:
         """Quantities whose nuisance parameters are at their bounds, each as a cause fitted from the nominal vehicle.

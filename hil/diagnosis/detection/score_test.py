@@ -28,7 +28,7 @@ from hil.diagnosis.detection.threshold import (
 from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
 from hil.diagnosis.estimation.information import InformationBlocks, Marginal, marginalise, marginalise_from_onset
 from hil.diagnosis.estimation.model_discrepancy import corrected_gain
-from hil.diagnosis.estimation.terms import PRIOR_SD_IN_TYPICAL_SIZES, Candidate
+from hil.diagnosis.estimation.terms import PRIOR_SD_IN_TYPICAL_SIZES, Candidate, log_prior
 from hil.diagnosis.noise.model import Noise, SampleMasks
 
 OnsetTime = tuple[int, float]
@@ -108,9 +108,8 @@ def score(candidate: Candidate, b: float, q: float, current: float = 0.0) -> Sco
 def log_occam_factor(candidate: Candidate, information: float, value: float) -> float:
     """Log of posterior over prior volume at a value, the location being one of those possible (MacKay 1992)."""
     tau = candidate.prior_sd
-    return (
-        -0.5 * float(np.log1p(information * tau * tau)) - 0.5 * (value / tau) ** 2 - float(np.log(candidate.locations))
-    )
+    volume = -0.5 * float(np.log1p(information * tau * tau))
+    return volume + log_prior(value, tau) - float(np.log(candidate.locations))
 
 
 def rescored(item: ScoreTest, value: float, raw: float, information: float) -> ScoreTest:

@@ -81,6 +81,9 @@ RESTART_SHARE = 1.0 / 3.0
 [as above]. Smaller: more restarts (each costs a screening), at most one in all."""
 RELINEARISED_RIVALS = 3
 """Best hypotheses, fitted from the nominal vehicle, that get Jacobians of their own [as above]. More: slower."""
+CHANGES_WITH_ALL_FREE = 3
+"""Best changes since reference logs, fitted with the car held as these show it, that are then fitted with all free
+[reference-logs, A change first, then the rest]. More: slower."""
 RIVAL_SHARE, AS_GOOD_SHARE = 1.0 / 3.0, 0.9
 """Shares of the best one's improvement of the criterion: below the first a fit from the nominal vehicle is not
 continued, below the second an unbiased hypothesis gets no new Jacobian [as above]. Smaller: slower, more rivals."""

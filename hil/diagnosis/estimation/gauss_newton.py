@@ -10,6 +10,7 @@ from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hil.diagnosis.compiled import compiled
 from hil.diagnosis.data.log import Floats, UnusableError
@@ -180,6 +181,12 @@ class Fitter:
         """A fitter whose Jacobian may be updated independently of this one."""
         columns = {name: values.copy() for name, values in self.nuisance_jacobian.items()}
         return Fitter(self.simulator, self.masks, self.base, self.nuisances, columns, self.origin)
+
+    def holding(self, held: NDArray[np.bool_]) -> "Fitter":
+        """A copy in which the nuisances that are ``held`` stay at the origin."""
+        other = self.copy()
+        other.lower, other.upper = (np.where(held, self.origin, limits) for limits in (self.lower, self.upper))
+        return other
 
     def forget(self) -> None:
         """Free the whitened Jacobian, as large as the Jacobian itself; it is made again where it is needed."""

@@ -15,7 +15,7 @@ from hil.diagnosis.detection.threshold import INDISTINGUISHABLE
 from hil.diagnosis.estimation.gauss_newton import Term
 from hil.diagnosis.estimation.information import marginalise
 from hil.diagnosis.estimation.model_discrepancy import UNLISTED, variance_inflation_nonparametric
-from hil.diagnosis.estimation.terms import PRIOR_SD_IN_TYPICAL_SIZES, Candidate
+from hil.diagnosis.estimation.terms import PRIOR_SD_IN_TYPICAL_SIZES, Candidate, log_prior
 from hil.diagnosis.estimation.uncertainty import half_width, intervals
 from hil.diagnosis.isolation.groups import IsolabilityGroup, isolability_group
 from hil.diagnosis.result.cross_validation import probabilities
@@ -202,4 +202,4 @@ def _inseparable(diagnosis: Diagnosis, causes: list[Entry], rivals: list[Entry])
 def _density(value: float, typical: float) -> float:
     """Prior density of a value, without what is common to all."""
     sd = PRIOR_SD_IN_TYPICAL_SIZES * abs(typical)
-    return float(np.exp(-0.5 * (value / sd) ** 2) / sd)
+    return float(np.exp(log_prior(value, sd)) / sd)

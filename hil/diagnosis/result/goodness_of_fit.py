@@ -105,9 +105,12 @@ def goodness_of_fit(diagnosis: Diagnosis) -> list[ChannelFit]:
 
 
 def whiteness(innovations: Floats) -> tuple[float, float]:
-    """Autocorrelation (samples,) from sample to sample, and the p-value of the test of Ljung and Box."""
+    """Autocorrelation (samples,) from sample to sample, and the p-value of the test of Ljung and Box.
+
+    Few samples, and such as are all the same, say nothing.
+    """
     count = len(innovations)
-    if count <= 2 * _LAGS:
+    if count <= 2 * _LAGS or np.ptp(innovations) == 0.0:
         return 0.0, 1.0
     centred = innovations - innovations.mean()
     power = float(centred @ centred)
