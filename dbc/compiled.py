@@ -6,14 +6,14 @@ from struct import Struct
 from typing import Any, cast
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from dbc.compile_cache import cached
 from dbc.e2e import CRC_TABLE
 
 PAYLOAD = 8  # bytes set aside for each message
 CRC = np.array(CRC_TABLE, dtype=np.int64)
-compiled = cast(Callable[[Callable[..., Any]], Callable[..., Any]], njit(cache=True, nogil=True, error_model="numpy"))
+compiled = cast(Callable[[Callable[..., Any]], Callable[..., Any]], cached)
 """Decorator of a loop: cached on disk, without the global interpreter lock, with Python's rounding."""
 
 

@@ -16,6 +16,8 @@ from typing import Any, TypeVar, cast
 
 import numba
 
+from dbc.compile_cache import cached
+
 F = TypeVar("F", bound=Callable[..., Any])
 PACKAGES = (
     "plant", "plant.parameters", "plant.injection", "plant.effects", "plant.effects.road_air", "plant.effects.chassis",
@@ -93,11 +95,7 @@ def exact_entry(function: F) -> F:
 
 
 def _entry(function: F, options: dict[str, Any]) -> F:
-    compiled = _nb.njit(cache=True, nogil=True, **options)(function)
-    disk_cache = getattr(compiled, "_cache", None)  # absent when numba is switched off
-    if disk_cache is not None:
-        disk_cache._cache_file._source_stamp = _source_stamp()
-    return cast(F, compiled)
+    return cached(function, _source_stamp(), **options)
 
 
 def digest(packages: tuple[str, ...], endings: tuple[str, ...] = (".py",)) -> str:

@@ -14,6 +14,8 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
+from dbc.compile_cache import cached
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -42,11 +44,7 @@ def numbers(parameters: Any) -> list[float]:
 
 def entry(function: F) -> F:
     """Compile a function that Python calls: cached on disk, without the global interpreter lock."""
-    compiled = njit(cache=True, nogil=True, error_model="numpy")(function)
-    disk_cache = getattr(compiled, "_cache", None)  # absent when numba is switched off
-    if disk_cache is not None:
-        disk_cache._cache_file._source_stamp = _source_stamp()
-    return cast(F, compiled)
+    return cached(function, _source_stamp())
 
 
 @cache

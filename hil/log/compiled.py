@@ -11,12 +11,13 @@ import numpy as np
 from numba import njit
 from numba.core import event
 
+from dbc.compile_cache import cached
 from hil.log.compiling import listeners
 
 F = TypeVar("F", bound=Callable[..., Any])
 Decorator = Callable[[F], F]
 
-compiled = cast(Decorator[Any], njit(cache=True, nogil=True, error_model="numpy"))
+compiled = cast(Decorator[Any], cached)
 """For a pass that Python calls."""
 inlined = cast(Decorator[Any], njit(error_model="numpy"))
 """For what such a pass calls; LLVM puts it in place (faster here than Numba's own ``inline="always"``, by a half)."""
