@@ -24,6 +24,7 @@ def test_white_innovations_are_white_and_coloured_ones_are_not():
     assert rho == pytest.approx(0.4, abs=0.05)
     assert p < 1e-6
     assert whiteness(noise[:10]) == (0.0, 1.0)
+    assert whiteness(np.zeros(1000)) == (0.0, 1.0)
 
 
 @pytest.fixture(scope="module")
