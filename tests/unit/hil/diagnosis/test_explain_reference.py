@@ -16,6 +16,7 @@ from plant.injection.theta import THETA
 SIX = {key: CAR[key] for key in VEHICLE}
 """All that is told of the car with one track; its pressures, tyres and load transfer are unlike the plant's."""
 DRAG_NM = (0.0, 0.0, 40.0, 0.0)
+LARGE_DRAG_NM = (0.0, 0.0, 120.0, 0.0)
 
 
 @pytest.mark.slow
@@ -47,6 +48,17 @@ def _drives(first_seed: int, drag_nm: tuple[float, ...] = (0.0,) * 4) -> list[di
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_drag_since_the_reference_is_named_though_many_numbers_could_take_it_up() -> None:
+    found = explain(_drives(40, LARGE_DRAG_NM), VEHICLE, reference=_drives(30)).json
+    (cause,) = found["causes"]
+    assert (cause["effect"], cause["location"]) == ("residual_drag", "rl")
+    low, high = cause["parameters"]["torque_nm"]["ci95"]
+    assert low < 120.0 < high
+
+
+@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(900)
 def test_a_drag_that_the_reference_has_too_is_no_change() -> None:
     found = explain(_drives(40, DRAG_NM), VEHICLE, reference=_drives(30, DRAG_NM)).json

@@ -17,7 +17,7 @@ from hil.diagnosis.detection.score_test import (
 )
 from hil.diagnosis.estimation.information import InformationBlocks, marginalise, solve
 from hil.diagnosis.estimation.model_discrepancy import UNLISTED, corrected_gain, variance_inflation
-from hil.diagnosis.estimation.terms import LOCATIONS, candidates, columns, location_kind
+from hil.diagnosis.estimation.terms import LOCATIONS, candidates, columns, location_kind, log_prior
 from hil.diagnosis.estimation.uncertainty import half_width
 
 CANDIDATES = {c.name: c for c in candidates(columns())}
@@ -35,6 +35,15 @@ def test_a_value_of_the_forbidden_sign_explains_nothing() -> None:
     test = score(CANDIDATES["residual_drag@fl"], -50.0, 10.0)
     assert test.value == 0.0
     assert test.gain == 0.0
+
+
+def test_a_prior_makes_a_large_value_unlikely_and_not_impossible() -> None:
+    """Pads that bind: 20 times what is usual, and data that want no other cause by 60 in chi-squared."""
+    usual = np.linspace(0.0, 2.0, 9)
+    assert [log_prior(value, 1.0) for value in usual] == pytest.approx(-0.5 * usual**2, abs=0.3)
+    assert log_prior(-3.0, 2.0) == log_prior(3.0, 2.0)
+    typical, bound = 1.0 / CANDIDATES["residual_drag@rl"].prior_sd, 20.0
+    assert -30.0 < log_prior(bound * CANDIDATES["residual_drag@rl"].parameter.typical * typical, 1.0) < -5.0
 
 
 def test_what_leaves_no_trace_cannot_score() -> None:

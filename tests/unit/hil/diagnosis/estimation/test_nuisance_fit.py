@@ -50,6 +50,18 @@ def test_numbers_with_which_the_car_diverges_are_refused(paper_fitter):
         diverging.start()
 
 
+def test_numbers_that_are_held_stay_where_they_are(paper_fitter):
+    held = np.zeros(len(paper_fitter.nuisances), bool)
+    held[::2] = True
+    rng = np.random.default_rng(5)
+    root = rng.standard_normal((len(held) + 1, 2 * len(held)))
+    z, *_ = paper_fitter.holding(held).moved(paper_fitter.start()[0], 10.0 * root @ root.T)
+    assert (z[held] == paper_fitter.origin[held]).all()
+    assert (z[~held] != paper_fitter.origin[~held]).any()
+    free, *_ = paper_fitter.moved(paper_fitter.start()[0], 10.0 * root @ root.T)
+    assert (free[held] != paper_fitter.origin[held]).any()
+
+
 def test_nuisances_within_their_prior_have_a_birge_ratio_of_1(paper_fitter):
     rng, count = np.random.default_rng(3), len(paper_fitter.nuisances)
     assert paper_fitter.birge_ratio(np.zeros(count)) == 1.0
