@@ -66,17 +66,11 @@ class Chain:
         return values
 
     def undo(self, node: str, time_s: Vector, values: Vector) -> Vector:
-        """True values of what a node reported, on whole arrays.
+        """Values of what a node reported with the effects taken back, on whole arrays.
 
-        Raises
-        ------
-        ValueError
-            An effect that is on has no inverse (filters, steps, drop-outs).
+        Effects that lose information (filters, steps, drop-outs) have no inverse and leave the values as they are.
         """
         for effect in reversed(self._active):
-            if node not in effect.nodes:
-                continue
-            if effect.undo is None:
-                raise ValueError(f"{effect.name} cannot be undone: information is lost; leave {node} as an output")
-            values = effect.undo(node, time_s, values, self._numbers(effect, time_s), {})
+            if node in effect.nodes and effect.undo is not None:
+                values = effect.undo(node, time_s, values, self._numbers(effect, time_s), {})
         return values

@@ -49,10 +49,7 @@ def before_sensors(inputs: Floats, theta: Floats, row_s: float) -> Floats:
     for node, part in _INPUT.items():
         if chain.touches(node):
             where = INPUT.slice(part)
-            try:
-                true[:, where] = chain.undo(node, time_s, inputs[:, where])
-            except ValueError:
-                true[:, where] = inputs[:, where]
+            true[:, where] = chain.undo(node, time_s, inputs[:, where])
     return true
 
 
