@@ -9,7 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hil.diagnosis.estimation.aliases import alias_of
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
+from hil.diagnosis.estimation.gauss_newton import Fitter
+from hil.diagnosis.estimation.model import Model, Term
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.vehicle.priors import NuisanceKind
 from plant.injection.theta import THETA

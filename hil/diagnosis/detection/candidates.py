@@ -26,7 +26,7 @@ from hil.diagnosis.detection.score_test import (
     shortlist,
 )
 from hil.diagnosis.detection.threshold import SCORED_WITH_OWN_NOISE
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Tracks
+from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.diagnosis.estimation.information import (
     InformationBlocks,
     acting_among,
@@ -35,6 +35,7 @@ from hil.diagnosis.estimation.information import (
     marginalise_from_onset,
     silent_columns,
 )
+from hil.diagnosis.estimation.model import Model, Tracks
 from hil.diagnosis.estimation.model_discrepancy import FORM_SHARE
 from hil.diagnosis.estimation.terms import Candidate, candidates, columns
 from hil.diagnosis.noise.model import Noise, SampleMasks

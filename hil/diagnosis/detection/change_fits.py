@@ -13,7 +13,8 @@ import numpy as np
 from hil.diagnosis.detection.profile_fit import FittedHypothesis, criterion, refitted, unscored
 from hil.diagnosis.detection.score_test import ScoreTest
 from hil.diagnosis.detection.threshold import CHANGES_WITH_ALL_FREE
-from hil.diagnosis.estimation.gauss_newton import Fitter, Term
+from hil.diagnosis.estimation.gauss_newton import Fitter
+from hil.diagnosis.estimation.model import Term
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import Noise
 from hil.diagnosis.parallel import thread_map

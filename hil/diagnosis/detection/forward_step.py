@@ -44,8 +44,9 @@ from hil.diagnosis.detection.threshold import (
     RESTART_SHARE,
     DetectionThreshold,
 )
-from hil.diagnosis.estimation.gauss_newton import BIASED_BIRGE_RATIO, Fitter, Model, Term
+from hil.diagnosis.estimation.gauss_newton import BIASED_BIRGE_RATIO, Fitter
 from hil.diagnosis.estimation.information import InformationBlocks
+from hil.diagnosis.estimation.model import Model, Term
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import Noise
 from hil.diagnosis.progress import counted

@@ -11,8 +11,9 @@ import numpy as np
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.nonparametric import BASIS_SIZE, BasisExpansion, at_each_location, basis_expansions
 from hil.diagnosis.detection.profile_fit import FittedHypothesis
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term, Tracks
+from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.diagnosis.estimation.information import finite_difference_jacobian, marginalise
+from hil.diagnosis.estimation.model import Model, Term, Tracks
 from hil.diagnosis.noise.model import Noise
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator

@@ -24,7 +24,8 @@ from hil.diagnosis.detection.threshold import (
     DetectionThreshold,
     chi2_quantile,
 )
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model
+from hil.diagnosis.estimation.gauss_newton import Fitter
+from hil.diagnosis.estimation.model import Model
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation_nonparametric
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.noise.model import Noise

@@ -24,8 +24,9 @@ from hil.diagnosis.detection.threshold import (
     SAME_ONSET_CRITERION,
     chi2_quantile,
 )
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
+from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.diagnosis.estimation.information import information_blocks
+from hil.diagnosis.estimation.model import Model, Term
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation
 from hil.diagnosis.noise.model import Noise
 

@@ -25,7 +25,8 @@ from hil.diagnosis.detection.threshold import (
     SHORTLIST_SIZE,
     DetectionThreshold,
 )
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term, Tracks
+from hil.diagnosis.estimation.gauss_newton import Fitter
+from hil.diagnosis.estimation.model import Model, Term, Tracks
 from hil.diagnosis.estimation.model_discrepancy import corrected_gain, variance_inflation
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.noise.model import Noise

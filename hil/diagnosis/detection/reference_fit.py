@@ -19,8 +19,9 @@ from hil.diagnosis.detection.nonparametric import BasisExpansion
 from hil.diagnosis.detection.result import Progress, Settings
 from hil.diagnosis.detection.score_test import ScoreTest, score, shortlist
 from hil.diagnosis.detection.threshold import SHORTLIST_MIN_GAIN
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model
+from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.diagnosis.estimation.information import marginalise
+from hil.diagnosis.estimation.model import Model
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.estimation.terms import Candidate, summed
 from hil.diagnosis.noise.model import Noise, SampleMasks

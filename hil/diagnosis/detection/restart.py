@@ -16,7 +16,8 @@ from hil.diagnosis.detection.threshold import (
     OVERTAKING_CRITERION,
     RIVAL_SHARE,
 )
-from hil.diagnosis.estimation.gauss_newton import BIASED_BIRGE_RATIO, Model
+from hil.diagnosis.estimation.gauss_newton import BIASED_BIRGE_RATIO
+from hil.diagnosis.estimation.model import Model
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import Noise
 from hil.diagnosis.parallel import thread_map

@@ -11,8 +11,9 @@ from hil.diagnosis.detection.nonparametric import BasisFunction
 from hil.diagnosis.detection.profile_fit import FittedHypothesis
 from hil.diagnosis.detection.score_test import ScoreTest
 from hil.diagnosis.detection.threshold import FALSE_ALARM_PROBABILITY, MAX_CAUSES
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model
+from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.diagnosis.estimation.information import InformationBlocks
+from hil.diagnosis.estimation.model import Model
 from hil.diagnosis.noise.model import Noise
 from hil.diagnosis.progress import Progress as Progress
 from hil.diagnosis.vehicle.spec import Vehicle

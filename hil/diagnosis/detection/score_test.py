@@ -25,8 +25,9 @@ from hil.diagnosis.detection.threshold import (
     TESTS_PER_PARAMETER,
     ZERO_GRADIENT_SNR,
 )
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
+from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.diagnosis.estimation.information import InformationBlocks, Marginal, marginalise, marginalise_from_onset
+from hil.diagnosis.estimation.model import Model, Term
 from hil.diagnosis.estimation.model_discrepancy import corrected_gain
 from hil.diagnosis.estimation.terms import PRIOR_SD_IN_TYPICAL_SIZES, Candidate, log_prior
 from hil.diagnosis.noise.model import Noise, SampleMasks

@@ -16,8 +16,9 @@ from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.nonparametric import BasisFunction
 from hil.diagnosis.detection.profile_fit import CandidateFits, FittedHypothesis, refitted
 from hil.diagnosis.detection.threshold import SHAPE_MIN_SHARE
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
+from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.diagnosis.estimation.information import finite_difference_jacobian, information_blocks, solve
+from hil.diagnosis.estimation.model import Model, Term
 from hil.diagnosis.estimation.model_discrepancy import FORM_SHARE, variance_inflation
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.estimation.uncertainty import FORM_SD_SHARE

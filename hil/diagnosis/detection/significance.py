@@ -24,7 +24,8 @@ from hil.diagnosis.detection.threshold import (
     chi2_quantile,
 )
 from hil.diagnosis.estimation.aliases import resolve_aliases
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Tracks
+from hil.diagnosis.estimation.gauss_newton import Fitter
+from hil.diagnosis.estimation.model import Model, Tracks
 from hil.diagnosis.estimation.model_discrepancy import corrected_gain, variance_inflation, with_uncertainty
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.estimation.uncertainty import standard_deviations

@@ -37,7 +37,8 @@ from hil.diagnosis.detection.score_test import (
 from hil.diagnosis.detection.significance import Elimination, eliminate_backward
 from hil.diagnosis.detection.threshold import SHORTLIST_SIZE, DetectionThreshold
 from hil.diagnosis.estimation.aliases import resolve_aliases
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
+from hil.diagnosis.estimation.gauss_newton import Fitter
+from hil.diagnosis.estimation.model import Model, Term
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.noise.model import Noise, SampleMasks
 from hil.diagnosis.parallel import thread_map

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.estimation.gauss_newton import Model, Term
+from hil.diagnosis.estimation.model import Model, Term
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.vehicle.priors import Nuisance, NuisanceKind
 from plant.effects.effect import NODE_LATENCY

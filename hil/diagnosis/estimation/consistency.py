@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model
+from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.diagnosis.estimation.information import information_blocks
+from hil.diagnosis.estimation.model import Model
 from hil.diagnosis.noise.model import Noise
 
 _PRIOR_SEGMENTS = 4.0

@@ -22,7 +22,7 @@ from hil.diagnosis.estimation.information import (
     silent_columns,
     solve_bounded,
 )
-from hil.diagnosis.estimation.terms import Candidate
+from hil.diagnosis.estimation.model import Model, TakenJacobian, Term, Tracks, same_terms, with_term
 from hil.diagnosis.noise.estimate import estimate, first_guess
 from hil.diagnosis.noise.innovations import HUBER
 from hil.diagnosis.noise.model import Noise, SampleMasks, tracks_of, whiten, whitened
@@ -31,7 +31,6 @@ from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.priors import Nuisance, NuisanceKind
 
-Tracks = dict[str, Floats]
 _LARGEST_STEP = 8.0
 """Largest step of a nuisance, in prior standard deviations: what the linearisation may be trusted for."""
 _ATTEMPTS = ((False, 0.0, 1.0), (True, 0.0, 0.5), (True, 0.1, 1.0), (True, 1.0, 1.0), (True, 10.0, 1.0))
@@ -56,64 +55,16 @@ BIASED_BIRGE_RATIO = 1.5
 """Birge ratio (`Fitter.birge_ratio`) from which an unmodelled cause may bias the nuisances."""
 _REMEMBERED = 16
 """Term Jacobians that are remembered: fits, their scores and intervals ask for the same one."""
-_ALIKE = 0.2
-"""Share by which the value of a term may change while its signature serves on."""
-
-
-@dataclass(frozen=True, eq=False)
-class Term:
-    """A candidate with a value, and its onset as (recording, s in it); None: acts throughout."""
-
-    candidate: Candidate
-    value: float
-    onset: tuple[int, float] | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Model:
-    """A fitted vehicle: nuisances ``z`` in prior standard deviations and terms.
-
-    ``residual`` tracks, (samples, 1), simulated ``channels`` and ``cost`` are at exactly this point; ``covariance``
-    (terms, terms) is that of the values. ``driven_by`` are the inputs of the channels (`Simulator.driven_by`).
-    """
-
-    z: Floats
-    terms: tuple[Term, ...]
-    residual: Tracks
-    cost: float
-    covariance: Floats
-    channels: Stack = field(default_factory=dict)
-    driven_by: object = None
-
-    def values(self) -> list[float]:
-        """Values of the terms."""
-        return [term.value for term in self.terms]
 
 
 def _finite(values: Mapping[str, Floats]) -> bool:
     return all(np.isfinite(one).all() for one in values.values())
 
 
-def same_terms(some: Sequence[Term], others: Sequence[Term]) -> bool:
-    """Same candidates with the same onsets, at values whose signatures are alike."""
-    if [(one.candidate, one.onset) for one in some] != [(other.candidate, other.onset) for other in others]:
-        return False
-    before, after = (np.array([term.value for term in terms]) for terms in (some, others))
-    return bool((np.abs(after - before) <= _ALIKE * np.maximum(np.abs(before), np.abs(after))).all())
-
-
 def _far(linearised: Model, now: Model) -> bool:
     """The model is far from where the term Jacobian was taken."""
     moved = np.abs(now.z - linearised.z).max(initial=0.0)
     return not same_terms(linearised.terms, now.terms) or bool(moved > _FOLLOWED)
-
-
-def with_term(parameters: ParameterSet, term: Term) -> ParameterSet:
-    """The parameter set with a term at its value, from its onset on."""
-    always = term.candidate.applied(parameters, term.value)
-    if term.onset is None:
-        return always
-    return always.with_onset(term.candidate.effect.name, *term.onset, before=parameters)
 
 
 @dataclass(eq=False)
@@ -125,22 +76,6 @@ class _Whitened:
     acting: list[int] = field(default_factory=list)
     columns: Floats = field(default_factory=lambda: np.empty((0, 0), np.float32))
     products: Floats = field(default_factory=lambda: np.empty((0, 0)))
-
-
-@dataclass(frozen=True, eq=False)
-class _Taken:
-    """A term Jacobian, at which ``model`` by which inputs (`Simulator.driven_by`) and steps of the values."""
-
-    driven_by: object
-    model: Model
-    steps: list[float]
-    tracks: Tracks
-
-    def at(self, driven_by: object, model: Model, steps: list[float]) -> bool:
-        """Taken at exactly this point."""
-        terms = [[(one.candidate, one.value, one.onset) for one in of.terms] for of in (self.model, model)]
-        same = self.driven_by is driven_by and self.steps == steps and terms[0] == terms[1]
-        return same and bool((self.model.z == model.z).all())
 
 
 class Fitter:
@@ -174,7 +109,7 @@ class Fitter:
         self.radius = float(simulator.vehicle.parameters.wheel.rolling_radius_m)
         self._measured = simulator.measured()
         self._whitened = _Whitened()
-        self._taken: deque[_Taken] = deque(maxlen=_REMEMBERED)
+        self._taken: deque[TakenJacobian] = deque(maxlen=_REMEMBERED)
         self._awake: set[int] = set()  # nuisances without a column of their own that acted in some model
 
     def copy(self) -> "Fitter":
@@ -271,7 +206,7 @@ class Fitter:
         moved = [term.candidate.applied(parameters, step) for term, step in zip(model.terms, steps, strict=True)]
         tracks = finite_difference_jacobian(self.simulator, self.masks, self.channels(model), moved, steps)
         at = Model(model.z, model.terms, {}, 0.0, np.zeros((0, 0)))
-        self._taken.append(_Taken(driven_by, at, steps, tracks))
+        self._taken.append(TakenJacobian(driven_by, at, steps, tracks))
         return tracks
 
     def nuisance_jacobian_at(self, model: Model) -> Tracks:

@@ -9,16 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from hil.diagnosis.data.log import Floats
-from hil.diagnosis.estimation.gauss_newton import (
-    BIASED_BIRGE_RATIO,
-    Fitter,
-    Model,
-    Term,
-    Tracks,
-    same_terms,
-    with_term,
-)
+from hil.diagnosis.estimation.gauss_newton import BIASED_BIRGE_RATIO, Fitter
 from hil.diagnosis.estimation.information import acting_among, finite_difference_jacobian
+from hil.diagnosis.estimation.model import Model, Term, Tracks, same_terms, with_term
 from hil.diagnosis.noise.model import Noise, SampleMasks
 from hil.diagnosis.simulation.parameter_set import ParameterSet
 from hil.diagnosis.simulation.simulator import Simulator

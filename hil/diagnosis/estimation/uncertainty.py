@@ -4,8 +4,9 @@ import numpy as np
 
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.estimation.aliases import alias_of
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model
+from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.diagnosis.estimation.information import InformationBlocks, information_blocks, solve
+from hil.diagnosis.estimation.model import Model
 from hil.diagnosis.estimation.model_discrepancy import variance_inflation
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.noise.model import Noise

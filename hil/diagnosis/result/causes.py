@@ -12,8 +12,8 @@ from hil.diagnosis.detection.result import Diagnosis
 from hil.diagnosis.detection.score_test import candidate_key, segment_starts
 from hil.diagnosis.detection.shape import ShapedCandidate
 from hil.diagnosis.detection.threshold import INDISTINGUISHABLE
-from hil.diagnosis.estimation.gauss_newton import Term
 from hil.diagnosis.estimation.information import marginalise
+from hil.diagnosis.estimation.model import Term
 from hil.diagnosis.estimation.model_discrepancy import UNLISTED, variance_inflation_nonparametric
 from hil.diagnosis.estimation.terms import PRIOR_SD_IN_TYPICAL_SIZES, Candidate, log_prior
 from hil.diagnosis.estimation.uncertainty import half_width, intervals

@@ -8,8 +8,9 @@ import numpy as np
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.profile_fit import FittedHypothesis, delta_criterion
 from hil.diagnosis.detection.result import Diagnosis, Progress
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term, Tracks
+from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.diagnosis.estimation.information import information_blocks
+from hil.diagnosis.estimation.model import Model, Term, Tracks
 from hil.diagnosis.noise.model import Noise, SampleMasks
 from hil.diagnosis.result.statistics import (
     FOLDS,

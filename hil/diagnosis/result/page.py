@@ -8,7 +8,7 @@ import numpy as np
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.profile_fit import FittedHypothesis, delta_chi2
 from hil.diagnosis.detection.threshold import INDISTINGUISHABLE
-from hil.diagnosis.estimation.gauss_newton import Model
+from hil.diagnosis.estimation.model import Model
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.manoeuvres import stops
 from hil.diagnosis.result import reference

@@ -14,8 +14,9 @@ from scipy.signal import lfilter
 
 from hil.diagnosis.data.log import Floats, Log, make_log
 from hil.diagnosis.data.prepare import prepare
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
+from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.diagnosis.estimation.information import finite_difference_jacobian
+from hil.diagnosis.estimation.model import Model, Term
 from hil.diagnosis.estimation.terms import candidates, columns
 from hil.diagnosis.estimation.uncertainty import intervals
 from hil.diagnosis.noise.model import SampleMasks

@@ -10,7 +10,8 @@ from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.detection.agreement import MODEL_FORM, agrees, shown_elsewhere
 from hil.diagnosis.detection.profile_fit import refitted, unscored
 from hil.diagnosis.estimation.consistency import Consistency, consistencies
-from hil.diagnosis.estimation.gauss_newton import Fitter, Term
+from hil.diagnosis.estimation.gauss_newton import Fitter
+from hil.diagnosis.estimation.model import Term
 from hil.diagnosis.estimation.terms import candidates, columns
 from hil.diagnosis.noise.model import SampleMasks
 from hil.diagnosis.simulation.parameter_set import nominal

@@ -6,7 +6,7 @@ import pytest
 
 from hil.diagnosis.detection.nonparametric_search import is_preferred
 from hil.diagnosis.detection.profile_fit import FittedHypothesis
-from hil.diagnosis.estimation.gauss_newton import Term
+from hil.diagnosis.estimation.model import Term
 from hil.diagnosis.estimation.terms import candidates, columns
 
 BEFORE = 1000.0

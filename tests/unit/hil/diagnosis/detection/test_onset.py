@@ -11,7 +11,8 @@ from hil.diagnosis.data.dataset import Segment
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.detection.onset import detect_change_point, estimate_onsets, nearest, times_between
 from hil.diagnosis.detection.score_test import onset_penalty, segment_starts
-from hil.diagnosis.estimation.gauss_newton import Fitter, Term
+from hil.diagnosis.estimation.gauss_newton import Fitter
+from hil.diagnosis.estimation.model import Term
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.estimation.terms import candidates, columns
 from hil.diagnosis.noise.model import SampleMasks

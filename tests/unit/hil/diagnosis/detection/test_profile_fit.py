@@ -12,7 +12,7 @@ from hil.diagnosis.detection.profile_fit import (
     delta_criterion,
     rival_hypotheses,
 )
-from hil.diagnosis.estimation.gauss_newton import Term
+from hil.diagnosis.estimation.model import Term
 from hil.diagnosis.estimation.terms import candidates, columns
 
 CANDIDATES = {c.name: c for c in candidates(columns())}

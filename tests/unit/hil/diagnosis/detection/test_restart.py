@@ -8,7 +8,7 @@ from pulses import log_as_driven
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.detection.profile_fit import criterion, refitted, unscored
 from hil.diagnosis.detection.restart import refit_from_nominal
-from hil.diagnosis.estimation.gauss_newton import Term
+from hil.diagnosis.estimation.model import Term
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.estimation.terms import candidates, columns
 from hil.diagnosis.noise.model import SampleMasks

@@ -12,7 +12,7 @@ from hil.diagnosis.detection import forward_step
 from hil.diagnosis.detection.profile_fit import FittedHypothesis, fit_shortlist, merge_best
 from hil.diagnosis.detection.score_test import score
 from hil.diagnosis.detection.stepwise import diagnose
-from hil.diagnosis.estimation.gauss_newton import Term
+from hil.diagnosis.estimation.model import Term
 from hil.diagnosis.estimation.terms import candidates, columns
 from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.simulation.simulator import Simulator

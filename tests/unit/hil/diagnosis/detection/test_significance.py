@@ -18,7 +18,8 @@ from hil.diagnosis.detection.significance import (
     with_gain,
 )
 from hil.diagnosis.detection.threshold import DetectionThreshold
-from hil.diagnosis.estimation.gauss_newton import Fitter, Model, Term
+from hil.diagnosis.estimation.gauss_newton import Fitter
+from hil.diagnosis.estimation.model import Model, Term
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.estimation.terms import candidates, columns
 from hil.diagnosis.noise.model import Noise, SampleMasks

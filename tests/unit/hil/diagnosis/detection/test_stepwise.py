@@ -11,7 +11,7 @@ from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.detection.candidates import CandidateSet
 from hil.diagnosis.detection.profile_fit import FittedHypothesis, criterion, refit_from_best, refitted, unscored
 from hil.diagnosis.detection.stepwise import try_single_cause
-from hil.diagnosis.estimation.gauss_newton import Model, Term
+from hil.diagnosis.estimation.model import Model, Term
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.noise.model import SampleMasks

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hil.diagnosis.estimation.aliases import alias_of, resolve_aliases
-from hil.diagnosis.estimation.gauss_newton import Model, Term
+from hil.diagnosis.estimation.model import Model, Term
 from hil.diagnosis.estimation.terms import candidates, columns
 from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.vehicle.load import paper_car

@@ -8,8 +8,9 @@ from pulses import log_of_pulses
 
 from hil.diagnosis.data.log import UnusableError
 from hil.diagnosis.data.prepare import prepare
-from hil.diagnosis.estimation.gauss_newton import Fitter, Term
+from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.diagnosis.estimation.information import acting_among
+from hil.diagnosis.estimation.model import Term
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.estimation.terms import candidates, columns
 from hil.diagnosis.noise.model import SampleMasks
