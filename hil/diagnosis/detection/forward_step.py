@@ -19,6 +19,7 @@ from hil.diagnosis.detection.profile_fit import (
     CandidateFits,
     Fitted,
     FittedHypothesis,
+    corrected,
     criterion,
     fit_shortlist,
     merge_best,
@@ -234,14 +235,18 @@ class ForwardStep:
         fits = CandidateFits(self._fitter, candidates.jacobian, model, noise, self._settings.relinearise)
         fitted = fit_shortlist(fits, tests, allowance.of, threshold, self._biased, self._progress)
         if self._biased:
-            fitted = merge_best(fitted, self._fit_shortlist_at_nominal(candidates, noise, allowance, threshold))
+            fitted = self._fit_shortlist_at_nominal(fitted, candidates, noise, allowance, threshold, fits.reference)
             fitted = merge_best(fitted, self._fit_beyond_bounds(model, noise))
         return fits, *fitted, threshold
 
     def _fit_shortlist_at_nominal(
-        self, candidates: CandidateSet, noise: Noise, allowance: FormErrorAllowance, threshold: DetectionThreshold
-    ) -> Fitted:
-        """The shortlist at the nominal vehicle, where no nuisance parameter has absorbed a cause."""
+        self, first: Fitted, candidates: CandidateSet, noise: Noise, allowance: FormErrorAllowance,
+        threshold: DetectionThreshold, reference: float,
+    ) -> Fitted:  # fmt: skip
+        """A ``first`` shortlist, and that at the nominal vehicle, where no nuisance parameter has absorbed a cause.
+
+        Where neither explains enough, changes since reference logs are fitted with the car held (`change_fits`).
+        """
         self._progress("Jacobian at the nominal vehicle")
         fitter = self._nominal_fitter.with_simulator(self._fitter.simulator)
         nominal = fitter.at(fitter.origin, (), noise)
@@ -252,9 +257,11 @@ class ForwardStep:
         tests = candidates.scores(fitter, blocks, nominal, noise)
         tests = candidates.shortlist(fitter, tests, blocks, nominal, False)
         fits = CandidateFits(fitter, candidates.jacobian, nominal, noise, self._settings.relinearise)
-        fitted = fit_shortlist(fits, tests, allowance.of, threshold, False, self._progress)
+        both = merge_best(first, fit_shortlist(fits, tests, allowance.of, threshold, False, self._progress))
+        if any(corrected(one, reference - one.cost) >= threshold.gain for one in both[1]):
+            return both
         _, guess = fitter.start(noise.enabled)
-        return merge_best(fitted, fit_changes(self._nuisance_fit, fitter, tests, guess, self._progress))
+        return merge_best(both, fit_changes(self._nuisance_fit, fitter, tests, guess, self._progress))
 
     def _fit_beyond_bounds(self, model: Model, noise: Noise) -> Fitted:
         """Quantities whose nuisance parameters are at their bounds, each as a cause fitted from the nominal vehicle.

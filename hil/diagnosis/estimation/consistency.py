@@ -45,12 +45,16 @@ class Consistency:
 
 
 def consistencies(fitter: Fitter, model: Model, noise: Noise) -> list[Consistency]:
-    """Of each term of a fitted model."""
+    """Of each term of a fitted model.
+
+    A nuisance parameter may be the same quantity as a term: what is left of the term without it is the small difference
+    of two large columns.
+    """
     if not model.terms:
         return []
     own, count = fitter.term_jacobian(model), len(fitter.nuisances)
     columns = {name: np.hstack([values, own[name]]) for name, values in fitter.nuisance_jacobian_at(model).items()}
-    blocks = information_blocks(model.residual, columns, fitter.masks, noise, count)
+    blocks = information_blocks(model.residual, columns, fitter.masks, noise, count, precise=True)
     normal = blocks.total()[1:, 1:]
     normal[range(count), range(count)] += 1.0
     held = fitter.at_bounds(model.z)

@@ -115,11 +115,13 @@ def _unchanged(stack: Stack, base: Stack) -> bool:
 
 
 def information_blocks(
-    residual: dict[str, Floats], columns: Tracks | Sequence[Tracks], frame: SampleMasks, noise: Noise, nuisances: int
-) -> InformationBlocks:
+    residual: dict[str, Floats], columns: Tracks | Sequence[Tracks], frame: SampleMasks, noise: Noise, nuisances: int,
+    precise: bool = False,
+) -> InformationBlocks:  # fmt: skip
     """Whiten residual (samples, 1) and columns (samples, columns) by track, and sum their products by segment.
 
-    Several Jacobians stand side by side. Only tracks with a common noise are whitened together, for the memory.
+    Several Jacobians stand side by side. Only tracks with a common noise are whitened together, for the memory. With
+    ``precise`` products are made in double precision: for combinations of columns that nearly cancel.
     """
     parts = (columns,) if isinstance(columns, Mapping) else columns
     white_residual, likelihood = whiten(residual, frame, noise)
@@ -146,6 +148,7 @@ def information_blocks(
             ordered = values if order is None else values[order]
             for k in range(segment_count):
                 block = ordered[bounds[k] : bounds[k + 1]]
+                block = block.astype(np.float64) if precise else block
                 matrix[k] += block.T @ block
     samples = int(sum(float(known.sum()) for known in frame.present.values()))
     return InformationBlocks(matrix, nuisances, samples, likelihood)

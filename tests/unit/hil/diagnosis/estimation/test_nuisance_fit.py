@@ -9,7 +9,7 @@ from pulses import log_of_pulses
 from hil.diagnosis.data.log import UnusableError
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.estimation.gauss_newton import Fitter
-from hil.diagnosis.estimation.information import acting_among
+from hil.diagnosis.estimation.information import acting_among, information_blocks
 from hil.diagnosis.estimation.model import Term
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.estimation.terms import candidates, columns
@@ -49,6 +49,23 @@ def test_numbers_with_which_the_car_diverges_are_refused(paper_fitter):
     diverging = Fitter(paper_fitter.simulator, paper_fitter.masks, base, paper_fitter.nuisances, {})
     with pytest.raises(UnusableError, match="the simulated car diverges"):
         diverging.start()
+
+
+def test_what_two_columns_differ_by_is_kept_in_precise_products(paper_fitter):
+    """A term and a nuisance that are the same quantity: single precision leaves rounding, which may be negative."""
+    model, noise = paper_fitter.start()
+    rng, wide = np.random.default_rng(4), {name: (1e5 * one).astype(np.float32) for name, one in model.residual.items()}
+    other = {name: (one + rng.standard_normal(one.shape)).astype(np.float32) for name, one in wide.items()}
+    difference = {name: one - other[name] for name, one in wide.items()}
+
+    def products(columns, precise):
+        blocks = information_blocks(model.residual, columns, paper_fitter.masks, noise, 0, precise)
+        return blocks.total()[1:, 1:]
+
+    both, weights = {name: np.hstack([one, other[name]]) for name, one in wide.items()}, np.array([1.0, -1.0])
+    expected = float(products(difference, True)[0, 0])
+    assert weights @ products(both, True) @ weights == pytest.approx(expected, rel=0.02)
+    assert weights @ products(both, False) @ weights != pytest.approx(expected, rel=0.02)
 
 
 def test_numbers_that_are_held_stay_where_they_are(paper_fitter):
