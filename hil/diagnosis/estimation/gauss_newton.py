@@ -98,6 +98,7 @@ class Fitter:
         self.simulator, self.masks, self.base = simulator, masks, base
         self.nuisances, self.nuisance_jacobian = tuple(nuisances), nuisance_columns
         self.silent = silent_columns(nuisance_columns)
+        self.updated = False  # by steps made, since it was taken
         self.origin = np.zeros(len(self.nuisances)) if origin is None else origin
         self.bound = np.array([nuisance.bound for nuisance in self.nuisances])
         self.upper = np.array([nuisance.upper for nuisance in self.nuisances])
@@ -115,7 +116,9 @@ class Fitter:
     def copy(self) -> "Fitter":
         """A fitter whose Jacobian may be updated independently of this one."""
         columns = {name: values.copy() for name, values in self.nuisance_jacobian.items()}
-        return Fitter(self.simulator, self.masks, self.base, self.nuisances, columns, self.origin)
+        other = Fitter(self.simulator, self.masks, self.base, self.nuisances, columns, self.origin)
+        other.updated = self.updated
+        return other
 
     def holding(self, held: NDArray[np.bool_]) -> "Fitter":
         """A copy in which the nuisances that are ``held`` stay at the origin."""
@@ -251,8 +254,6 @@ class Fitter:
             if best.terms and (own is None or (relinearise and _far(linearised, best))):
                 own, linearised = self.term_jacobian(best), best
             moved = self._step(best, own or {}, noise)
-            if moved is None:
-                break
             gained = best.cost - moved.cost
             if follow:
                 self._broyden_update(best, moved, own or {}, noise)
@@ -277,16 +278,16 @@ class Fitter:
             model = moved
         return model
 
-    def _step(self, model: Model, own: Tracks, noise: Noise) -> Model | None:
-        total = self._total(model, own, noise)
+    def _step(self, model: Model, own: Tracks, noise: Noise) -> Model:
+        total, foreseen = self._total(model, own, noise), 0.0
         for hold, damping, share in _ATTEMPTS:
             z, terms, covariance, decrease = self.moved(model, total, hold, damping, share)
             if decrease < _WORTH:
                 break
-            moved = self.at(z, terms, noise)
+            moved, foreseen = self.at(z, terms, noise), max(foreseen, decrease)
             if moved.cost < model.cost:
                 return replace(moved, covariance=covariance)
-        return replace(model, covariance=covariance) if model.terms and not model.covariance.size else None
+        return replace(model, covariance=model.covariance if model.covariance.size else covariance, unrealised=foreseen)
 
     def moved(
         self, model: Model, total: Floats, hold: bool = False, damping: float = 0.0, share: float = 1.0
@@ -315,14 +316,16 @@ class Fitter:
     def _broyden_update(self, before: Model, after: Model, own: Tracks, noise: Noise) -> None:
         """Update the Jacobian so that it predicts the step just made (Broyden 1965, Math. Comp. 19, eq. 4.5).
 
-        Nuisances are scaled by their information: one without effect gets no signature.
+        Among all updates that do, it changes least what the Jacobian predicts over the posterior of the nuisances: they
+        are scaled by its precision. One without effect gets no signature.
         """
         change = after.z - before.z
-        scaled = np.diag(self.nuisance_information(noise)) * change
+        scaled = self.nuisance_information(noise) @ change + change
+        scaled[self.silent] = 0.0
         squared = float(scaled @ change)
         if float(change @ change) < _FOLLOWED**2 or squared <= 0.0:
             return
-        share = (scaled / squared).astype(np.float32)
+        self.updated, share = True, (scaled / squared).astype(np.float32)
         stepped = [new - old for new, old in zip(after.values(), before.values(), strict=True)]
         unpredicted = {}
         for name, columns in self.nuisance_jacobian.items():

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from plant import model
-from plant.injection.theta import BUILT_IN, THETA
 from plant.injection.bank import NO_TERMS, Shape, Variable, term
 from plant.injection.plugin import NO_PLUGINS
+from plant.injection.theta import BUILT_IN, THETA
 from plant.integrate import EXPONENTIAL, RUNGE_KUTTA_4, SEMI_IMPLICIT
 from plant.model import healthy, initial_state, pack
 from plant.road import DRY, road_table
