@@ -335,11 +335,8 @@ class Fitter:
             unpredicted[name] = (moved - columns @ change.astype(np.float32))[:, None]
             _add_outer(columns, unpredicted[name][:, 0], share)
         white, added = self._whitened, whitened(unpredicted, self.masks, noise)[:, 0]
-        cross = np.zeros(len(share))
-        cross[white.acting] = white.columns.T @ added
-        once = np.outer(cross, share)
-        white.products = white.products + once + once.T + float(added @ added) * np.outer(share, share)
         _add_outer(white.columns, added, share[white.acting])
+        white.products = _products(white.columns, white.acting, len(share))
 
     def at_bounds(self, z: Floats) -> list[int]:
         """Nuisances at their bounds, which explain nothing more."""
@@ -387,9 +384,8 @@ class Fitter:
         count = len(self.nuisances)
         acting = [k for k in range(count) if k not in self.silent]
         chosen = acting if self.silent else None
-        white, products = whitened(self.nuisance_jacobian, self.masks, noise, chosen), np.zeros((count, count))
-        products[np.ix_(acting, acting)] = white.T @ white
-        return _Whitened(noise, acting, white, products)
+        white = whitened(self.nuisance_jacobian, self.masks, noise, chosen)
+        return _Whitened(noise, acting, white, _products(white, acting, count))
 
     def _total(self, model: Model, own: Tracks, noise: Noise) -> Floats:
         """Products of the whitened [residual, nuisances, term Jacobian]."""
@@ -447,6 +443,13 @@ class Fitter:
             parts.append(self.term_jacobian(model))
         parts.append(columns)
         return information_blocks(model.residual, parts, self.masks, noise, len(self.nuisances))
+
+
+def _products(white: Floats, acting: Sequence[int], count: int) -> Floats:
+    """Products, (count, count), of the columns that are acting, (samples, acting)."""
+    products = np.zeros((count, count))
+    products[np.ix_(acting, acting)] = white.T @ white
+    return products
 
 
 @compiled
