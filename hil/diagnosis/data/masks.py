@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.diagnosis.data.dataset import ROW_S, Segment
+from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Segment
 from hil.diagnosis.data.log import Floats, Log
-from plant.rolling import ROLLING_MPS
 
 Mask = NDArray[np.bool_]
 SETTLE_S, _RINGS_S = 1.0, 2.0
@@ -16,10 +15,6 @@ brakes and springs: the exact time of the stop would outweigh all that was befor
 (docs/decisions/replay-and-comparison.md)."""
 _BEFORE_S = 0.2
 """Time before the car is slow that is not compared: the simulated one may be slow a little earlier."""
-_CREEPS_MPS = ROLLING_MPS + 0.5
-"""Speed below which motion is not compared. Where the simulated car no longer rolls, its steps become shorter and its
-wheels swing by a thousandth; when that is, changes from one simulation to the next by whole steps, which no Jacobian
-tells."""
 _AT_REST_MPS = 0.02
 _DEMAND_PA = 2e4
 _LOCKED_SLIP, _SLIDES_SLIP, _ROLLS_SLIP = 0.5, 0.2, 0.1
@@ -35,9 +30,7 @@ of 7 km radius at 72 km/h."""
 def moving_and_resting(speed_mps: Floats, sample_s: float) -> tuple[Mask, Mask]:
     """(samples,) where the wheel and body motion, and where the body at rest is compared, by the speed (samples,)."""
     before, after = (max(int(time_s / sample_s), 1) for time_s in (_BEFORE_S, SETTLE_S))
-    near_stop = (
-        np.convolve(speed_mps < _CREEPS_MPS, np.ones(before + 1 + after))[before : before + len(speed_mps)] > 0.5
-    )
+    near_stop = np.convolve(speed_mps < SLOW_MPS, np.ones(before + 1 + after))[before : before + len(speed_mps)] > 0.5
     rings = max(int(_RINGS_S / sample_s), 1)
     moved = np.convolve(speed_mps > _AT_REST_MPS, np.ones(2 * rings + 1))  # "same" is as long as the longer of both
     resting = moved[rings : rings + len(speed_mps)] < 0.5

@@ -316,12 +316,10 @@ class Fitter:
     def _broyden_update(self, before: Model, after: Model, own: Tracks, noise: Noise) -> None:
         """Update the Jacobian so that it predicts the step just made (Broyden 1965, Math. Comp. 19, eq. 4.5).
 
-        Among all updates that do, it changes least what the Jacobian predicts over the posterior of the nuisances: they
-        are scaled by its precision. One without effect gets no signature.
+        Nuisances are scaled by their information: one without effect gets no signature.
         """
         change = after.z - before.z
-        scaled = self.nuisance_information(noise) @ change + change
-        scaled[self.silent] = 0.0
+        scaled = np.diag(self.nuisance_information(noise)) * change
         squared = float(scaled @ change)
         if float(change @ change) < _FOLLOWED**2 or squared <= 0.0:
             return

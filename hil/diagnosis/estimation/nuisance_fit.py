@@ -5,7 +5,6 @@ Takes a simulator of the nominal vehicle; gives fitters with the Jacobian at a p
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -104,15 +103,12 @@ class NuisanceFit:
         What is not explained yet counts as noise, so steps are forgiving. The first turn keeps the noise given: an
         estimate there would take for noise what the nuisances explain.
         """
-        cost, around, times, refused = np.inf, model.z, 0, False
+        cost, around, times = np.inf, model.z, 0
         for turn in range(_TURNS):
             if turn:
                 noise = self.fitter.estimate_noise(model, noise)
-            if refused:  # no step lowers the cost: the rest is noise
-                model = replace(model, cost=self.fitter.cost(model.residual, model.z, noise))
-            else:
-                model = self.fitter.fit(model, noise, 4, follow=True)
-            settled, cost, refused = cost - model.cost < _SETTLED, model.cost, model.unrealised > 0.0
+            model = self.fitter.fit(model, noise, 4, follow=True)
+            settled, cost = cost - model.cost < _SETTLED, model.cost
             stale = float(np.abs(model.z - around).max()) > (_STALE * (1 + 2 * times) if settled else _FAR)
             stale |= model.unrealised >= _SETTLED and self.fitter.updated
             most = (
@@ -127,7 +123,7 @@ class NuisanceFit:
                     self._taken.pop()  # on the way of this fit: no other will ask for it
                 self.relinearise(model.z, model.terms)
                 model = self.fitter.at(model.z, model.terms, noise)
-                around, times, cost, refused = model.z, times + 1, np.inf, False
+                around, times, cost = model.z, times + 1, np.inf
             elif settled:
                 break
         return model, noise

@@ -63,11 +63,3 @@ def test_masks_are_as_long_as_the_log(samples: int) -> None:
     assert len(moving) == len(resting) == samples
     expected = np.arange(samples) >= max(samples // 10 + 100, 2 * 50)
     assert (resting == expected).all()
-
-
-def test_a_car_that_creeps_is_not_compared():
-    """Below 3 m/s the simulation makes shorter steps, from a moment on that any number shifts by a whole step."""
-    speed = np.concatenate((np.linspace(20.0, 0.0, 500), np.zeros(300), np.linspace(0.0, 20.0, 500)))
-    moving, _ = moving_and_resting(speed, 0.02)
-    assert speed[moving].min() > 3.5
-    assert moving[speed > 5.0][:300].all()
