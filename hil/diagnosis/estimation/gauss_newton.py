@@ -98,6 +98,7 @@ class Fitter:
         self.simulator, self.masks, self.base = simulator, masks, base
         self.nuisances, self.nuisance_jacobian = tuple(nuisances), nuisance_columns
         self.silent = silent_columns(nuisance_columns)
+        self.updated = False  # by steps made, since it was taken
         self.origin = np.zeros(len(self.nuisances)) if origin is None else origin
         self.bound = np.array([nuisance.bound for nuisance in self.nuisances])
         self.upper = np.array([nuisance.upper for nuisance in self.nuisances])
@@ -115,7 +116,9 @@ class Fitter:
     def copy(self) -> "Fitter":
         """A fitter whose Jacobian may be updated independently of this one."""
         columns = {name: values.copy() for name, values in self.nuisance_jacobian.items()}
-        return Fitter(self.simulator, self.masks, self.base, self.nuisances, columns, self.origin)
+        other = Fitter(self.simulator, self.masks, self.base, self.nuisances, columns, self.origin)
+        other.updated = self.updated
+        return other
 
     def holding(self, held: NDArray[np.bool_]) -> "Fitter":
         """A copy in which the nuisances that are ``held`` stay at the origin."""
@@ -251,8 +254,6 @@ class Fitter:
             if best.terms and (own is None or (relinearise and _far(linearised, best))):
                 own, linearised = self.term_jacobian(best), best
             moved = self._step(best, own or {}, noise)
-            if moved is None:
-                break
             gained = best.cost - moved.cost
             if follow:
                 self._broyden_update(best, moved, own or {}, noise)
@@ -277,16 +278,16 @@ class Fitter:
             model = moved
         return model
 
-    def _step(self, model: Model, own: Tracks, noise: Noise) -> Model | None:
-        total = self._total(model, own, noise)
+    def _step(self, model: Model, own: Tracks, noise: Noise) -> Model:
+        total, foreseen = self._total(model, own, noise), 0.0
         for hold, damping, share in _ATTEMPTS:
             z, terms, covariance, decrease = self.moved(model, total, hold, damping, share)
             if decrease < _WORTH:
                 break
-            moved = self.at(z, terms, noise)
+            moved, foreseen = self.at(z, terms, noise), max(foreseen, decrease)
             if moved.cost < model.cost:
                 return replace(moved, covariance=covariance)
-        return replace(model, covariance=covariance) if model.terms and not model.covariance.size else None
+        return replace(model, covariance=model.covariance if model.covariance.size else covariance, unrealised=foreseen)
 
     def moved(
         self, model: Model, total: Floats, hold: bool = False, damping: float = 0.0, share: float = 1.0
@@ -322,7 +323,7 @@ class Fitter:
         squared = float(scaled @ change)
         if float(change @ change) < _FOLLOWED**2 or squared <= 0.0:
             return
-        share = (scaled / squared).astype(np.float32)
+        self.updated, share = True, (scaled / squared).astype(np.float32)
         stepped = [new - old for new, old in zip(after.values(), before.values(), strict=True)]
         unpredicted = {}
         for name, columns in self.nuisance_jacobian.items():
@@ -332,11 +333,8 @@ class Fitter:
             unpredicted[name] = (moved - columns @ change.astype(np.float32))[:, None]
             _add_outer(columns, unpredicted[name][:, 0], share)
         white, added = self._whitened, whitened(unpredicted, self.masks, noise)[:, 0]
-        cross = np.zeros(len(share))
-        cross[white.acting] = white.columns.T @ added
-        once = np.outer(cross, share)
-        white.products = white.products + once + once.T + float(added @ added) * np.outer(share, share)
         _add_outer(white.columns, added, share[white.acting])
+        white.products = _products(white.columns, white.acting, len(share))
 
     def at_bounds(self, z: Floats) -> list[int]:
         """Nuisances at their bounds, which explain nothing more."""
@@ -384,9 +382,8 @@ class Fitter:
         count = len(self.nuisances)
         acting = [k for k in range(count) if k not in self.silent]
         chosen = acting if self.silent else None
-        white, products = whitened(self.nuisance_jacobian, self.masks, noise, chosen), np.zeros((count, count))
-        products[np.ix_(acting, acting)] = white.T @ white
-        return _Whitened(noise, acting, white, products)
+        white = whitened(self.nuisance_jacobian, self.masks, noise, chosen)
+        return _Whitened(noise, acting, white, _products(white, acting, count))
 
     def _total(self, model: Model, own: Tracks, noise: Noise) -> Floats:
         """Products of the whitened [residual, nuisances, term Jacobian]."""
@@ -444,6 +441,13 @@ class Fitter:
             parts.append(self.term_jacobian(model))
         parts.append(columns)
         return information_blocks(model.residual, parts, self.masks, noise, len(self.nuisances))
+
+
+def _products(white: Floats, acting: Sequence[int], count: int) -> Floats:
+    """Products, (count, count), of the columns that are acting, (samples, acting)."""
+    products = np.zeros((count, count))
+    products[np.ix_(acting, acting)] = white.T @ white
+    return products
 
 
 @compiled

@@ -110,6 +110,7 @@ class NuisanceFit:
             model = self.fitter.fit(model, noise, 4, follow=True)
             settled, cost = cost - model.cost < _SETTLED, model.cost
             stale = float(np.abs(model.z - around).max()) > (_STALE * (1 + 2 * times) if settled else _FAR)
+            stale |= model.unrealised >= _SETTLED and self.fitter.updated
             most = (
                 _MOST_LINEARISATIONS
                 if self.fitter.birge_ratio(model.z) < BIASED_BIRGE_RATIO
