@@ -56,7 +56,7 @@ def fit_changes(
     for item, one in best:
         nuisance_fit.fitter, model, noise = origin.copy(), one.model, one.noise
         for _ in range(_PASSES):
-            nuisance_fit.relinearise(model.z, model.terms)
+            nuisance_fit.relinearise(model.z, model.terms, noise)
             model, noise = nuisance_fit.fit(nuisance_fit.fitter.at(model.z, model.terms, noise), noise)
         found.append((item, refitted(one, model, noise)))
     nuisance_fit.fitter = last
