@@ -329,7 +329,7 @@ class Fitter:
         for name, columns in self.nuisance_jacobian.items():
             moved = (before.residual[name][:, 0] - after.residual[name][:, 0]).astype(np.float32)
             if own:
-                moved -= own[name].astype(np.float32) @ np.array(stepped, np.float32)
+                moved -= np.einsum("tk,k->t", own[name], np.array(stepped)).astype(np.float32)
             unpredicted[name] = (moved - columns @ change.astype(np.float32))[:, None]
             _add_outer(columns, unpredicted[name][:, 0], share)
         white, added = self._whitened, whitened(unpredicted, self.masks, noise)[:, 0]
@@ -415,10 +415,10 @@ class Fitter:
             at = 1 + count + np.arange(len(known))
             total[at, at] += known
         z, terms, covariance, _ = self.moved(model, total)
-        moved = np.array([new.value - old.value for new, old in zip(terms, model.terms, strict=True)], np.float32)
+        moved = np.array([new.value - old.value for new, old in zip(terms, model.terms, strict=True)])
         change = np.asarray(z - model.z, np.float32)  # as precise as the sensitivities
         residual = {
-            name: values - (self.nuisance_jacobian[name] @ change + own[name].astype(np.float32) @ moved)[:, None]
+            name: values - (self.nuisance_jacobian[name] @ change + np.einsum("tk,k->t", own[name], moved))[:, None]
             for name, values in model.residual.items()
         }
         return Model(z, terms, residual, self.cost(residual, z, noise), covariance)
