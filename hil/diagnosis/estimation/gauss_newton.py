@@ -98,7 +98,7 @@ class Fitter:
         self.simulator, self.masks, self.base = simulator, masks, base
         self.nuisances, self.nuisance_jacobian = tuple(nuisances), nuisance_columns
         self.silent = silent_columns(nuisance_columns)
-        self.approximate = False  # updated by steps made since it was taken, or taken by coarse differences
+        self.updated = False  # the Jacobian, by steps made since it was taken
         self.origin = np.zeros(len(self.nuisances)) if origin is None else origin
         self.bound = np.array([nuisance.bound for nuisance in self.nuisances])
         self.upper = np.array([nuisance.upper for nuisance in self.nuisances])
@@ -117,7 +117,7 @@ class Fitter:
         """A fitter whose Jacobian may be updated independently of this one."""
         columns = {name: values.copy() for name, values in self.nuisance_jacobian.items()}
         other = Fitter(self.simulator, self.masks, self.base, self.nuisances, columns, self.origin)
-        other.approximate = self.approximate
+        other.updated = self.updated
         return other
 
     def holding(self, held: NDArray[np.bool_]) -> "Fitter":
@@ -323,7 +323,7 @@ class Fitter:
         squared = float(scaled @ change)
         if float(change @ change) < _FOLLOWED**2 or squared <= 0.0:
             return
-        self.approximate, share = True, (scaled / squared).astype(np.float32)
+        self.updated, share = True, (scaled / squared).astype(np.float32)
         stepped = [new - old for new, old in zip(after.values(), before.values(), strict=True)]
         unpredicted = {}
         for name, columns in self.nuisance_jacobian.items():
