@@ -243,13 +243,15 @@ class Fitter:
         self, model: Model, noise: Noise, steps: int = 2, relinearise: bool = True, own: Tracks | None = None,
         follow: bool = False,
     ) -> Model:  # fmt: skip
-        """The model of least cost after some steps, the same model where none lowers it.
+        """The model of least cost after some steps, the same model where none lowers it, or where its car diverges.
 
         ``own`` is the term Jacobian at this model, if it is known; with ``follow`` the Jacobian of the nuisances is
         updated by each step (Broyden).
         """
         best = replace(model, cost=self.cost(model.residual, model.z, noise))
         linearised = best
+        if not _finite(best.residual):
+            return best
         for _ in range(steps):
             if best.terms and (own is None or (relinearise and _far(linearised, best))):
                 own, linearised = self.term_jacobian(best), best
@@ -263,8 +265,8 @@ class Fitter:
         return best
 
     def refit_amplitudes(self, model: Model, noise: Noise, steps: int = 2) -> Model:
-        """The model with the value of its last term at least cost, all else fixed."""
-        for _ in range(steps):
+        """The model with the value of its last term at least cost, all else fixed; the same where its car diverges."""
+        for _ in range(steps if _finite(model.residual) else 0):
             own = self.term_jacobian(model)
             joined = {name: np.hstack([values, own[name][:, -1:]]) for name, values in model.residual.items()}
             residual, signature = whitened(joined, self.masks, noise).T

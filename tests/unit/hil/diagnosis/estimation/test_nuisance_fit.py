@@ -44,6 +44,16 @@ def test_a_car_that_diverges_fits_nothing(paper_fitter):
     assert paper_fitter.cost(diverging.residual, z, noise) > 1e12
 
 
+def test_from_a_car_that_diverges_no_step_is_made(paper_fitter):
+    """Its gradient is not finite; numbers that were not reached the simulation, whose latencies were none."""
+    z, noise = paper_fitter.origin, paper_fitter.start()[1]
+    diverging = paper_fitter.at(z, (Term(_INERTIA, -2.0),), noise)
+    for fitted in (paper_fitter.fit(diverging, noise), paper_fitter.refit_amplitudes(diverging, noise)):
+        assert np.array_equal(fitted.z, z)
+        assert fitted.values() == [-2.0]
+        assert fitted.cost > 1e12
+
+
 def test_numbers_with_which_the_car_diverges_are_refused(paper_fitter):
     base = _INERTIA.applied(paper_fitter.base, -2.0)
     diverging = Fitter(paper_fitter.simulator, paper_fitter.masks, base, paper_fitter.nuisances, {})
