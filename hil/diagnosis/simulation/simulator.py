@@ -80,8 +80,7 @@ class _Runs:
 
 def _true_inputs(inputs: Floats, recording: Recording, parameters: ParameterSet) -> Floats:
     """Measured inputs without what sensors and nodes of a parameter set add; demands when they are acted on."""
-    theta = parameters.theta_in(recording)
-    return without_latency(before_sensors(inputs, theta, ROW_S), parameters.latency_s, theta)
+    return without_latency(before_sensors(inputs, parameters.theta_in(recording), ROW_S), parameters.latency_s)
 
 
 @dataclass(frozen=True, eq=False)
