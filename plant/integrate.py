@@ -86,6 +86,7 @@ def exponential_step(
         half[i] = exp(-min(z, EXPONENT_LIMIT))
         mean[i] = 0.5 * step_s * phi_1(z, half[i])
         trial[i] = x[i] + mean[i] * y[Y.rate + i]
+    trial[X.time_s] = x[X.time_s] + 0.5 * step_s
     derivative(trial, u, cut, switch, p, road, stage)
     for i in range(last):
         total[i] = stage[Y.rate + i] + y[Y.decay_1_s + i] * (trial[i] - x[i])
@@ -95,6 +96,7 @@ def exponential_step(
         again = stage[Y.rate + i] + y[Y.decay_1_s + i] * (trial[i] - x[i])
         total[i] += again
         trial[i] = x[i] + half[i] * mean[i] * y[Y.rate + i] + mean[i] * (2.0 * again - y[Y.rate + i])
+    trial[X.time_s] = x[X.time_s] + step_s
     derivative(trial, u, cut, switch, p, road, stage)
     for i in range(last):
         end = stage[Y.rate + i] + y[Y.decay_1_s + i] * (trial[i] - x[i])
@@ -119,11 +121,13 @@ def runge_kutta_step(
     for i in range(last):
         total[i] = y[Y.rate + i]
         trial[i] = x[i] + 0.5 * step_s * y[Y.rate + i]
+    trial[X.time_s] = x[X.time_s] + 0.5 * step_s
     for half in (0.5, 1.0):
         derivative(trial, u, cut, switch, p, road, stage)
         for i in range(last):
             total[i] += 2.0 * stage[Y.rate + i]
             trial[i] = x[i] + half * step_s * stage[Y.rate + i]
+        trial[X.time_s] = x[X.time_s] + half * step_s
     derivative(trial, u, cut, switch, p, road, stage)
     for i in range(last):
         x[i] += step_s / 6.0 * (total[i] + stage[Y.rate + i])

@@ -110,6 +110,7 @@ def rolling_step(
     if extra:
         for i in range(wheels):
             _begin(_HUB, _HUB_TRAVEL, _HUB_RATE, i, step_s, x, y, trial, pairs)
+    trial[X.time_s] = x[X.time_s] + step_s
     derivative(trial, u, cut, switch, p, road, stage)
     for i in range(last):
         grown = stage[Y.rate + i] - y[Y.rate + i] + y[Y.decay_1_s + i] * (trial[i] - x[i])

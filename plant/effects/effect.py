@@ -108,7 +108,7 @@ class Effect:
     rates : ``(x, u, q, k, y)``, of its extra states.  Its numbers begin at ``k`` in ``q``; parameters are changed in
         ``q``, injection points in ``y``.
     sense : of a sensing effect, which acts on measured arrays and not in the model (`plant.injection.sensing_chain`).
-    undo : its inverse on arrays, where it has one.
+    undo : its inverse on arrays, where it has one.  late_s : of one that only delays: by how long, s.
     nodes : of `NODES`, or `GROUND`, whose signals a sensing effect changes.
     """
 
@@ -134,6 +134,7 @@ class Effect:
     rates: Callable[..., None] | None = None
     sense: Callable[..., Any] | None = None
     undo: Callable[..., Any] | None = None
+    late_s: Callable[..., Any] | None = None
     nodes: tuple[str, ...] = ()
 
     @property

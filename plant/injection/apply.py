@@ -162,6 +162,8 @@ def _load(p: Vector, theta: Vector, terms: Vector, plugins: Vector, q: Vector, y
         q[_AT.injection_points + k] = _NEUTRAL[k]
         y[FIRST + k] = _NEUTRAL[k]
         stage[FIRST + k] = _NEUTRAL[k]
+    for i in range(4):  # what a term may ask for before the first evaluation
+        stage[Y.wheel_load_n + i] = y[Y.wheel_load_n + i]
     anything = False
     for k in range(_NUMBERS):
         if (theta[k] != 0.0) & (_OWNER[k] >= 0):

@@ -29,15 +29,18 @@ class Chain:
     ----------
     theta : numbers of all effects.
     layout : where they lie.
+    in_time : nothing is delayed; `late_s` says by how long it would be.
     """
 
-    def __init__(self, theta: Vector, layout: Theta = THETA) -> None:
+    def __init__(self, theta: Vector, layout: Theta = THETA, in_time: bool = False) -> None:
         self._theta = theta
         self._layout = layout
         self._memory: dict[tuple[str, str], Memory] = {}
         strengths, begins = _strengths(layout)
         on = np.logical_or.reduceat(theta[strengths] != 0.0, begins)
-        self._active = [effect for effect, is_on in zip(SENSING, on, strict=True) if is_on]
+        every = [effect for effect, is_on in zip(SENSING, on, strict=True) if is_on]
+        self._late = [effect for effect in every if effect.late_s is not None]
+        self._active = [effect for effect in every if not (in_time and effect.late_s)]
         self._nodes = {node for effect in self._active for node in effect.nodes}
 
     def _numbers(self, effect: Effect, time_s: Vector) -> Numbers:
@@ -56,6 +59,14 @@ class Chain:
     def touches(self, node: str) -> bool:
         """Whether any effect changes a node's signals."""
         return node in self._nodes
+
+    def late_s(self, node: str, time_s: Vector) -> Vector:
+        """How late a node's samples are, (samples,), s."""
+        late = np.zeros(len(time_s))
+        for effect in self._late:
+            if node in effect.nodes and effect.late_s is not None:
+                late += effect.late_s(node, time_s, self._numbers(effect, time_s))
+        return late
 
     def sense(self, node: str, time_s: Vector, values: Vector) -> Vector:
         """What a node reports of true ``values``, shape (samples, signals), at ``time_s`` of the model."""

@@ -110,23 +110,24 @@ def cubic(values: Floats, k: int, place: float) -> float:
 
 
 @compiled
-def shifted(values: Floats, late: float, out: Floats) -> None:
-    """Columns of ``values`` (samples, columns) delayed by ``late`` samples, into ``out`` of the same shape, by `cubic`.
+def shifted(values: Floats, late: Floats, out: Floats) -> None:
+    """Columns of ``values`` (samples, columns), each sample ``late`` (samples,) of them later, into ``out`` of the same
+    shape, by `cubic`.
 
     A wheel that oscillates on its tyre has four samples of 10 ms per period: linear interpolation loses up to a third
     of its amplitude.
     """
     for t in range(out.shape[0]):
         for k in range(values.shape[1]):
-            out[t, k] = cubic(values, k, t - late)
+            out[t, k] = cubic(values, k, t - late[t])
 
 
 @compiled
-def shifted_linear(values: Floats, every: int, late: float, out: Floats) -> None:
+def shifted_linear(values: Floats, every: int, late: Floats, out: Floats) -> None:
     """As `shifted`, by linear interpolation, at every ``every``-th sample."""
     last = values.shape[0] - 1
     for t in range(out.shape[0]):
-        place = min(max(every * t - late, 0.0), float(last))
+        place = min(max(every * t - late[t], 0.0), float(last))
         i = int(place)
         following = min(i + 1, last)
         for k in range(values.shape[1]):

@@ -235,11 +235,11 @@ class ForwardStep:
         fits = CandidateFits(self._fitter, candidates.jacobian, model, noise, self._settings.relinearise)
         fitted = fit_shortlist(fits, tests, allowance.of, threshold, self._biased, self._progress)
         if self._biased:
-            fitted = self._fit_shortlist_at_nominal(fitted, candidates, noise, allowance, threshold, fits.reference)
+            fitted = self._add_fits_at_nominal(fitted, candidates, noise, allowance, threshold, fits.reference)
             fitted = merge_best(fitted, self._fit_beyond_bounds(model, noise))
         return fits, *fitted, threshold
 
-    def _fit_shortlist_at_nominal(
+    def _add_fits_at_nominal(
         self, first: Fitted, candidates: CandidateSet, noise: Noise, allowance: FormErrorAllowance,
         threshold: DetectionThreshold, reference: float,
     ) -> Fitted:  # fmt: skip
@@ -258,7 +258,8 @@ class ForwardStep:
         tests = candidates.shortlist(fitter, tests, blocks, nominal, False)
         fits = CandidateFits(fitter, candidates.jacobian, nominal, noise, self._settings.relinearise)
         both = merge_best(first, fit_shortlist(fits, tests, allowance.of, threshold, False, self._progress))
-        if any(corrected(one, reference - one.cost) >= threshold.gain for one in both[1]):
+        enough = any(corrected(one, reference - one.cost) >= threshold.gain for one in both[1])
+        if enough or not self._settings.relinearise:
             return both
         _, guess = fitter.start(noise.enabled)
         return merge_best(both, fit_changes(self._nuisance_fit, fitter, tests, guess, self._progress))

@@ -20,7 +20,7 @@ from hil.diagnosis.simulation.simulator import Simulator
 from plant.effects.effect import Scope
 
 _BY_WHEEL, _AXLES = ("friction.mu",), ("front", "rear")
-_STEP_SHARE = 0.1
+STEP_SHARE = 0.1
 """Finite difference of a coefficient, in typical sizes."""
 
 
@@ -57,7 +57,7 @@ class GroupScoreTest:
     def _linearised(self, simulator: Simulator, parts: Sequence[BasisExpansion]) -> dict[tuple[str, str], Tracks]:
         """Jacobian of the coefficients of each term and location."""
         functions = [function for part in parts for function in part.functions]
-        steps = [_STEP_SHARE * function.term.typical for function in functions]
+        steps = [STEP_SHARE * function.term.typical for function in functions]
         stepped = [function.applied(self._base, step) for function, step in zip(functions, steps, strict=True)]
         whole = finite_difference_jacobian(simulator, self._masks, simulator.run(self._base), stepped, steps)
         return {

@@ -14,7 +14,7 @@ import numpy as np
 from hil.diagnosis.data.dataset import Dataset
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.candidates import CandidateSet
-from hil.diagnosis.detection.group_score_test import GroupScoreTest
+from hil.diagnosis.detection.group_score_test import STEP_SHARE, GroupScoreTest
 from hil.diagnosis.detection.nonparametric import BasisExpansion
 from hil.diagnosis.detection.result import Progress, Settings
 from hil.diagnosis.detection.score_test import ScoreTest, score, shortlist
@@ -72,8 +72,9 @@ def common_part(candidate: Candidate) -> Nuisance:
     at, sd = tuple(start + member for member in candidate.members()), candidate.prior_sd
     low, high = candidate.parameter.low / sd, candidate.parameter.high / sd
     return Nuisance(
-        candidate.name, at, (sd,) * len(at), NuisanceKind.LEARNED, max(-low, high), upper_bound=high, lower_bound=low
-    )
+        candidate.name, at, (sd,) * len(at), NuisanceKind.LEARNED, max(-low, high), high, low,
+        difference=abs(candidate.parameter.step) / sd,
+    )  # fmt: skip
 
 
 def _common_parts(
@@ -89,7 +90,8 @@ def _common_parts(
         none, unit, typical = function.row(0.0), function.row(1.0), function.term.typical
         at = tuple((rows.size + np.flatnonzero(unit != none)).tolist())
         bound = function.parameter.high / typical
-        added.append(Nuisance(function.name, at, (typical,) * len(at), NuisanceKind.LEARNED_CURVE, bound))
+        kind = NuisanceKind.LEARNED_CURVE
+        added.append(Nuisance(function.name, at, (typical,) * len(at), kind, bound, difference=STEP_SHARE))
         rows = np.vstack([rows, none])
     return replace(base, nonparametric_rows=rows), added
 
@@ -133,9 +135,9 @@ def fit_reference(
 
 
 def _shown(fitter: Fitter, model: Model, noise: Noise, candidates: CandidateSet) -> list[Candidate]:
-    """Candidates that explain the residual one after the other, all before marginalised."""
-    candidates = candidates.at(fitter, model)
-    listed = [one for one in candidates.candidates if not one.effect.free_phase]
+    """Candidates without a common part that explain the residual one after the other, all before marginalised."""
+    candidates, known = candidates.at(fitter, model), {one.name for one in fitter.nuisances}
+    listed = [one for one in candidates.candidates if not one.effect.free_phase and one.name not in known]
     blocks = fitter.information_blocks(model, candidates.jacobian, noise)
     marginal = marginalise(blocks.total(), blocks.nuisances, (), model.z, fitter.at_bounds(model.z))
     q = summed(marginal.q, listed)

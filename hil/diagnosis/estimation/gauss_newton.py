@@ -98,6 +98,7 @@ class Fitter:
         self.simulator, self.masks, self.base = simulator, masks, base
         self.nuisances, self.nuisance_jacobian = tuple(nuisances), nuisance_columns
         self.silent = silent_columns(nuisance_columns)
+        self.updated = False  # the Jacobian, by steps made since it was taken
         self.origin = np.zeros(len(self.nuisances)) if origin is None else origin
         self.bound = np.array([nuisance.bound for nuisance in self.nuisances])
         self.upper = np.array([nuisance.upper for nuisance in self.nuisances])
@@ -115,7 +116,9 @@ class Fitter:
     def copy(self) -> "Fitter":
         """A fitter whose Jacobian may be updated independently of this one."""
         columns = {name: values.copy() for name, values in self.nuisance_jacobian.items()}
-        return Fitter(self.simulator, self.masks, self.base, self.nuisances, columns, self.origin)
+        other = Fitter(self.simulator, self.masks, self.base, self.nuisances, columns, self.origin)
+        other.updated = self.updated
+        return other
 
     def holding(self, held: NDArray[np.bool_]) -> "Fitter":
         """A copy in which the nuisances that are ``held`` stay at the origin."""
@@ -240,19 +243,19 @@ class Fitter:
         self, model: Model, noise: Noise, steps: int = 2, relinearise: bool = True, own: Tracks | None = None,
         follow: bool = False,
     ) -> Model:  # fmt: skip
-        """The model of least cost after some steps, the same model where none lowers it.
+        """The model of least cost after some steps, the same model where none lowers it, or where its car diverges.
 
         ``own`` is the term Jacobian at this model, if it is known; with ``follow`` the Jacobian of the nuisances is
         updated by each step (Broyden).
         """
         best = replace(model, cost=self.cost(model.residual, model.z, noise))
         linearised = best
+        if not _finite(best.residual):
+            return best
         for _ in range(steps):
             if best.terms and (own is None or (relinearise and _far(linearised, best))):
                 own, linearised = self.term_jacobian(best), best
             moved = self._step(best, own or {}, noise)
-            if moved is None:
-                break
             gained = best.cost - moved.cost
             if follow:
                 self._broyden_update(best, moved, own or {}, noise)
@@ -262,8 +265,8 @@ class Fitter:
         return best
 
     def refit_amplitudes(self, model: Model, noise: Noise, steps: int = 2) -> Model:
-        """The model with the value of its last term at least cost, all else fixed."""
-        for _ in range(steps):
+        """The model with the value of its last term at least cost, all else fixed; the same where its car diverges."""
+        for _ in range(steps if _finite(model.residual) else 0):
             own = self.term_jacobian(model)
             joined = {name: np.hstack([values, own[name][:, -1:]]) for name, values in model.residual.items()}
             residual, signature = whitened(joined, self.masks, noise).T
@@ -277,16 +280,16 @@ class Fitter:
             model = moved
         return model
 
-    def _step(self, model: Model, own: Tracks, noise: Noise) -> Model | None:
-        total = self._total(model, own, noise)
+    def _step(self, model: Model, own: Tracks, noise: Noise) -> Model:
+        total, foreseen = self._total(model, own, noise), 0.0
         for hold, damping, share in _ATTEMPTS:
             z, terms, covariance, decrease = self.moved(model, total, hold, damping, share)
             if decrease < _WORTH:
                 break
-            moved = self.at(z, terms, noise)
+            moved, foreseen = self.at(z, terms, noise), max(foreseen, decrease)
             if moved.cost < model.cost:
                 return replace(moved, covariance=covariance)
-        return replace(model, covariance=covariance) if model.terms and not model.covariance.size else None
+        return replace(model, covariance=model.covariance if model.covariance.size else covariance, unrealised=foreseen)
 
     def moved(
         self, model: Model, total: Floats, hold: bool = False, damping: float = 0.0, share: float = 1.0
@@ -322,21 +325,18 @@ class Fitter:
         squared = float(scaled @ change)
         if float(change @ change) < _FOLLOWED**2 or squared <= 0.0:
             return
-        share = (scaled / squared).astype(np.float32)
+        self.updated, share = True, (scaled / squared).astype(np.float32)
         stepped = [new - old for new, old in zip(after.values(), before.values(), strict=True)]
         unpredicted = {}
         for name, columns in self.nuisance_jacobian.items():
             moved = (before.residual[name][:, 0] - after.residual[name][:, 0]).astype(np.float32)
             if own:
-                moved -= own[name].astype(np.float32) @ np.array(stepped, np.float32)
+                moved -= np.einsum("tk,k->t", own[name], np.array(stepped)).astype(np.float32)
             unpredicted[name] = (moved - columns @ change.astype(np.float32))[:, None]
             _add_outer(columns, unpredicted[name][:, 0], share)
         white, added = self._whitened, whitened(unpredicted, self.masks, noise)[:, 0]
-        cross = np.zeros(len(share))
-        cross[white.acting] = white.columns.T @ added
-        once = np.outer(cross, share)
-        white.products = white.products + once + once.T + float(added @ added) * np.outer(share, share)
         _add_outer(white.columns, added, share[white.acting])
+        white.products = _products(white.columns, white.acting, len(share))
 
     def at_bounds(self, z: Floats) -> list[int]:
         """Nuisances at their bounds, which explain nothing more."""
@@ -384,9 +384,8 @@ class Fitter:
         count = len(self.nuisances)
         acting = [k for k in range(count) if k not in self.silent]
         chosen = acting if self.silent else None
-        white, products = whitened(self.nuisance_jacobian, self.masks, noise, chosen), np.zeros((count, count))
-        products[np.ix_(acting, acting)] = white.T @ white
-        return _Whitened(noise, acting, white, products)
+        white = whitened(self.nuisance_jacobian, self.masks, noise, chosen)
+        return _Whitened(noise, acting, white, _products(white, acting, count))
 
     def _total(self, model: Model, own: Tracks, noise: Noise) -> Floats:
         """Products of the whitened [residual, nuisances, term Jacobian]."""
@@ -418,10 +417,10 @@ class Fitter:
             at = 1 + count + np.arange(len(known))
             total[at, at] += known
         z, terms, covariance, _ = self.moved(model, total)
-        moved = np.array([new.value - old.value for new, old in zip(terms, model.terms, strict=True)], np.float32)
+        moved = np.array([new.value - old.value for new, old in zip(terms, model.terms, strict=True)])
         change = np.asarray(z - model.z, np.float32)  # as precise as the sensitivities
         residual = {
-            name: values - (self.nuisance_jacobian[name] @ change + own[name].astype(np.float32) @ moved)[:, None]
+            name: values - (self.nuisance_jacobian[name] @ change + np.einsum("tk,k->t", own[name], moved))[:, None]
             for name, values in model.residual.items()
         }
         return Model(z, terms, residual, self.cost(residual, z, noise), covariance)
@@ -444,6 +443,13 @@ class Fitter:
             parts.append(self.term_jacobian(model))
         parts.append(columns)
         return information_blocks(model.residual, parts, self.masks, noise, len(self.nuisances))
+
+
+def _products(white: Floats, acting: Sequence[int], count: int) -> Floats:
+    """Products, (count, count), of the columns that are acting, (samples, acting)."""
+    products = np.zeros((count, count))
+    products[np.ix_(acting, acting)] = white.T @ white
+    return products
 
 
 @compiled

@@ -70,7 +70,8 @@ def finite_difference_jacobian(
     """Finite differences of simulated channels, by track (samples, parameter sets), each divided by its step.
 
     ``base`` are the channels at no step. With ``among``, places and a width, columns stand at these places of a wider
-    Jacobian that is 0 elsewhere. ``progress`` hears how many columns are done.
+    Jacobian that is 0 elsewhere. So is the column of a simulation that is not finite: it says nothing. ``progress``
+    hears how many columns are done.
     """
     radius = float(simulator.vehicle.parameters.wheel.rolling_radius_m)
     places, width = among or (range(len(parameter_sets)), len(parameter_sets))
@@ -79,6 +80,8 @@ def finite_difference_jacobian(
     if progress is not None:
         simulated = counted(progress, "Jacobian", simulated, len(parameter_sets))
     for k, stack, step in zip(places, simulated, steps, strict=True):
+        if not all(np.isfinite(values).all() for values in stack.values()):
+            continue
         change = {group: (values - base[group]) / step for group, values in stack.items()}
         for name, values in tracks_of(change, frame, radius).items():
             out[name][:, k] = np.clip(values[:, 0], -_DIVERGED, _DIVERGED)

@@ -30,6 +30,7 @@ class Model:
 
     ``residual`` tracks, (samples, 1), simulated ``channels`` and ``cost`` are at exactly this point; ``covariance``
     (terms, terms) is that of the values. ``driven_by`` are the inputs of the channels (`Simulator.driven_by`).
+    ``unrealised`` is the decrease of the cost that a linear step from here foresaw, where no share of it gave any.
     """
 
     z: Floats
@@ -39,6 +40,7 @@ class Model:
     covariance: Floats
     channels: Stack = field(default_factory=dict)
     driven_by: object = None
+    unrealised: float = 0.0
 
     def values(self) -> list[float]:
         """Values of the terms."""

@@ -20,8 +20,10 @@ from hil.diagnosis.vehicle.spec import Vehicle
 
 _KINKED = ("ehb_dead_time_s",)
 """Nuisances with a kink at each simulation step: a dead time is a whole number of these."""
-_COARSE, _FINE = 0.5, 3.0
-"""Steps of finite differences: in prior and, later, in posterior standard deviations."""
+_FINE, _LEAST, _MOST = 3.0, 0.06, 0.5
+"""Steps of finite differences where the data's information is known: in posterior standard deviations; the least as a
+share of the first step, the largest in prior standard deviations. Data may know a common part
+(`hil.diagnosis.detection.reference_fit`) a thousand times better than its prior."""
 _TURNS, _MOST_LINEARISATIONS, _SETTLED = 20, 4, 3.0
 """Turns of noise and nuisances at most, Jacobians at most, and the decrease of the cost at which a fit has settled."""
 _STALE, _FAR = 0.3, 1.0
@@ -47,16 +49,22 @@ class NuisanceFit:
         measured = all(recording.log.disc_temperature_k is not None for recording in recordings)
         usual = (*vehicle.nuisances, *recording_nuisances(measured, vehicle.latencies))
         self.nuisances = usual if nuisances is None else tuple(nuisances)
-        self._steps: Floats = np.full(len(self.nuisances), _COARSE)
+        self._first_steps: Floats = np.array([one.difference for one in self.nuisances])
+        self._steps = self._first_steps
         self.fitter = Fitter(simulator, masks, base, self.nuisances, {}, origin)
         self._taken: deque[tuple[Floats, tuple[Term, ...], Fitter]] = deque(maxlen=_REMEMBERED)
         self.relinearise(self.fitter.origin)
 
-    def relinearise(self, z: Floats, terms: Sequence[Term] = ()) -> None:
+    def relinearise(self, z: Floats, terms: Sequence[Term] = (), noise: Noise | None = None) -> None:
         """Take the Jacobian at ``z`` prior standard deviations, given these terms.
 
-        Inputs are denoised there, too (`Simulator.denoised`), and it is the baseline of the fits to come.
+        Steps of the finite differences are as fine as what the last Jacobian tells in this ``noise``. Inputs are
+        denoised there, too (`Simulator.denoised`), and it is the baseline of the fits to come.
         """
+        if noise is not None:
+            information = np.diag(self.fitter.nuisance_information(noise))
+            fine = _FINE / np.sqrt(np.maximum(information, 1e-9))
+            self._steps = np.clip(fine, _LEAST * self._first_steps, _MOST)
         at = self._parameter_set(z, terms)
         simulator = self.fitter.simulator.denoised(at).with_baseline(at)
         upper = np.array([nuisance.upper for nuisance in self.nuisances])
@@ -110,17 +118,16 @@ class NuisanceFit:
             model = self.fitter.fit(model, noise, 4, follow=True)
             settled, cost = cost - model.cost < _SETTLED, model.cost
             stale = float(np.abs(model.z - around).max()) > (_STALE * (1 + 2 * times) if settled else _FAR)
+            stale |= model.unrealised >= _SETTLED and self.fitter.updated
             most = (
                 _MOST_LINEARISATIONS
                 if self.fitter.birge_ratio(model.z) < BIASED_BIRGE_RATIO
                 else 2 * _MOST_LINEARISATIONS
             )
             if self._relinearise and stale and times < most:
-                information = np.diag(self.fitter.nuisance_information(noise))
-                self._steps = np.clip(_FINE / np.sqrt(np.maximum(information, 1e-9)), 0.03, _COARSE)
                 if times:
                     self._taken.pop()  # on the way of this fit: no other will ask for it
-                self.relinearise(model.z, model.terms)
+                self.relinearise(model.z, model.terms, noise)
                 model = self.fitter.at(model.z, model.terms, noise)
                 around, times, cost = model.z, times + 1, np.inf
             elif settled:

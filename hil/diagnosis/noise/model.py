@@ -21,8 +21,9 @@ REFERENCE_MPS = 20.0
 """Speed at which noise in proportion to speed is stated."""
 MODES = np.array([[0.25, 0.25, 0.25, 0.25], [0.25, 0.25, -0.25, -0.25], [0.5, -0.5, 0.0, 0.0], [0.0, 0.0, 0.5, -0.5]])
 MODE_NAMES = ("mean", "front-rear", "left-right front", "left-right rear")
-_SWING_S = 0.3
-"""After the start of a segment, how long yaw rate and lateral acceleration are not compared: the body swings in."""
+_AFTER_START_S = {"ay": 0.3, "yaw": 0.3, "gps": 0.5}
+"""After the start of a segment, how long tracks are not compared: the body swings in; a ground speed that a receiver
+computes in 0.1 to 0.2 s (`hil.diagnosis.vehicle.latency`) still is that of the segment before. Others: one sample."""
 LONGITUDINAL = ("wheel.mean", "ax", "gps")
 """Tracks along the road, in the order of the Kalman filter."""
 _WIDE = 8
@@ -98,11 +99,9 @@ class SampleMasks:
                     tracks.setdefault(name, []).append(known * drive.compared.get(name, 1.0))
         present = {name: np.concatenate(parts) for name, parts in tracks.items()}
         starts = np.concatenate(segment_start)  # a lag mixes the first sample with those before
-        swings = np.convolve(starts, np.ones(int(np.ceil(_SWING_S / case.sample_s))))[: len(starts)]
-        present = {
-            name: np.where((swings if name in ("ay", "yaw") else starts) > 0.5, 0.0, known)
-            for name, known in present.items()
-        }
+        for name, known in present.items():
+            samples = int(np.ceil(_AFTER_START_S.get(name, 0.0) / case.sample_s))
+            known[np.convolve(starts, np.ones(max(samples, 1)))[: len(starts)] > 0.5] = 0.0
         redundant = _redundant_channels(case)
         present = {
             name: known for name, known in present.items() if known.sum() > _LEAST_SAMPLES and name not in redundant

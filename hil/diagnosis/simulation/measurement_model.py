@@ -15,7 +15,7 @@ from hil.diagnosis.data.dataset import ROW_S, SLOW_MPS, Recording
 from hil.diagnosis.data.grid import averaged, cubic, shifted, shifted_linear, upsampled
 from hil.diagnosis.data.log import Floats
 from hil.diagnosis.simulation.parameter_set import ParameterSet
-from hil.diagnosis.simulation.sensors import after_sensors
+from hil.diagnosis.simulation.sensors import NODE, after_sensors
 from hil.diagnosis.vehicle.latency import LATENCY_NODES
 from plant.injection.sensing_chain import Chain
 from plant.parameters.plant import PlantParameters
@@ -86,22 +86,24 @@ class MeasurementModel:
 
     def measure_rows(self, true: Stack, recording: Recording, parameters: ParameterSet) -> Stack:
         """Channels row by row, as sensors and frames give the ``true`` ones."""
-        chain = Chain(parameters.theta_in(recording))
+        chain = Chain(parameters.theta_in(recording), in_time=True)
         others = {group: values for group, values in true.items() if group != "motor"}
         stack = after_sensors(others, chain, ROW_S) if others else {}
         for group, values in stack.items():
-            late = _latency_s(parameters.latency_s, group)
-            if late:
-                stack[group] = delayed(values, late / ROW_S, straight=group == "pressure")
-            elif group == "wheel":
+            late = _late_rows(parameters, chain, group, len(values))
+            if group == "wheel":
                 half_turned = np.pi / self.parameters.sensor.teeth / ROW_S
                 stack[group] = np.empty_like(values)
-                toothed(values, parameters.window_rows2, half_turned, parameters.tooth_share, stack[group])
+                toothed(values, parameters.window_rows2, half_turned, parameters.tooth_share, late, stack[group])
+            elif late.any():
+                stack[group] = delayed(values, late, straight=group == "pressure")
         if "motor" in true:
             fine = _finer(true["motor"], recording.inputs[:, INPUT.slice("motor_torque_bend_nm")])
             fine = after_sensors({"motor": fine}, chain, ROW_S / _FINER)["motor"]
             stack["motor"] = np.empty_like(true["motor"])
-            shifted_linear(fine, _FINER, _FINER * _latency_s(parameters.latency_s, "motor") / ROW_S, stack["motor"])
+            shifted_linear(
+                fine, _FINER, _FINER * _late_rows(parameters, chain, "motor", len(fine) // _FINER), stack["motor"]
+            )
         return stack
 
     def _at_measured_speed(self, channels: Stack, recording: Recording) -> None:
@@ -151,8 +153,10 @@ def _finer(torque_nm: Floats, bend_nm: Floats) -> Floats:
 
 
 @compiled
-def toothed(omega: Floats, window_rows2: float, half_pitch: float, share: float, out: Floats) -> None:
-    """Speeds (rows, wheels) as toothed wheels measure them, when a tooth has passed, into ``out``.
+def toothed(
+    omega: Floats, window_rows2: float, half_pitch: float, share: float, late: Floats, out: Floats
+) -> None:  # fmt: skip
+    """Speeds (rows, wheels) as toothed wheels measure them, when a tooth has passed, ``late`` rows later, into ``out``.
 
     ``half_pitch`` is half the angle between two teeth, rad rows/s: a speed comes later by a ``share`` of the time that
     takes, two rows at most. It is a mean over a window of squared width ``window_rows2``, by its second derivative.
@@ -164,20 +168,20 @@ def toothed(omega: Floats, window_rows2: float, half_pitch: float, share: float,
     for t in range(omega.shape[0]):
         for k in range(omega.shape[1]):
             rows = min(half_pitch / max(abs(omega[t, k]), _TURNS_RAD_S), _TOOTH_ROWS)
-            out[t, k] = cubic(mean, k, t - share * rows)
+            out[t, k] = cubic(mean, k, t - late[t] - share * rows)
 
 
-def delayed(values: Floats, rows: float, straight: bool = False) -> Floats:
-    """Channels some rows later.
+def delayed(values: Floats, late: Floats, straight: bool = False) -> Floats:
+    """Channels, (rows, columns), each row ``late`` (rows,) of them later.
 
     ``straight`` lines between rows for what has corners, as a motor at its rate limit; else parabolas
     (`hil.diagnosis.data.grid`).
     """
     out = np.empty(values.shape)
     if straight:
-        shifted_linear(values, 1, rows, out)
+        shifted_linear(values, 1, late, out)
     else:
-        shifted(values, rows, out)
+        shifted(values, late, out)
     return out
 
 
@@ -190,27 +194,36 @@ def held_later(values: Floats, rows: float) -> Floats:
     return np.asarray(now + share * (before - now))
 
 
-def _latency_s(latencies_s: tuple[float, ...], group: str) -> float:
-    return sum(latencies_s[LATENCY_NODES.index(node)] for node in _LATE.get(group, ()))
+def _late_rows(parameters: ParameterSet, chain: Chain, group: str, rows: int) -> Floats:
+    """How many rows a channel comes late, (rows,), by latency and stamps: one shift, as lines between rows would smooth
+    a jump twice."""
+    late = sum(parameters.latency_s[LATENCY_NODES.index(node)] for node in _LATE.get(group, ()))
+    time_s: Floats = np.arange(rows) * ROW_S
+    return np.asarray((late + chain.late_s(NODE[group], time_s)) / ROW_S)
 
 
-def without_latency(inputs: Floats, late_s: tuple[float, ...]) -> Floats:
+def without_latency(inputs: Floats, late_s: tuple[float, ...], theta: Floats) -> Floats:
     """Measured inputs, (rows, INPUT.size), with their nodes' latency (s) taken back; demands when they are acted on.
 
-    ``late_s`` are the latencies of `LATENCY_NODES`, s.
+    ``late_s`` are the latencies of `LATENCY_NODES`, s; stamps are late by ``theta``.
     """
-    rows = {node: late / ROW_S for node, late in zip(LATENCY_NODES, late_s, strict=True) if late}
+    chain = Chain(theta, in_time=True)
+    time_s: Floats = np.arange(len(inputs)) * ROW_S
+    rows = {node: late / ROW_S + np.zeros(len(inputs)) for node, late in zip(LATENCY_NODES, late_s, strict=True)}
+    for node in ("pressure", "motor"):
+        rows[node] += chain.late_s(node, time_s) / ROW_S
+    rows = {node: late for node, late in rows.items() if late.any()}
     if not rows:
         return inputs
     moved = inputs.copy()
-    if late := rows.get("steering"):
-        moved[:, _STEERING] = delayed(inputs[:, _STEERING], late)
+    if "steering" in rows:
+        moved[:, _STEERING] = delayed(inputs[:, _STEERING], rows["steering"])
     for part, node in _DEMANDS:
-        if late := rows.get(node):
-            moved[:, INPUT.slice(part)] = held_later(inputs[:, INPUT.slice(part)], late)
+        if node in rows:
+            moved[:, INPUT.slice(part)] = held_later(inputs[:, INPUT.slice(part)], rows[node][0])
     for part, node in _MEASURED:
-        if late := rows.get(node):
-            moved[:, INPUT.slice(part)] = delayed(inputs[:, INPUT.slice(part)], -late, straight=True)
+        if node in rows:
+            moved[:, INPUT.slice(part)] = delayed(inputs[:, INPUT.slice(part)], -rows[node], straight=True)
     return moved
 
 

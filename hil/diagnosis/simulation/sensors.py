@@ -1,6 +1,7 @@
 """Sensor and clock effects on arrays: applied to simulated channels, and taken back from measured inputs and speeds.
 
-Takes channels by group or inputs, (rows, columns), and theta; gives the same shapes.
+Takes channels by group or inputs, (rows, columns), and theta; gives the same shapes. Nothing is delayed here: the
+measurement model does that once, with the latency (`Chain.late_s`).
 """
 
 from collections.abc import Mapping
@@ -16,7 +17,8 @@ from plant.vectors import INPUT
 
 Stack = Mapping[str, Floats]
 _IMU = ("ax", "ay", "yaw")
-_NODE = {"wheel": "wheel", "pressure": "pressure", "motor": "motor", "gps": GROUND}
+NODE = {"wheel": "wheel", "pressure": "pressure", "motor": "motor", "gps": GROUND} | dict.fromkeys(_IMU, "imu")
+"""The node of each group of channels."""
 _INPUT = {"pressure": "pressure_pa", "motor": "motor_torque_nm"}
 OUTPUT_SENSORS = np.concatenate(
     [
@@ -41,7 +43,7 @@ _WHEEL_SCALE = THETA.slice("wrong_scale", "gain").start + NODES.index("wheel")
 
 def before_sensors(inputs: Floats, theta: Floats, row_s: float) -> Floats:
     """Inputs before the sensors, (rows, INPUT.size); what loses information (a filter, a step) is left as it is."""
-    chain = Chain(theta)
+    chain = Chain(theta, in_time=True)
     if not any(chain.touches(node) for node in _INPUT):
         return inputs
     time_s: Floats = np.arange(len(inputs)) * row_s
@@ -54,11 +56,11 @@ def before_sensors(inputs: Floats, theta: Floats, row_s: float) -> Floats:
 
 
 def after_sensors(stack: Stack, chain: Chain, row_s: float) -> dict[str, Floats]:
-    """Channels as the sensors give them."""
+    """Channels as the sensors give them; ``chain`` delays nothing."""
     sensed = dict(stack)
     time_s: Floats = np.arange(len(next(iter(stack.values())))) * row_s
-    for group, node in _NODE.items():
-        if group in sensed and chain.touches(node):
+    for group, node in NODE.items():
+        if group in sensed and node != "imu" and chain.touches(node):
             sensed[group] = chain.sense(node, time_s, sensed[group])
     if chain.touches("imu") and any(name in sensed for name in _IMU):
         rest = np.zeros((len(time_s), 1))

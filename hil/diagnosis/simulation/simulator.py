@@ -80,7 +80,8 @@ class _Runs:
 
 def _true_inputs(inputs: Floats, recording: Recording, parameters: ParameterSet) -> Floats:
     """Measured inputs without what sensors and nodes of a parameter set add; demands when they are acted on."""
-    return without_latency(before_sensors(inputs, parameters.theta_in(recording), ROW_S), parameters.latency_s)
+    theta = parameters.theta_in(recording)
+    return without_latency(before_sensors(inputs, theta, ROW_S), parameters.latency_s, theta)
 
 
 @dataclass(frozen=True, eq=False)

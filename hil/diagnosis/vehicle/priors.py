@@ -70,6 +70,7 @@ class Nuisance:
     at : indices in the vector that ``kind`` says.  step : (len(at),) prior standard deviations, in its units.
     bound : largest z; a parameter farther off is a cause to be named.
     upper_bound, lower_bound : largest and smallest z for which the equation has a meaning.
+    difference : z of a finite difference, where nothing is known yet of what the data tell.
     """
 
     name: str
@@ -79,6 +80,7 @@ class Nuisance:
     bound: float = 3.0
     upper_bound: float = np.inf
     lower_bound: float = -np.inf
+    difference: float = 0.5
 
     @property
     def lower(self) -> float:

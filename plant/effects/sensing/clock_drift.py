@@ -9,14 +9,19 @@ from plant.excitation import Excitation
 from plant.layout import Vector
 
 
+def late_s(node: str, time_s: Vector, number: Numbers) -> Vector:
+    """e t, (samples,)."""
+    return number["share"][:, NODES.index(node)] * np.maximum(time_s, 0.0)
+
+
 def sense(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
     """s'(t) = s(t - e t); e below 0 needs whole arrays, no live node knows what comes."""
-    return delayed(time_s, values, number["share"][:, NODES.index(node)] * np.maximum(time_s, 0.0), memory)
+    return delayed(time_s, values, late_s(node, time_s, number), memory)
 
 
 def undo(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
     """Inverse of `sense`."""
-    return advanced(time_s, values, number["share"][:, NODES.index(node)] * np.maximum(time_s, 0.0))
+    return advanced(time_s, values, late_s(node, time_s, number))
 
 
 EFFECT = Effect(
@@ -34,5 +39,6 @@ EFFECT = Effect(
     confounded_with=("timestamp_offset",),
     sense=sense,
     undo=undo,
+    late_s=late_s,
     nodes=("wheel", "imu", "pressure", "motor", "driver"),
 )

@@ -7,14 +7,19 @@ from plant.excitation import Excitation
 from plant.layout import Vector
 
 
+def late_s(node: str, time_s: Vector, number: Numbers) -> Vector:
+    """d, (samples,)."""
+    return number["delay_s"][:, NODES.index(node)]
+
+
 def sense(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
     """s'(t) = s(t - d); d below 0 needs whole arrays, no live node knows what comes."""
-    return delayed(time_s, values, number["delay_s"][:, NODES.index(node)], memory)
+    return delayed(time_s, values, late_s(node, time_s, number), memory)
 
 
 def undo(node: str, time_s: Vector, values: Vector, number: Numbers, memory: Memory) -> Vector:
     """Inverse of `sense`."""
-    return advanced(time_s, values, number["delay_s"][:, NODES.index(node)])
+    return advanced(time_s, values, late_s(node, time_s, number))
 
 
 EFFECT = Effect(
@@ -32,5 +37,6 @@ EFFECT = Effect(
     confounded_with=("ehb_dead_time", "imu_filter", "clock_drift", "tyre_relaxation"),
     sense=sense,
     undo=undo,
+    late_s=late_s,
     nodes=("wheel", "imu", "pressure", "motor", "driver"),
 )

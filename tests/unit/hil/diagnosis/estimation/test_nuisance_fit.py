@@ -9,7 +9,7 @@ from pulses import log_of_pulses
 from hil.diagnosis.data.log import UnusableError
 from hil.diagnosis.data.prepare import prepare
 from hil.diagnosis.estimation.gauss_newton import Fitter
-from hil.diagnosis.estimation.information import acting_among, information_blocks
+from hil.diagnosis.estimation.information import acting_among, finite_difference_jacobian, information_blocks
 from hil.diagnosis.estimation.model import Term
 from hil.diagnosis.estimation.nuisance_fit import NuisanceFit
 from hil.diagnosis.estimation.terms import candidates, columns
@@ -44,11 +44,34 @@ def test_a_car_that_diverges_fits_nothing(paper_fitter):
     assert paper_fitter.cost(diverging.residual, z, noise) > 1e12
 
 
+def test_from_a_car_that_diverges_no_step_is_made(paper_fitter):
+    """Its gradient is not finite; numbers that were not reached the simulation, whose latencies were none."""
+    z, noise = paper_fitter.origin, paper_fitter.start()[1]
+    diverging = paper_fitter.at(z, (Term(_INERTIA, -2.0),), noise)
+    for fitted in (paper_fitter.fit(diverging, noise), paper_fitter.refit_amplitudes(diverging, noise)):
+        assert np.array_equal(fitted.z, z)
+        assert fitted.values() == [-2.0]
+        assert fitted.cost > 1e12
+
+
 def test_numbers_with_which_the_car_diverges_are_refused(paper_fitter):
     base = _INERTIA.applied(paper_fitter.base, -2.0)
     diverging = Fitter(paper_fitter.simulator, paper_fitter.masks, base, paper_fitter.nuisances, {})
     with pytest.raises(UnusableError, match="the simulated car diverges"):
         diverging.start()
+
+
+def test_a_step_with_which_the_car_diverges_says_nothing(paper_fitter):
+    """Its column is zero, and that of a step beside it is what it is alone."""
+    simulator, masks = paper_fitter.simulator, paper_fitter.masks
+    level = paper_fitter.parameter_set(paper_fitter.origin, ())
+    broken, heavier, base = _INERTIA.applied(level, -2.0), _MASS.applied(level, 20.0), simulator.run(level)
+    both = finite_difference_jacobian(simulator, masks, base, [broken, heavier], [1.0, 1.0])
+    alone = finite_difference_jacobian(simulator, masks, base, [heavier], [1.0])
+    for name, values in both.items():
+        assert not values[:, 0].any()
+        assert np.array_equal(values[:, 1], alone[name][:, 0])
+    assert both["wheel.mean"][:, 1].any()
 
 
 def test_what_two_columns_differ_by_is_kept_in_precise_products(paper_fitter):

@@ -189,3 +189,19 @@ def test_some_columns_are_whitened_as_among_all_where_a_channel_along_the_road_i
     frame = SampleMasks(fresh, zeros, ones, 20.0 * ones, zeros, 0.02, dict.fromkeys(tracks, ones), measured)
     noise = first_guess({name: values[:, :1] for name, values in tracks.items()}, frame)
     assert np.array_equal(whitened(tracks, frame, noise, [0, 3]), whitened(tracks, frame, noise)[:, [0, 3]])
+
+
+def test_a_late_ground_speed_is_not_compared_while_it_is_that_of_the_segment_before():
+    """It jumps where the simulated speed is set to the measured one, and comes 0.1 to 0.2 s late: no Jacobian column of
+    its latency told what a step did, and fits of a stranger's car stood still."""
+    log, _ = _log(np.random.default_rng(1), 0.0)
+    channels = {**log.channels, "speed_mps": np.full(len(log.t_s), 18.0)}
+    frame = SampleMasks.of(prepare([make_log("log", log.t_s, channels)], 0.3))
+    starts = np.flatnonzero(frame.segment_start)
+    after = int(0.5 / frame.sample_s)
+    assert len(starts) > 1
+    for start in starts:
+        assert not frame.present["gps"][start : start + after].any()
+        assert frame.present["gps"][start - 5 : start].all()
+        assert frame.present["gps"][start + after]
+        assert frame.present["wheel.mean"][start + 1]

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from hil.diagnosis.data.grid import at_samples
 from hil.diagnosis.simulation.measurement_model import delayed, without_latency
+from plant.injection.theta import THETA
 from plant.vectors import INPUT
 
 
@@ -15,14 +16,14 @@ def test_what_has_corners_is_shifted_on_straight_lines(rows, channels):
     values = np.random.default_rng(1).standard_normal((30, channels))
     at = np.arange(30.0)
     expected = np.column_stack([np.interp(at - rows, at, column) for column in values.T])
-    assert delayed(values, rows, straight=True) == pytest.approx(expected)
+    assert delayed(values, np.full(30, rows), straight=True) == pytest.approx(expected)
 
 
 @given(rows=st.floats(-3.0, 3.0), a=st.floats(-2.0, 2.0), b=st.floats(-2.0, 2.0))
 def test_a_parabola_is_shifted_exactly(rows, a, b):
     at = np.arange(30.0)
     inside = slice(5, 25)
-    shifted = delayed((a * at**2 + b * at)[:, None], rows)[inside, 0]
+    shifted = delayed((a * at**2 + b * at)[:, None], np.full(30, rows))[inside, 0]
     assert shifted == pytest.approx((a * (at - rows) ** 2 + b * (at - rows))[inside], abs=1e-9)
 
 
@@ -43,10 +44,10 @@ def test_places_outside_are_the_ends():
 def test_the_steering_wheel_may_act_later_than_it_is_logged():
     inputs = INPUT.zeros() + np.zeros((40, 1))
     inputs[:, INPUT.at.steering_wheel_rad] = np.arange(40.0)
-    moved = without_latency(inputs, (0.0, 0.0, 0.0, 0.0, 0.0, 0.005, 0.0, 0.0))
+    moved = without_latency(inputs, (0.0, 0.0, 0.0, 0.0, 0.0, 0.005, 0.0, 0.0), THETA.neutral())
     assert moved[5:35, INPUT.at.steering_wheel_rad] == pytest.approx(np.arange(5.0, 35.0) - 0.5)
 
 
 def test_channels_of_a_wider_table_are_shifted_too():
     table = np.random.default_rng(2).standard_normal((12, 6))
-    assert delayed(table[:, 2:4], 1.0)[1:] == pytest.approx(table[:-1, 2:4])
+    assert delayed(table[:, 2:4], np.ones(12))[1:] == pytest.approx(table[:-1, 2:4])

@@ -297,6 +297,19 @@ def test_a_torque_measured_half_a_row_late_is_the_one_between_two_rows(late_by):
     assert near < 0.8 < 2.0 < far
 
 
+@pytest.mark.parametrize("node", ["imu", "pressure", "motor"])
+def test_a_late_stamp_and_an_early_frame_cancel(simulator, node):
+    """Two shifts by lines between rows smooth every jump: fits of two names of one delay stood still there."""
+    level, of_node = nominal(simulator.vehicle), np.array([name == node for name in NODES]) * 1.0
+    delayed = _with(level, "timestamp_offset", "delay_s", of_node * 0.004)
+    both, latency = (replace(one, latency_s=late(node, by_s)) for one, by_s in ((delayed, -0.004), (level, 0.004)))
+    seen, as_stamped, as_logged, in_time = map(simulator.run, (both, delayed, latency, level))
+    for group, values in in_time.items():
+        assert seen[group] == pytest.approx(values, abs=1e-9 * np.abs(values).max())
+        assert as_stamped[group] == pytest.approx(as_logged[group], abs=1e-9 * np.abs(values).max())
+    assert any(not np.allclose(as_stamped[group], values) for group, values in in_time.items())
+
+
 def test_a_yaw_rate_comes_later_than_the_accelerations(simulator):
     """A gyroscope has a filter of its own."""
     recording = simulator.dataset.recordings[0]
