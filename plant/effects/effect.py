@@ -54,6 +54,7 @@ class Parameter:
     part_to_part : standard deviation from one part of a kind to the next, where it is known; 0 where it is not.
     aliases : numbers of the vehicle that are the same quantity, names of ``PARAMETER`` or `NODE_LATENCY`: it changes
         them and nothing else, so that no data tell the two apart.
+    factor : 1 where it multiplies something by 1 + value, -1 by 1 - value, 0 where it is no factor.
     """
 
     name: str
@@ -67,6 +68,7 @@ class Parameter:
     sign_along_road: bool = False
     part_to_part: float = 0.0
     aliases: tuple[str, ...] = ()
+    factor: int = 0
 
     @property
     def step(self) -> float:

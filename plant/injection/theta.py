@@ -30,6 +30,7 @@ class Theta:
     effects : built-in ones, then those from outside.
     strengths : number of elements before the times: parameters of the built-in effects.
     size : total length, the same whatever comes from outside.
+    factors : (size,) `plant.effects.effect.Parameter.factor` of every number.
     """
 
     def __init__(self, plugins: Sequence[Effect] = ()) -> None:
@@ -47,6 +48,10 @@ class Theta:
         self.size = self._plugins_at + PLUGIN_SLOTS
         if sum(outside.values()) > PLUGIN_SLOTS:
             raise ValueError(f"effects from outside have {sum(outside.values())} numbers; room is for {PLUGIN_SLOTS}")
+        self.factors = np.zeros(self.size)
+        for effect in self.effects:
+            for parameter in effect.parameters:
+                self.factors[self.slice(effect.name, parameter.name)] = parameter.factor
 
     def _place(self, sizes: Mapping[str, int], start: int) -> None:
         for name, size in sizes.items():
@@ -92,6 +97,13 @@ class Theta:
                 if parameter.sign_along_road:
                     back[self.slice(effect.name, parameter.name)] *= -1.0
         return back
+
+    def changed(self, theta: Vector, change: Vector) -> Vector:
+        """The same car after a ``change``, (size,), that is 0 where nothing changes.
+
+        Factors multiply: what was 1 + e before is (1 + e)(1 + d) after a change d. All else is added.
+        """
+        return theta + change * (1.0 + self.factors * theta)
 
     def timed(self, theta: Vector) -> bool:
         """Whether any effect begins or ends at some time."""

@@ -200,7 +200,7 @@ class Fitter:
     def term_jacobian(self, model: Model) -> Tracks:
         """Jacobian of the terms' values at the model, by track (samples, terms)."""
         parameters = self.parameter_set(model.z, model.terms)
-        known = np.diag(model.covariance) if model.covariance.size else np.zeros(len(model.terms))
+        known = np.maximum(np.diag(model.covariance), 0.0) if model.covariance.size else np.zeros(len(model.terms))
         steps = [_difference(term, float(sd)) for term, sd in zip(model.terms, np.sqrt(known), strict=True)]
         driven_by = self.simulator.driven_by
         known_tracks = next((one.tracks for one in tuple(self._taken) if one.at(driven_by, model, steps)), None)

@@ -42,6 +42,8 @@ _LATE = {
 _USUAL_RADIUS_M = 0.3
 _TOOTH_ROWS, _TURNS_RAD_S = 2.0, 0.1
 _FADING_MPS, _LEAST_NM = 0.3, 1.0
+_DIVERGED = 1e9
+"""Largest value of a channel, SI: no pressure, torque or speed of a car comes near."""
 _TURNS_MPS2, _CHARACTERISTIC_MPS = 0.3, (8.0, 200.0)
 _FINER = 4
 """Points per row between which a motor's torque is linear: its lag bends it, and a straight line from row to row would
@@ -77,7 +79,13 @@ class MeasurementModel:
         return stack
 
     def measure(self, recording: Recording, parameters: ParameterSet, table: Floats) -> Stack:
-        """Channels by sample, (samples, channels), from columns of the plant, (rows, columns)."""
+        """Channels by sample, (samples, channels), from columns of the plant, (rows, columns).
+
+        Those of a car that diverges are NaN: no sensor, and no place in a table, is worked out from infinite speeds.
+        """
+        if not -_DIVERGED < table.min() <= table.max() < _DIVERGED:
+            nothing = np.full_like(table, np.nan)
+            return {group: averaged(values, recording.stride) for group, values in self.split(nothing).items()}
         stack = self.measure_rows(self.split(table), recording, parameters)
         channels = {group: averaged(values, recording.stride) for group, values in stack.items()}
         if "wheel" in channels:

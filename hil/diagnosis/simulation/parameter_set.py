@@ -37,8 +37,8 @@ class Onset:
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """What is otherwise in all recordings from number ``since`` on: theta (THETA.size,), rows of nonparametric terms
-    and the temperature of the discs at the start, all added."""
+    """What is otherwise in all recordings from number ``since`` on: theta (THETA.size,) as `Theta.changed` takes it,
+    rows of nonparametric terms and the temperature of the discs at the start, both added."""
 
     since: int
     theta: Floats = field(default_factory=lambda: np.zeros(THETA.size))
@@ -103,7 +103,8 @@ class ParameterSet:
         rows = self.nonparametric_rows
         if len(self.change.nonparametric_rows):
             rows = np.vstack([rows, self.change.nonparametric_rows])
-        theta, disc_offset_k = self.theta + self.change.theta, self.disc_offset_k + self.change.disc_offset_k
+        theta = THETA.changed(self.theta, self.change.theta)
+        disc_offset_k = self.disc_offset_k + self.change.disc_offset_k
         return replace(self, theta=theta, nonparametric_rows=rows, disc_offset_k=disc_offset_k, change=None)
 
     def theta_in(self, recording: Recording) -> Floats:

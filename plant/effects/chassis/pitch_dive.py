@@ -6,7 +6,7 @@ from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("softness", "", -0.4, 1.0, 0.25, aliases=("suspension_ride_rate_n_m",)),)
+PARAMETERS = (Parameter("softness", "", -0.4, 1.0, 0.25, aliases=("suspension_ride_rate_n_m",), factor=1),)
 L = slots(Scope.CAR, PARAMETERS)
 
 

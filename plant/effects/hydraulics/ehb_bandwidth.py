@@ -7,8 +7,8 @@ from plant.layout import Vector
 from plant.vectors import P
 
 PARAMETERS = (
-    Parameter("frequency", "", -0.7, 1.5, -0.3, aliases=("ehb_natural_frequency_hz",)),
-    Parameter("damping", "", -0.6, 1.0, -0.25, aliases=("ehb_damping_ratio",)),
+    Parameter("frequency", "", -0.7, 1.5, -0.3, aliases=("ehb_natural_frequency_hz",), factor=1),
+    Parameter("damping", "", -0.6, 1.0, -0.25, aliases=("ehb_damping_ratio",), factor=1),
 )
 L = slots(Scope.CAR, PARAMETERS)
 

@@ -6,7 +6,9 @@ from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("gain", "", -0.9, 1.0, -0.4, aliases=("ehb_build_rate_pa_s", "ehb_release_rate_pa_s")),)
+PARAMETERS = (
+    Parameter("gain", "", -0.9, 1.0, -0.4, aliases=("ehb_build_rate_pa_s", "ehb_release_rate_pa_s"), factor=1),
+)
 L = slots(Scope.CAR, PARAMETERS)
 
 

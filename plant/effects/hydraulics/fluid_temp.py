@@ -8,7 +8,7 @@ from plant.vectors import P
 
 SLOWED = ("ehb_natural_frequency_hz", "ehb_build_rate_pa_s", "ehb_release_rate_pa_s")
 
-PARAMETERS = (Parameter("slowness", "", 0.0, 3.0, 0.6, aliases=SLOWED),)
+PARAMETERS = (Parameter("slowness", "", 0.0, 3.0, 0.6, aliases=SLOWED, factor=1),)
 L = slots(Scope.CAR, PARAMETERS)
 
 

@@ -6,7 +6,7 @@ from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("power", "", -0.95, 1.0, -0.4, aliases=("battery_charge_power_w",)),)
+PARAMETERS = (Parameter("power", "", -0.95, 1.0, -0.4, aliases=("battery_charge_power_w",), factor=1),)
 L = slots(Scope.CAR, PARAMETERS)
 
 

@@ -10,8 +10,8 @@ from plant.inject import J
 from plant.layout import Vector
 
 PARAMETERS = (
-    Parameter("gain", "", -0.3, 0.3, -0.05, part_to_part=0.005),
-    Parameter("unseen", "", -0.3, 0.3, -0.05, part_to_part=0.005),
+    Parameter("gain", "", -0.3, 0.3, -0.05, part_to_part=0.005, factor=1),
+    Parameter("unseen", "", -0.3, 0.3, -0.05, part_to_part=0.005, factor=1),
 )
 L = slots(Scope.WHEEL, PARAMETERS)
 

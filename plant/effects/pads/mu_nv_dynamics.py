@@ -6,7 +6,7 @@ from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("rate", "", -0.7, 3.0, 1.0, aliases=("pad_a_1_ks", "pad_b_1_j")),)
+PARAMETERS = (Parameter("rate", "", -0.7, 3.0, 1.0, aliases=("pad_a_1_ks", "pad_b_1_j"), factor=1),)
 L = slots(Scope.CAR, PARAMETERS)
 
 

@@ -6,7 +6,7 @@ from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
-PARAMETERS = (Parameter("gain", "", -0.6, 0.6, -0.12, part_to_part=0.01),)
+PARAMETERS = (Parameter("gain", "", -0.6, 0.6, -0.12, part_to_part=0.01, factor=1),)
 L = slots(Scope.WHEEL, PARAMETERS)
 
 

@@ -8,7 +8,7 @@ from plant.layout import Vector
 from plant.vectors import Y
 
 PARAMETERS = (
-    Parameter("loss", "", 0.0, 1.0, 0.4),
+    Parameter("loss", "", 0.0, 1.0, 0.4, factor=-1),
     Parameter("held_pa", "Pa", 0.0, 4000000.0, 400000.0, difference_step=0.5),
 )
 L = slots(Scope.WHEEL, PARAMETERS)

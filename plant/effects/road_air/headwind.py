@@ -9,7 +9,7 @@ from plant.vectors import P
 
 PARAMETERS = (
     Parameter("wind_mps", "m/s", -20.0, 20.0, 5.0, sign_along_road=True),
-    Parameter("drag_gain", "", -0.5, 0.6, 0.15, aliases=("vehicle_drag_coefficient",)),
+    Parameter("drag_gain", "", -0.5, 0.6, 0.15, aliases=("vehicle_drag_coefficient",), factor=1),
 )
 L = slots(Scope.CAR, PARAMETERS)
 

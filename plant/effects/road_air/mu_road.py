@@ -6,7 +6,7 @@ from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
-PARAMETERS = (Parameter("scale", "", -0.95, 0.3, -0.5),)
+PARAMETERS = (Parameter("scale", "", -0.95, 0.3, -0.5, factor=1),)
 L = slots(Scope.CAR, PARAMETERS)
 
 

@@ -6,7 +6,7 @@ from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
-PARAMETERS = (Parameter("right", "", -0.9, 0.2, -0.6),)
+PARAMETERS = (Parameter("right", "", -0.9, 0.2, -0.6, factor=1),)
 L = slots(Scope.CAR, PARAMETERS)
 
 

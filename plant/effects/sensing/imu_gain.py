@@ -34,7 +34,7 @@ EFFECT = Effect(
     acts_when=Excitation.NONE,
     scope=Scope.CAR,
     parameters=(
-        Parameter("gain", "", -0.2, 0.2, 0.02),
+        Parameter("gain", "", -0.2, 0.2, 0.02, factor=1),
         Parameter("tilt_rad", "rad", -0.1, 0.1, 0.02),
         Parameter("cross", "", -0.1, 0.1, 0.02),
     ),

@@ -26,7 +26,7 @@ EFFECT = Effect(
     scope=Scope.CAR,
     parameters=(
         Parameter("offset", "", -0.1, 0.1, 0.01),
-        Parameter("gain", "", -0.1, 0.1, 0.01),
+        Parameter("gain", "", -0.1, 0.1, 0.01, factor=1),
     ),
     source="M: 1 %",
     signature="demand shifted",

@@ -25,7 +25,7 @@ EFFECT = Effect(
     acts_when=Excitation.BRAKES,
     scope=Scope.WHEEL,
     parameters=(
-        Parameter("gain", "", -0.2, 0.2, 0.02, part_to_part=0.005),
+        Parameter("gain", "", -0.2, 0.2, 0.02, part_to_part=0.005, factor=1),
         Parameter("drift_1_s", "1/s", -0.001, 0.001, 0.0002),
     ),
     source="M: +-1 to 2 %",

@@ -24,7 +24,7 @@ EFFECT = Effect(
     injection_points=("sensor.ground",),
     acts_when=Excitation.ALWAYS,
     scope=Scope.CAR,
-    parameters=(Parameter("gain", "", -0.1, 0.1, 0.01),),
+    parameters=(Parameter("gain", "", -0.1, 0.1, 0.01, factor=1),),
     source="C: an optical sensor mounted askew by 8 degrees tells 1 % too little; a satellite receiver is far better",
     signature="constant ratio to all wheel speeds, and no force changes",
     manoeuvre="coast_down",

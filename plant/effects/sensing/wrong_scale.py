@@ -24,7 +24,7 @@ EFFECT = Effect(
     injection_points=("sensor.wheel", "sensor.imu", "sensor.pressure", "sensor.motor", "sensor.driver"),
     acts_when=(Excitation.ALWAYS, Excitation.NONE, Excitation.BRAKES, Excitation.MOTORS, Excitation.NONE),
     scope=Scope.NODE,
-    parameters=(Parameter("gain", "", -3.0, 300.0, 2.6),),
+    parameters=(Parameter("gain", "", -3.0, 300.0, 2.6, factor=1),),
     source="M: 1, -1, 3.6, 256",
     signature="exact constant ratio",
     manoeuvre="straight_stop",

@@ -6,7 +6,7 @@ from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("damping", "", -0.95, 1.0, -0.6, aliases=("tyre_low_speed_damping_ns_m",)),)
+PARAMETERS = (Parameter("damping", "", -0.95, 1.0, -0.6, aliases=("tyre_low_speed_damping_ns_m",), factor=1),)
 L = slots(Scope.CAR, PARAMETERS)
 
 

@@ -6,7 +6,7 @@ from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
-PARAMETERS = (Parameter("gain", "", -0.95, 1.5, 0.3),)
+PARAMETERS = (Parameter("gain", "", -0.95, 1.5, 0.3, factor=1),)
 L = slots(Scope.WHEEL, PARAMETERS)
 
 

@@ -6,7 +6,7 @@ from plant.excitation import Excitation
 from plant.inject import J
 from plant.layout import Vector
 
-PARAMETERS = (Parameter("gain", "", -0.5, 0.6, 0.2),)
+PARAMETERS = (Parameter("gain", "", -0.5, 0.6, 0.2, factor=1),)
 L = slots(Scope.AXLE, PARAMETERS)
 
 

@@ -6,7 +6,7 @@ from plant.excitation import Excitation
 from plant.layout import Vector
 from plant.vectors import P
 
-PARAMETERS = (Parameter("gain", "", -0.7, 2.0, 1.0, aliases=("tyre_lsgkp",)),)
+PARAMETERS = (Parameter("gain", "", -0.7, 2.0, 1.0, aliases=("tyre_lsgkp",), factor=1),)
 L = slots(Scope.CAR, PARAMETERS)
 
 

@@ -14,7 +14,7 @@ from plant.injection.apply import Q
 from plant.injection.theta import THETA
 from plant.injection_points import INJECTION_POINTS
 from plant.parameters import PlantParameters
-from plant.vectors import OUTPUT, PARAMETER
+from plant.vectors import INPUT, OUTPUT, PARAMETER, STATE
 
 PLANT = Path(__file__).parents[4] / "plant"
 SUBSYSTEMS = ("road_air", "chassis", "tyres", "pads", "hydraulics", "motors", "sensing")
@@ -141,3 +141,33 @@ def test_effects_know_nothing_of_what_injects_them():
         imported = [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
         above = ("plant.injection.", "plant.model", *(("plant.effects",) if file in submodels else ()))
         assert not [module for module in imported if module.startswith(above) or module == "plant.injection"], file
+
+
+def _made_of(effect: Effect, parameter: Parameter, value: float) -> np.ndarray:
+    """All that an effect changes, with this value of one parameter, of arbitrary inputs."""
+    rng = np.random.default_rng(3)
+    if effect.sensing:
+        time_s, signals = np.arange(5.0), rng.uniform(1.0, 2.0, (5, 4))
+        numbers = {p.name: np.full((5, p.size(effect.scope)), p.neutral) for p in effect.parameters}
+        numbers[parameter.name][:] = value
+        return np.concatenate([effect.sense(n, time_s, signals, numbers, {}).ravel() for n in effect.nodes])
+    x, u, q, y = (rng.uniform(1.0, 2.0, size) for size in (STATE.size, INPUT.size, Q.size, OUTPUT.size))
+    q[Q.slice("theta")] = THETA.neutral()
+    q[Q.slice("theta")][THETA.slice(effect.name, parameter.name)] = value
+    first = Q.slice("theta").start + THETA.slice(effect.name, effect.parameters[0].name).start
+    if effect.static is not None:
+        getattr(effect.static, "py_func", effect.static)(q, first, y)
+    if effect.dynamic is not None:
+        getattr(effect.dynamic, "py_func", effect.dynamic)(x, u, q, first, y)
+    return np.concatenate([q[: PARAMETER.size], y])
+
+
+@pytest.mark.parametrize("number", [one for one in NUMBERS if one[1].factor], ids=called)
+def test_two_factors_make_their_product(number):
+    effect, parameter = number
+    size = 0.3 * abs(parameter.step)
+    both = 3.0 * size + parameter.factor * 2.0 * size**2
+    neither, one, other, product = (_made_of(effect, parameter, value) for value in (0.0, size, 2.0 * size, both))
+    changed = one != neither
+    assert changed.any()
+    assert product[changed] * neither[changed] == pytest.approx(one[changed] * other[changed], rel=1e-9)

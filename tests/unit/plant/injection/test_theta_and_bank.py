@@ -26,6 +26,20 @@ def test_numbers_by_member_list_or_one_for_all():
     assert theta[THETA.slice("pad_mu_gain", "onset_s")] == 2.0
 
 
+def test_a_change_multiplies_factors_and_adds_to_all_else():
+    """Pads that bite 10 % more than stated, then a fifth less than before, bite 12 % less than stated."""
+    before, change = THETA.neutral(), np.zeros(THETA.size)
+    for theta, gain, loss, drag in ((before, 0.1, 0.3, 5.0), (change, -0.2, 0.5, 6.0)):
+        THETA.set(theta, "pad_mu_gain", {"gain": gain})
+        THETA.set(theta, "stuck_corner", {"loss": loss})
+        THETA.set(theta, "residual_drag", {"torque_nm": drag})
+    after = THETA.changed(before, change)
+    assert after[THETA.slice("pad_mu_gain", "gain")] == pytest.approx(np.full(4, 1.1 * 0.8 - 1.0))
+    assert after[THETA.slice("stuck_corner", "loss")] == pytest.approx(np.full(4, 1.0 - 0.7 * 0.5))
+    assert after[THETA.slice("residual_drag", "torque_nm")] == pytest.approx(np.full(4, 11.0))
+    assert np.array_equal(THETA.changed(before, np.zeros(THETA.size)), before)
+
+
 @pytest.mark.parametrize(
     ("effect", "values", "error"),
     [

@@ -18,6 +18,7 @@ from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import load_vehicle, paper_car
 from hil.diagnosis.vehicle.priors import DISC_ASSUMED_SD_K, DISC_MEASURED_SD_K
+from plant.injection.theta import THETA
 
 NOISE_PA = 2e3
 GAINS = {"brake_gain_front_nm_pa": 2e-4, "brake_gain_rear_nm_pa": 1e-4}
@@ -42,6 +43,15 @@ def test_a_car_that_diverges_fits_nothing(paper_fitter):
     assert not np.isfinite(paper_fitter.simulator.run(paper_fitter.parameter_set(z, diverging.terms))["wheel"]).all()
     assert diverging.cost > 1e12
     assert paper_fitter.cost(diverging.residual, z, noise) > 1e12
+
+
+def test_sensors_of_a_car_that_diverges_say_nothing(paper_fitter):
+    """An angle that is infinite has no cosine, and a speed that is none no place in a table."""
+    level = paper_fitter.parameter_set(paper_fitter.origin, (Term(_INERTIA, -2.0),))
+    uneven = level.adding(range(*THETA.slice("wheel_tooth_error", "first_cosine").indices(THETA.size)), 0.001)
+    late = replace(uneven, latency_s=(0.01,) * len(uneven.latency_s))
+    for values in paper_fitter.simulator.run(late).values():
+        assert np.isnan(values).all()
 
 
 def test_from_a_car_that_diverges_no_step_is_made(paper_fitter):
