@@ -18,13 +18,13 @@ def parameters(records: Sequence[Record]) -> Metrics:
                 errors.append(abs(named[name]["value"] - true) / abs(true))
                 covered.append(named[name]["ci95"][0] <= true <= named[name]["ci95"][1])
     return {
-        "median_error": median(errors, 0.1, at_most=True), "coverage95": _coverage(covered),
+        "median_error": median(errors, 0.1, at_most=True), "coverage95": coverage(covered, 0.92, 0.98),
         "right_place": share(right, lambda r: r["causes"][0]["location"] == r["hidden"][0]["location"]),
     }  # fmt: skip
 
 
-def _coverage(covered: Sequence[bool]) -> Metric:
-    """Asked is 92 to 98 %."""
+def coverage(covered: Sequence[bool], low: float, high: float) -> Metric:
+    """Share of 95 % intervals that hold the truth; met between ``low`` and ``high``."""
     value = sum(covered) / len(covered) if covered else None
     entry = metric(value, *wilson(sum(covered), len(covered)), 0.95, at_most=False)
-    return entry | {"met": None if value is None else 0.92 <= value <= 0.98}
+    return entry | {"met": None if value is None else low <= value <= high}

@@ -6,7 +6,9 @@ import pytest
 
 from hil.validation.blind_trials.misses import misses
 from hil.validation.blind_trials.score import table_of
-from hil.validation.blind_trials.strangers import held_out_worse, is_right, something_false
+from hil.validation.blind_trials.strangers import SAME_NUMBER, held_out_worse, is_right, something_false
+from hil.validation.strangers.cases import CARS
+from plant.injection.theta import THETA
 
 HIDDEN = {"effect": "front_pads_weak", "location": "first", "parameters": {"size": {"value": -0.1, "unit": "1"}}}
 
@@ -71,3 +73,29 @@ def test_singles_are_scored_against_the_marks() -> None:
     assert metrics["nothing_named"]["value"] == 0.1
     assert len(misses("strangers_single", records)) == 3
     assert misses("strangers_single", records)[-1] == "3: front_pads_weak@first -0.1 1; answered none"
+
+
+def test_numbers_of_right_first_causes_are_compared_where_they_are_the_same_number() -> None:
+    def named(effect: str, name: str, value: float, half: float, **more: Any) -> dict[str, Any]:
+        found = {"value": value, "ci95": [value - half, value + half]}
+        record = _record(f"{effect}@front", accepted=["pad_mu_gain@front", "stuck_corner@front"], **more)
+        record["causes"][0]["parameters"] = {name: found}
+        return record
+
+    records = [
+        named("pad_mu_gain", "gain", -0.11, 0.02), named("stuck_corner", "loss", 0.13, 0.02),
+        named("mass_offset", "mass_kg", 90.0, 1.0, rivals=("pad_mu_gain@front",)), _record(),
+    ]  # fmt: skip
+    metrics = table_of("strangers_single", records)["metrics"]
+    assert metrics["size_error"]["value"] == pytest.approx(0.2)
+    assert (metrics["size_error"]["met"], metrics["size_coverage95"]["met"]) == (False, False)
+    assert metrics["size_coverage95"]["value"] == 0.5
+
+
+def test_every_cause_with_a_size_is_one_of_a_car_and_what_it_is_compared_with_a_right_answer() -> None:
+    causes = {cause.name: cause for car in CARS.values() for cause in car.causes.values()}
+    for name, same in SAME_NUMBER.items():
+        accepted = {answer.split("@")[0] for answer in causes[name].accepted}
+        numbers = [number.split(".") for number in same]
+        assert all(THETA.effect(effect).parameter(parameter) for effect, parameter in numbers)
+        assert accepted & {effect for effect, _ in numbers}
