@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from hil.diagnosis.data.dataset import Dataset
+from hil.diagnosis.data.log import Floats
 from hil.diagnosis.detection.result import Diagnosis
 from hil.diagnosis.simulation.parameter_set import ParameterSet, nominal
 from hil.diagnosis.vehicle.extension_file import load_extension, write_extension
@@ -43,11 +44,33 @@ def write_extended_car(diagnosis: Diagnosis, folder: Path) -> str:
     causes = fitter.parameter_set(np.where(kept, final.z, 0.0), final.terms).changed()
     extended = replace(fitter.parameter_set(final.z, final.terms).changed(), theta=causes.theta)
     onsets, notes = _onsets(causes, diagnosis.dataset)
+    theta, beyond = _within_bounds(causes.theta)
+    extended = replace(extended, theta=theta)
     names = ", ".join(term.candidate.name for term in final.terms) or "no effect"
     head = f"Estimated from {len(diagnosis.dataset.recordings)} logs: {names}"
     extension = replace(extended.extension_of(nominal(diagnosis.vehicle)), onsets=onsets)
-    write_extension(path, extension, (head, *notes))
+    write_extension(path, extension, (head, *notes, *beyond))
     return str(path)
+
+
+def _within_bounds(theta: Floats) -> tuple[Floats, list[str]]:
+    """Theta with every number inside its bounds, and comments on those that were beyond.
+
+    A common part and a change are each inside; both together may not be, and no file is read with such a number.
+    """
+    inside, notes = theta.copy(), []
+    for effect in THETA.effects:
+        for parameter in effect.parameters:
+            own = THETA.slice(effect.name, parameter.name)
+            inside[own] = np.clip(theta[own], parameter.low, parameter.high)
+            beyond = theta[own][inside[own] != theta[own]]
+            if beyond.size:
+                most = f"{beyond[np.abs(beyond).argmax()]:.4g} {parameter.unit}".strip()
+                limits = f"{parameter.low:g} to {parameter.high:g}"
+                notes.append(
+                    f"{effect.name}.{parameter.name}: estimated as {most}, beyond {limits}; here at the limit."
+                )
+    return inside, notes
 
 
 def _onsets(causes: ParameterSet, dataset: Dataset) -> tuple[dict[str, tuple[str, float]], list[str]]:

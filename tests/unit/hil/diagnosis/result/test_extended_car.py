@@ -75,3 +75,10 @@ def test_nuisances_act_before_an_onset_of_the_same_effect_too(tmp_path):
     before, after = (theta[PADS] for _, theta in moved.thetas_in(dataset.recordings[1]))
     assert before == pytest.approx([0.02, 0.0, 0.0, 0.0])
     assert after == pytest.approx([-0.08, -0.1, -0.1, -0.1])
+
+
+def test_numbers_beyond_their_bounds_are_written_at_the_bound(tmp_path):
+    """A common part and a change, each inside: pads that bite 25 % more than stated, and 35 % more than that since."""
+    text = (path := _written(tmp_path, already=0.7875)).read_text()
+    assert "pad_mu_gain.gain: estimated as 0.6875, beyond -0.6 to 0.6; here at the limit." in text
+    assert load_extension(path).theta[PADS] == pytest.approx([0.6] * 4)
