@@ -26,13 +26,33 @@ from plant.vectors import PARAMETER
 class Onset:
     """Time from which an effect acts: ``recording`` by its number, and s in it.
 
-    ``before`` are its strengths until then: what single wheels are off was there before a cause of the same kind.
+    ``before`` are its strengths until then, and ``change`` what is otherwise of these since the reference, nothing
+    where it is empty: what single wheels are off was there before a cause of the same kind.
     """
 
     effect: str
     recording: int
     since_s: float
     before: tuple[float, ...]
+    change: tuple[float, ...] = ()
+
+    def changed(self) -> "Onset":
+        """As it is since the change."""
+        if not self.change:
+            return self
+        theta, change = np.zeros((2, THETA.size))
+        own = _strengths(self.effect)
+        theta[own], change[own] = self.before, self.change
+        return replace(self, before=tuple(THETA.changed(theta, change)[own].tolist()), change=())
+
+    def moved(self, by: Floats, change_by: Floats | None) -> "Onset":
+        """With nuisance parameters that move theta and, where there is one, its change, (THETA.size,)."""
+        own = _strengths(self.effect)
+        before = tuple(np.add(self.before, by[own]).tolist())
+        if change_by is None:
+            return replace(self, before=before)
+        change = np.add(self.change or 0.0, change_by[own])
+        return replace(self, before=before, change=tuple(change.tolist()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,10 +111,14 @@ class ParameterSet:
         """As it is in one recording, before or since the change."""
         if self.change is None:
             return self
-        if number < self.change.since:
-            kept = tuple(one for one in self.onsets if one.recording < self.change.since)
-            return replace(self, change=None, onsets=kept)
-        return self.changed()
+        if number >= self.change.since:
+            return self.changed()
+        theta = self.theta
+        for one in (one for one in self.onsets if one.recording >= self.change.since):
+            theta = theta.copy()
+            theta[_strengths(one.effect)] = one.before
+        kept = tuple(replace(one, change=()) for one in self.onsets if one.recording < self.change.since)
+        return replace(self, theta=theta, change=None, onsets=kept)
 
     def changed(self) -> "ParameterSet":
         """As it is since the change."""
@@ -105,7 +129,10 @@ class ParameterSet:
             rows = np.vstack([rows, self.change.nonparametric_rows])
         theta = THETA.changed(self.theta, self.change.theta)
         disc_offset_k = self.disc_offset_k + self.change.disc_offset_k
-        return replace(self, theta=theta, nonparametric_rows=rows, disc_offset_k=disc_offset_k, change=None)
+        onsets = tuple(one.changed() for one in self.onsets)
+        return replace(
+            self, theta=theta, nonparametric_rows=rows, disc_offset_k=disc_offset_k, onsets=onsets, change=None
+        )
 
     def theta_in(self, recording: Recording) -> Floats:
         """Theta of one recording at its end: direction along the road, onsets in it or later."""
@@ -129,8 +156,11 @@ class ParameterSet:
 
     def with_onset(self, effect: str, number: int, since_s: float, before: "ParameterSet") -> "ParameterSet":
         """With an effect that acts from a time on in recording ``number``; until then, with strengths of ``before``."""
-        strengths = tuple(before.changed().theta[_strengths(effect)].tolist())
-        return replace(self, onsets=(*self.onsets, Onset(effect, number, since_s, strengths)))
+        own = _strengths(effect)
+        change = () if before.change is None else tuple(before.change.theta[own].tolist())
+        return replace(
+            self, onsets=(*self.onsets, Onset(effect, number, since_s, tuple(before.theta[own].tolist()), change))
+        )
 
     def with_nuisances(self, nuisances: Sequence[Nuisance], z: Floats) -> "ParameterSet":
         """With nuisances ``z`` prior standard deviations off, (nuisances,)."""
@@ -164,13 +194,8 @@ class ParameterSet:
                         tooth += amount * step
                     case NuisanceKind.TOOTH_WINDOW:
                         window += amount * step
-        moved = theta - self.theta  # also before an onset: what single wheels are off
-        if self.change is not None:
-            moved = moved + (change - self.change.theta)
-        onsets = tuple(
-            replace(one, before=tuple(np.add(one.before, moved[_strengths(one.effect)]).tolist()))
-            for one in self.onsets
-        )
+        change_by = None if self.change is None else change - self.change.theta
+        onsets = tuple(one.moved(theta - self.theta, change_by) for one in self.onsets)  # single wheels, also before it
         since = None
         if self.change is not None:
             since = replace(self.change, theta=change, disc_offset_k=disc_change)

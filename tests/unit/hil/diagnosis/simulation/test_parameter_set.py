@@ -98,3 +98,20 @@ def test_what_has_changed_since_a_reference_acts_in_later_logs_alone():
     assert begun.in_recording(1).onsets == ()
     (onset,) = begun.in_recording(2).onsets
     assert onset.before[: pads.stop - pads.start] == pytest.approx([1.05 * 0.8 - 1.0, 0.05, 0.0, 0.0])
+
+
+def test_an_effect_that_begins_since_the_reference_is_not_in_it():
+    """An extension whose pads lose a fifth in the third log; the first two are the reference, all bite 30 % more."""
+    bare = nominal(load_vehicle(SIX))
+    pads = THETA.slice("pad_mu_gain", "gain")
+    weak = bare.adding(range(pads.start, pads.stop), -0.2).with_onset("pad_mu_gain", 2, 4.0, before=bare)
+    base = replace(weak, change=Change(2))
+    at = tuple(range(pads.start, pads.stop))
+    common = Nuisance("pad_mu_gain@car", at, (0.1,) * 4, NuisanceKind.LEARNED)
+    day = Nuisance("pad_mu_gain.gain_of_the_day_0", (pads.start,), (0.01,), NuisanceKind.OF_THE_DAY)
+    moved = base.with_nuisances((common, day), np.array([3.0, 2.0]))
+    assert moved.in_recording(1).theta[pads] == pytest.approx(np.full(4, 0.3))
+    assert moved.in_recording(1).onsets == ()
+    (onset,) = moved.in_recording(2).onsets
+    assert onset.before[: len(at)] == pytest.approx([1.3 * 1.02 - 1.0, 0.3, 0.3, 0.3])
+    assert moved.in_recording(2).theta[pads] == pytest.approx([1.1 * 1.02 - 1.0, 0.1, 0.1, 0.1])
