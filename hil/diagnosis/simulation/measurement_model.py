@@ -175,7 +175,8 @@ def toothed(
             mean[t, k] += window_rows2 / 24.0 * (omega[t + 1, k] - 2.0 * omega[t, k] + omega[t - 1, k])
     for t in range(omega.shape[0]):
         for k in range(omega.shape[1]):
-            rows = min(half_pitch / max(abs(omega[t, k]), _TURNS_RAD_S), _TOOTH_ROWS)
+            speed = omega[t, k] if late[t] == 0.0 else cubic(omega, k, t - late[t])
+            rows = min(half_pitch / max(abs(speed), _TURNS_RAD_S), _TOOTH_ROWS)
             out[t, k] = cubic(mean, k, t - late[t] - share * rows)
 
 

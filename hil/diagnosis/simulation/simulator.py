@@ -200,11 +200,14 @@ class Simulator:
         for group, part in wanted:
             where = INPUT.slice(part)
             difference = inputs[:, where] - simulated[group]
+            if not np.isfinite(difference).all():  # the car diverges: inputs stay as measured
+                continue
             window = min(_SMOOTH, (len(difference) - 1) // 2 * 2 + 1)
             inputs[:, where] = simulated[group] + savgol_filter(difference, window, 2, axis=0)
         if "motor" in groups:
             x, mask = initial_state_of(self.vehicle, recording, at, measured), self.dataset.measured_input_mask
-            inputs[:, INPUT.slice("motor_torque_bend_nm")] = motor_bend(x, recording, at, mask)
+            bend = motor_bend(x, recording, at, mask)
+            inputs[:, INPUT.slice("motor_torque_bend_nm")] = np.where(np.isfinite(bend), bend, 0.0)
         again = measured.copy()
         recording = replace(recording, inputs=inputs)
         sensed = self.measurement_model.measure_rows(

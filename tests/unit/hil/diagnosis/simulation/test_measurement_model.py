@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hil.diagnosis.data.grid import at_samples
-from hil.diagnosis.simulation.measurement_model import delayed, without_latency
+from hil.diagnosis.simulation.measurement_model import delayed, toothed, without_latency
 from plant.injection.theta import THETA
 from plant.vectors import INPUT
 
@@ -51,3 +51,12 @@ def test_the_steering_wheel_may_act_later_than_it_is_logged():
 def test_channels_of_a_wider_table_are_shifted_too():
     table = np.random.default_rng(2).standard_normal((12, 6))
     assert delayed(table[:, 2:4], np.ones(12))[1:] == pytest.approx(table[:-1, 2:4])
+
+
+def test_the_lag_of_a_toothed_wheel_is_that_of_the_speed_when_it_was_sampled():
+    """Stamps 20 ms late of a wheel that slows down: measured first, stamped then, in one shift or in two."""
+    omega, none, late = np.linspace(30.0, 4.0, 105)[:, None], np.zeros(105), np.full(105, 2.0)
+    at_once, measured = np.empty_like(omega), np.empty_like(omega)
+    toothed(omega, 0.0, 6.5, 1.0, late, at_once)
+    toothed(omega, 0.0, 6.5, 1.0, none, measured)
+    assert at_once[5:] == pytest.approx(delayed(measured, late)[5:], abs=1e-9)
