@@ -1,9 +1,8 @@
 """Changes since reference logs, each fitted first with the car held as the reference shows it.
 
 Beside a change dozens of common parts are free. With all of them free from the start a fit may end in a valley where
-these have taken the change up: a drag of 120 N m on one wheel gained nothing. With the change and the numbers of the
-day alone free, it is found at 82 N m; the rest follows from there (block coordinate descent; Nocedal and Wright 2006,
-sec. 9.3).
+these have taken the change up (docs/decisions/reference-logs.md, A change first). So the change and the numbers of the
+day are fitted alone, and the rest from there (block coordinate descent; Nocedal and Wright 2006, sec. 9.3).
 """
 
 from collections.abc import Sequence
@@ -51,12 +50,11 @@ def fit_changes(
 
     fitted = thread_map(fit_held, tests, "changes", progress)
     best = sorted(zip(tests, fitted, strict=True), key=lambda both: criterion(both[1]))[:CHANGES_WITH_ALL_FREE]
-    last, found = nuisance_fit.fitter, []
+    found = []
     for item, one in best:
-        nuisance_fit.fitter, model, noise = origin.copy(), one.model, one.noise
+        own, model, noise = nuisance_fit.beginning_with(origin), one.model, one.noise
         for _ in range(_PASSES):
-            nuisance_fit.relinearise(model.z, model.terms, noise)
-            model, noise = nuisance_fit.fit(nuisance_fit.fitter.at(model.z, model.terms, noise), noise)
+            own.relinearise(model.z, model.terms, noise)
+            model, noise = own.fit(own.fitter.at(model.z, model.terms, noise), noise)
         found.append((item, refitted(one, model, noise)))
-    nuisance_fit.fitter = last
     return [item for item, _ in found], [one for _, one in found]

@@ -5,6 +5,7 @@ Takes a simulator of the nominal vehicle; gives fitters with the Jacobian at a p
 
 from collections import deque
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 
@@ -97,6 +98,12 @@ class NuisanceFit:
             parameters = with_term(parameters, term)
         return parameters
 
+    def beginning_with(self, fitter: Fitter) -> "NuisanceFit":
+        """A fit that begins with another fitter and leaves this one as it is; Jacobians are remembered for both."""
+        other = copy(self)
+        other.fitter = fitter
+        return other
+
     def relinearise_cached(self, z: Floats, terms: Sequence[Term]) -> None:
         """As `relinearise`, or a remembered Jacobian of a model that was alike."""
         for around, others, fitter in self._taken:
@@ -109,8 +116,10 @@ class NuisanceFit:
         """Nuisances and noise in turn until neither moves, with a new Jacobian where the nuisances moved.
 
         What is not explained yet counts as noise, so steps are forgiving. The first turn keeps the noise given: an
-        estimate there would take for noise what the nuisances explain.
+        estimate there would take for noise what the nuisances explain. Steps update a copy of the Jacobian: who has the
+        fitter of before, and who remembers it, keeps the one that was taken.
         """
+        self.fitter = self.fitter.copy()
         cost, around, times = np.inf, model.z, 0
         for turn in range(_TURNS):
             if turn:

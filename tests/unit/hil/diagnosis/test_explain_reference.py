@@ -49,7 +49,7 @@ def _drives(first_seed: int, drag_nm: tuple[float, ...] = (0.0,) * 4) -> list[di
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-@pytest.mark.xfail(reason="many numbers take the most of it up (docs/decisions/reference-logs.md, A change first)")
+@pytest.mark.xfail(reason="many numbers take a part of it up (docs/decisions/reference-logs.md, A change first)")
 def test_a_drag_since_the_reference_is_named_though_many_numbers_could_take_it_up() -> None:
     found = explain(_drives(40, LARGE_DRAG_NM), VEHICLE, reference=_drives(30)).json
     (cause,) = found["causes"]

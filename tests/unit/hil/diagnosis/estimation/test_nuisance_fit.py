@@ -19,6 +19,7 @@ from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import load_vehicle, paper_car
 from hil.diagnosis.vehicle.priors import DISC_ASSUMED_SD_K, DISC_MEASURED_SD_K
 from plant.injection.theta import THETA
+from plant.vectors import INPUT
 
 NOISE_PA = 2e3
 GAINS = {"brake_gain_front_nm_pa": 2e-4, "brake_gain_rear_nm_pa": 1e-4}
@@ -52,6 +53,14 @@ def test_sensors_of_a_car_that_diverges_say_nothing(paper_fitter):
     late = replace(uneven, latency_s=(0.01,) * len(uneven.latency_s))
     for values in paper_fitter.simulator.run(late).values():
         assert np.isnan(values).all()
+
+
+def test_inputs_are_not_denoised_by_a_car_that_diverges(paper_fitter):
+    base = _INERTIA.applied(paper_fitter.base, -2.0)
+    simulator = paper_fitter.simulator.denoised(base)
+    assert all(np.isfinite(one.inputs[:, INPUT.slice("pressure_pa")]).all() for one in simulator.dataset.recordings)
+    with pytest.raises(UnusableError, match="the simulated car diverges"):
+        Fitter(simulator, paper_fitter.masks, base, paper_fitter.nuisances, {}).start()
 
 
 def test_from_a_car_that_diverges_no_step_is_made(paper_fitter):
@@ -276,3 +285,18 @@ def test_a_dead_time_is_estimated_on_either_side(side):
     assert np.sign(model.z[at]) == side  # how much of it is latency, one log leaves open
     left = drive.measured["pressure"] - model.channels["pressure"]
     assert np.sqrt(np.mean(left**2)) < 1.1 * NOISE_PA
+
+
+def test_a_fit_leaves_the_fitter_that_it_began_with_as_it_was():
+    """Steps update the Jacobian; who remembers the one at the nominal vehicle goes on from there."""
+    vehicle = paper_car()
+    case = prepare([log_of_pulses()], 0.308)
+    fit = NuisanceFit(Simulator(case, vehicle), SampleMasks.of(case), vehicle, nominal(vehicle), False)
+    before = fit.fitter
+    taken = {name: values.copy() for name, values in before.nuisance_jacobian.items()}
+    _, noise = before.start()
+    start = before.at(np.full(len(before.nuisances), 0.3), (), noise)
+    fit.fit(start, noise)
+    assert fit.fitter.updated
+    assert not before.updated
+    assert all(np.array_equal(values, taken[name]) for name, values in before.nuisance_jacobian.items())
