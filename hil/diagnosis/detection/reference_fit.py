@@ -62,7 +62,7 @@ class Reference:
 
     def with_common_parts(self, candidates: Sequence[Candidate]) -> "Reference":
         """With a common part of each of these that has none yet."""
-        _, added = _common_parts(self.base, self.nuisances, candidates, ())
+        _, added = common_parts(self.base, self.nuisances, candidates, ())
         return replace(self, nuisances=(*self.nuisances, *added), z=np.append(self.z, np.zeros(len(added))))
 
 
@@ -77,7 +77,7 @@ def common_part(candidate: Candidate) -> Nuisance:
     )  # fmt: skip
 
 
-def _common_parts(
+def common_parts(
     base: ParameterSet, known: Sequence[Nuisance], candidates: Sequence[Candidate], curves: Sequence[BasisExpansion]
 ) -> tuple[ParameterSet, list[Nuisance]]:
     """Common parts of candidates and nonparametric terms not ``known`` yet; the vehicle with rows of the latter."""
@@ -121,7 +121,7 @@ def fit_reference(
         elif settings.dictionary:
             progress("the reference: simulating nonparametric terms")
             curves = _curves_shown(fit.fitter, model, noise)
-        base, added = _common_parts(base, fit.nuisances, shown, curves)
+        base, added = common_parts(base, fit.nuisances, shown, curves)
         if not added:
             continue
         progress(f"the reference shows {', '.join([one.name for one in shown] + [one.name for one in curves])}")

@@ -5,8 +5,10 @@ Takes fitted hypotheses and the `hil.diagnosis.detection.threshold.DetectionThre
 takes out what is not needed at the end (`eliminate_backward`).
 """
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -26,10 +28,11 @@ from hil.diagnosis.detection.threshold import (
 from hil.diagnosis.estimation.aliases import resolve_aliases
 from hil.diagnosis.estimation.gauss_newton import Fitter
 from hil.diagnosis.estimation.model import Model, Tracks
-from hil.diagnosis.estimation.model_discrepancy import corrected_gain, variance_inflation, with_uncertainty
+from hil.diagnosis.estimation.model_discrepancy import UNLISTED, corrected_gain, variance_inflation, with_uncertainty
 from hil.diagnosis.estimation.terms import Candidate
 from hil.diagnosis.estimation.uncertainty import standard_deviations
 from hil.diagnosis.noise.model import Noise, SampleMasks, whiten
+from hil.diagnosis.vehicle.priors import NuisanceKind
 from plant.effects.effect import Effect
 
 # --- what divides a gain in these logs
@@ -80,22 +83,43 @@ class LocalDiscrepancy:
 # --- what the form of accepted causes leaves
 
 
-class FormErrorAllowance:
-    """What the accepted causes of a model may leave for a further one: a share of the chi-squared they ``explained``.
+@dataclass(frozen=True, eq=False)
+class _Form:
+    """What is known to a share of it alone: ``explained`` of chi-squared, energies of its signature
+    (`signature_energies`), where it acts, and which share of its amplitude may be wrong there."""
 
-    At their own injection points that share of all of it. Elsewhere as far as both act together: if their equations err
-    by a share f in every channel of every segment, a signature with energies e there takes at most
+    injection_points: frozenset[str]
+    explained: float
+    energies: Floats
+    share: float
+
+    def leaves(self, effect: Effect, energies: Callable[[], Floats]) -> float:
+        """In chi-squared, for an effect with a signature of these ``energies``."""
+        if self.injection_points.intersection(effect.injection_points):
+            return self.share**2 * self.explained
+        return FORM_ERROR**2 * self.explained * signature_overlap(self.energies, energies())
+
+
+class FormErrorAllowance:
+    """What the accepted causes of a model, and the curves that a reference shows, may leave for a further cause: a
+    share of the chi-squared they explain.
+
+    At their own injection points a share of all of it; a curve's is 1, for a change there that gains no more than the
+    curve does is what the reference shows as strongly. Elsewhere as far as both act together: if their equations err by
+    a share f in every channel of every segment, a signature with energies e there takes at most
     f^2 (sum sqrt(e P))^2 / sum e off chi-squared, P being the energies of the causes (Cauchy and Schwarz).
     """
 
     def __init__(self, explained: float, fitter: Fitter, model: Model, noise: Noise, jacobian: Tracks) -> None:
-        self._explained, self._jacobian, self._masks, self._noise = explained, jacobian, fitter.masks, noise
-        self._injection_points = {point for term in model.terms for point in term.candidate.effect.injection_points}
+        self._jacobian, self._masks, self._noise = jacobian, fitter.masks, noise
         self._known: dict[str, float] = {}
+        self._forms = _curves_of_the_reference(fitter, model, noise)
         if model.terms:
+            points = frozenset(point for term in model.terms for point in term.candidate.effect.injection_points)
             values = np.array(model.values())
             own = {name: (of @ values)[:, None] for name, of in fitter.term_jacobian(model).items()}
-            self._energies = signature_energies(own, self._masks, noise)
+            energies = signature_energies(own, self._masks, noise)
+            self._forms.append(_Form(points, explained, energies, FORM_ERROR_SAME_POINT))
 
     def of(self, candidate: Candidate) -> float:
         """In chi-squared, for a candidate; remembered."""
@@ -107,12 +131,34 @@ class FormErrorAllowance:
 
     def of_signature(self, effect: Effect, signature: Tracks) -> float:
         """In chi-squared, for an effect with this signature, (samples, 1)."""
-        if not self._injection_points:
-            return 0.0
-        if self._injection_points.intersection(effect.injection_points):
-            return FORM_ERROR_SAME_POINT**2 * self._explained
-        overlap = signature_overlap(self._energies, signature_energies(signature, self._masks, self._noise))
-        return FORM_ERROR**2 * self._explained * overlap
+        energies = cache(lambda: signature_energies(signature, self._masks, self._noise))
+        return sum(one.leaves(effect, energies) for one in self._forms)
+
+
+def _curves_of_the_reference(fitter: Fitter, model: Model, noise: Noise) -> list[_Form]:
+    """Nonparametric terms that a reference shows (`hil.diagnosis.detection.reference_fit`).
+
+    Such a term stands for an equation that nobody has: in other manoeuvres it acts otherwise. What it explains, before
+    and since, is what the other nuisance parameters do not.
+    """
+    curves = defaultdict(list)
+    for k, nuisance in enumerate(fitter.nuisances):
+        if nuisance.kind is NuisanceKind.LEARNED_CURVE and fitter.base.change is not None:
+            curves[nuisance.name.removeprefix(f"{UNLISTED}.").split("(")[0]].append(k)
+    if not curves:
+        return []
+    forms, columns = [], fitter.nuisance_jacobian_at(model)
+    information = fitter.nuisance_information(noise)
+    for point, own in curves.items():
+        z = model.z[own]
+        rest = [k for k in range(len(information)) if k not in own]
+        cross = information[np.ix_(rest, own)] @ z
+        others = information[np.ix_(rest, rest)] + np.eye(len(rest))
+        explained = float(z @ information[np.ix_(own, own)] @ z - cross @ np.linalg.solve(others, cross))
+        signature = {name: (values[:, own] @ z)[:, None] for name, values in columns.items()}
+        energies = signature_energies(signature, fitter.masks, noise)
+        forms.append(_Form(frozenset({point}), max(explained, 0.0), energies, 1.0))
+    return forms
 
 
 def signature_energies(signature: Tracks, masks: SampleMasks, noise: Noise) -> Floats:

@@ -8,9 +8,12 @@ from outsider import VEHICLE
 from pulses import log_as_driven
 
 from hil.diagnosis.data.prepare import prepare
+from hil.diagnosis.detection.nonparametric import NONPARAMETRIC_TERMS, basis_expansion
 from hil.diagnosis.detection.profile_fit import FittedHypothesis, criterion, refitted, unscored
+from hil.diagnosis.detection.reference_fit import common_parts, since
 from hil.diagnosis.detection.significance import (
     Elimination,
+    FormErrorAllowance,
     eliminate_backward,
     is_significant,
     local_inflation,
@@ -26,6 +29,7 @@ from hil.diagnosis.noise.model import Noise, SampleMasks
 from hil.diagnosis.simulation.parameter_set import nominal
 from hil.diagnosis.simulation.simulator import Simulator
 from hil.diagnosis.vehicle.load import load_vehicle
+from plant.effects.effect import Effect
 
 LEVEL_AND_STILL = {f"{key}_tolerance": 0.0 for key in ("road_grade", "wind_mps", "ax_zero_mps2")}
 """What else would share in a headwind in one log of 20 s."""
@@ -133,3 +137,34 @@ def test_no_error_of_the_form_gives_a_signature_more_and_the_worst_gives_it_all(
 
     assert max(taken(rng.normal(size=cause.shape)) for _ in range(200)) < bound
     assert taken(other) == pytest.approx(bound)
+
+
+def test_a_change_that_the_reference_shows_as_strongly_is_none():
+    """Slip stiffness by speed in both of two drives: a change there must gain more than the curve does."""
+    vehicle = load_vehicle(VEHICLE)
+    log = log_as_driven(vehicle, 0.318)
+    dataset = prepare([log, replace(log, name="another")], 0.318)
+    (unknown,) = [one for one in NONPARAMETRIC_TERMS if one.name == "tyre.stiffness(speed)"]
+    curve = basis_expansion(unknown, 5.0, 33.0)
+    base, added = common_parts(nominal(vehicle), (), (), [curve])
+    simulator, masks = Simulator(dataset, vehicle), SampleMasks.of(dataset)
+    nuisances = (*vehicle.nuisances, *added)
+    fit = NuisanceFit(simulator, masks, vehicle, since(base, 1), relinearise=False, nuisances=nuisances)
+    fitter = fit.fitter
+    none, noise = fitter.start()
+    z = np.append(np.zeros(len(vehicle.nuisances)), np.full(len(added), 0.3))
+    columns_of_curve = {
+        name: values[:, -len(added) :].sum(axis=1, keepdims=True) for name, values in fitter.nuisance_jacobian.items()
+    }
+    (wind,) = [one for one in candidates(columns()) if one.name == "headwind.wind_mps@car"]
+
+    def left(z: np.ndarray, effect: Effect) -> float:
+        model = replace(none, z=z)
+        return FormErrorAllowance(0.0, fitter, model, noise, {}).of_signature(effect, columns_of_curve)
+
+    own = curve.functions[0].effect
+    assert left(0.0 * z, own) == left(0.0 * z, wind.effect) == 0.0
+    assert left(2.0 * z, own) == pytest.approx(4.0 * left(z, own))
+    assert 0.0 < left(z, wind.effect) < left(z, own)
+    fitter.base = base
+    assert left(z, own) == 0.0
